@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user can get wrong, in one line."""
+
+
+class NeuralocksError(ValueError):
+    """Bad input: the message names the prim, file or argument, the fact, and the remedy.
+
+    Command line and add-on show the message as it is; anything else that escapes is a bug.
+    """
