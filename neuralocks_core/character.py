@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A character: skeleton, body surface, and which joint is which."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import Humanoid, find_humanoid
+from neuralocks_core.rotation import rotation_part
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints in bind pose, parents before children.
+
+    Attributes:
+        names: unique joint paths, (J).
+        parents: index of each joint's parent, -1 for a root, (J,) int.
+        bind: world transforms of the bind pose, (J, 4, 4) [m].
+    """
+
+    names: tuple[str, ...]
+    parents: np.ndarray
+    bind: np.ndarray
+
+    def __post_init__(self):
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "parents", np.asarray(self.parents, int))
+        object.__setattr__(self, "bind", np.asarray(self.bind, float))
+        count = len(self.names)
+        if not count:
+            raise NeuralocksError("skeleton: it has no joints; choose a skeleton with a head joint")
+        if len(set(self.names)) != count:
+            raise NeuralocksError("skeleton: two joints have the same path; make joint paths unique")
+        if self.parents.shape != (count,) or (self.parents >= np.arange(count)).any() or self.parents.min() < -1:
+            raise NeuralocksError("skeleton: a joint comes before its parent; order the joints root first")
+        if self.bind.shape != (count, 4, 4) or not np.isfinite(self.bind).all():
+            raise NeuralocksError(f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose")
+
+
+@dataclass(frozen=True)
+class Body:
+    """Skinned triangle mesh in bind pose.
+
+    Attributes:
+        points: (V, 3) [m], world space of the bind pose.
+        triangles: (F, 3) int, outward by the right-hand rule.
+        joint_indices: (V, I) int.
+        joint_weights: (V, I), each row sums to one.
+        shapes: blend shape name -> offsets (V, 3) [m].
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    joint_indices: np.ndarray
+    joint_weights: np.ndarray
+    shapes: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
+        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`."""
+        if weights is None or not len(self.shapes):
+            return self.points
+        return self.points + np.einsum("b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values())))
+
+    def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""
+        points = self.shaped(weights)
+        blended = np.einsum("vi,vixy->vxy", self.joint_weights, skinning[self.joint_indices, :3])
+        return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
+
+
+@dataclass(frozen=True)
+class Character:
+    """A skeleton with its body and the meaning of its joints.
+
+    Attributes:
+        skeleton: the joints.
+        body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
+        humanoid: semantic names of joints; found by name and hierarchy where left out.
+    """
+
+    skeleton: Skeleton
+    body: Body | None = None
+    humanoid: Humanoid = None
+
+    def __post_init__(self):
+        if self.humanoid is None:
+            humanoid = find_humanoid(self.skeleton.names, self.skeleton.parents, self.skeleton.bind[:, :3, 3])
+            object.__setattr__(self, "humanoid", humanoid)
+
+    @property
+    def head(self) -> int:
+        """Index of the joint that carries the hair."""
+        return self.humanoid["head"]
+
+    @cached_property
+    def inverse_bind(self) -> np.ndarray:
+        """(J, 4, 4)."""
+        return np.linalg.inv(self.skeleton.bind)
+
+    @cached_property
+    def facing(self) -> np.ndarray:
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
+        bind = self.skeleton.bind[:, :3, 3]
+        for part in ("upper_arm", "shoulder", "upper_leg", "eye"):
+            left, right = self.humanoid.get(f"left_{part}"), self.humanoid.get(f"right_{part}")
+            if left is not None and right is not None and left != right:
+                x, _, z = bind[left] - bind[right]
+                if np.hypot(x, z) > 1e-4:
+                    c, s = np.array([x, z]) / np.hypot(x, z)
+                    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        return np.eye(3)
+
+    @cached_property
+    def canonical_to_bind(self) -> np.ndarray:
+        """Transform (4, 4) from canonical space (origin at the head joint, +Z face) to bind world."""
+        transform = np.eye(4)
+        transform[:3, :3] = self.facing.T
+        transform[:3, 3] = self.skeleton.bind[self.head, :3, 3]
+        return transform
+
+    def carrying(self, joints: np.ndarray) -> np.ndarray:
+        """Rigid transforms (..., 4, 4), bind world to posed world, with which the head carries the groom.
+
+        `joints` (..., J, 4, 4) are world transforms.
+        """
+        joints = np.asarray(joints, float)
+        return joints[..., self.head, :, :] @ self.inverse_bind[self.head]
+
+    def canonical_to_world(self, joints: np.ndarray) -> np.ndarray:
+        """Transforms (..., 4, 4) from canonical to world space for world joint transforms (..., J, 4, 4)."""
+        return self.carrying(joints) @ self.canonical_to_bind
+
+    def relative_rotations(self, joints: np.ndarray, indices) -> np.ndarray:
+        """World rotations (..., n, 3, 3) of the joints since the bind pose, in axes that face +Z there."""
+        now = rotation_part(np.asarray(joints, float)[..., indices, :, :], "animation")
+        bind = rotation_part(self.skeleton.bind[indices], "bind pose")
+        return now @ np.swapaxes(bind, -1, -2) @ self.facing.T
+
+    def posed_body(self, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray | None:
+        """World points (V, 3) of the body for one pose, joints (J, 4, 4)."""
+        return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
+
+    def head_mask(self) -> np.ndarray | None:
+        """Which body vertices (V,) move mainly with the head or what hangs below it."""
+        if self.body is None:
+            return None
+        below = np.zeros(len(self.skeleton.names), bool)
+        below[self.head] = True
+        for joint, parent in enumerate(self.skeleton.parents):
+            below[joint] |= parent >= 0 and below[parent]
+        return np.sum(self.body.joint_weights * below[self.body.joint_indices], axis=1) > 0.5
+
+    @cached_property
+    def head_centre(self) -> np.ndarray:
+        """Centre of the head in canonical space (3,) [m]: middle of its surface, or an average adult's."""
+        mask = self.head_mask()
+        if mask is None or mask.sum() < 20:
+            return np.array([0.0, 0.08, 0.02])
+        points = (self.body.points[mask] - self.canonical_to_bind[:3, 3]) @ self.facing.T
+        low, high = points.min(axis=0), points.max(axis=0)
+        # The chin and the neck's skin belong to the head's vertices but not to the skull: measure from the top.
+        width = high[0] - low[0]
+        return np.array([(low[0] + high[0]) / 2, high[1] - 0.65 * width, (low[2] + high[2]) / 2])

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rotations: 3x3 matrices everywhere, quaternions (w, x, y, z) only here and at the borders."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from neuralocks_core.errors import NeuralocksError
+
+
+def to_quaternion(matrices: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) wxyz, w >= 0, of rotation matrices (..., 3, 3)."""
+    matrices = np.asarray(matrices, float)
+    flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return flat.reshape(*matrices.shape[:-2], 4)
+
+
+def from_quaternion(quaternions: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4) wxyz, which need not be of unit length."""
+    quaternions = np.asarray(quaternions, float)
+    flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
+    return flat.reshape(*quaternions.shape[:-1], 3, 3)
+
+
+def to_vector(matrices: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3)."""
+    matrices = np.asarray(matrices, float)
+    return Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec().reshape(*matrices.shape[:-2], 3)
+
+
+def from_vector(vectors: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) [rad]."""
+    vectors = np.asarray(vectors, float)
+    return Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*vectors.shape[:-1], 3, 3)
+
+
+def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any normal."""
+    a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
+    b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
+    a, b = np.broadcast_arrays(a, b)
+    cosine = np.sum(a * b, axis=-1, keepdims=True)
+    axis = np.cross(a, b)
+    # At 180 degrees the cross product vanishes; any axis at right angles to a serves.
+    fallback = np.cross(a, np.where(np.abs(a[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    quaternion = np.concatenate([1 + cosine, axis], axis=-1)
+    opposite = cosine < -1 + 1e-12
+    return from_quaternion(np.where(opposite, np.concatenate([0 * cosine, fallback], axis=-1), quaternion))
+
+
+def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
+    """Rotation (..., 3, 3) of transforms (..., 4, 4) after scale is divided out.
+
+    Raises:
+        NeuralocksError: a transform is mirrored, flat or not finite; `subject` names it.
+    """
+    linear = np.asarray(transforms, float)[..., :3, :3]
+    if not np.isfinite(linear).all():
+        raise NeuralocksError(f"{subject}: a transform holds NaN or infinity; repair the animation")
+    scale = np.linalg.norm(linear, axis=-2, keepdims=True)
+    if scale.size and scale.min() < 1e-9:
+        raise NeuralocksError(f"{subject}: a transform has zero scale; give every joint a scale above zero")
+    linear = linear / scale
+    if (np.linalg.det(linear) <= 0).any():
+        raise NeuralocksError(f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale")
+    u, _, vt = np.linalg.svd(linear)  # nearest rotation, so that shear from non-uniform scale cannot leak in
+    return u @ vt
