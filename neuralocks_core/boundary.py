@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The boundary history: what the body did up to a time, as the vector that a network reads (paper section 3.3).
+
+The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative to the head and the bind pose, so
+that joint orients and names cancel out; the shape is measured on the body, so that it means the same on every rig; and the history holds
+effective gravity in the head's frame, R^T (g - a), without which a jump cannot be seen. `docs/deviations.md` says why.
+"""
+
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from neuralocks_core import rotation
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import SEMANTIC
+from neuralocks_core.measures import MEASURES, body_measures
+from neuralocks_core.motion import GRAVITY, Clip
+
+POSE_JOINTS = ("neck", "upper_chest", "left_shoulder", "right_shoulder", "left_upper_arm", "right_upper_arm")
+MATERIALS = 4
+
+
+@dataclass(frozen=True)
+class BoundarySpec:
+    """What the network reads of the body, and at which times.
+
+    Attributes:
+        dt: the model's own time step [s].
+        bins: how many steps each history sample averages over, newest first; `(1,) * 30` is the paper's N = 30, `()` the static variant.
+        pose_joints: semantic joints whose rotation relative to the head is read.
+        linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes) or "none".
+        chest: whether the upper chest's angular velocity is in the history beside the head's.
+        taper: share of the history, at its old end, that fades to nothing so that no echo follows a stop.
+    """
+
+    dt: float = 1 / 30
+    bins: tuple[int, ...] = (1,) * 12 + (2,) * 8 + (4,) * 8
+    pose_joints: tuple[str, ...] = POSE_JOINTS
+    linear: str = "gravity"
+    chest: bool = True
+    taper: float = 0.3
+
+    def __post_init__(self):
+        object.__setattr__(self, "bins", tuple(int(b) for b in self.bins))
+        object.__setattr__(self, "pose_joints", tuple(self.pose_joints))
+        if not 1e-4 < self.dt < 1 or any(not 1 <= b <= 1000 for b in self.bins) or len(self.bins) > 1000:
+            raise NeuralocksError("model: its history has an impossible time step or bin; get an undamaged copy of the model")
+        if self.linear not in ("gravity", "velocity", "none") or not set(self.pose_joints) <= set(SEMANTIC):
+            raise NeuralocksError("model: it reads something of the body that this version does not know; update neuralocks")
+
+    @classmethod
+    def from_json(cls, values: dict) -> "BoundarySpec":
+        """From what `to_json` gave; unknown keys mean a later version."""
+        unknown = set(values) - {f.name for f in fields(cls)}
+        if unknown:
+            raise NeuralocksError(f"model: its boundary history has '{sorted(unknown)[0]}', unknown here; update neuralocks")
+        try:
+            return cls(**values)
+        except TypeError as error:
+            raise NeuralocksError(f"model: unreadable boundary history ({error}); get an undamaged copy") from None
+
+    def to_json(self) -> dict:
+        """Plain values for the model file."""
+        return asdict(self)
+
+    @property
+    def per_bin(self) -> int:
+        """Numbers per history bin."""
+        return 3 * ((self.linear != "none") + 1 + self.chest)
+
+    @property
+    def slices(self) -> dict[str, slice]:
+        """Where pose, gravity, shape, material and history lie in the vector."""
+        sizes = {
+            "pose": 6 * len(self.pose_joints),
+            "gravity": 3,
+            "shape": len(MEASURES),
+            "material": MATERIALS,
+            "history": self.per_bin * len(self.bins),
+        }
+        ends = np.cumsum(list(sizes.values()))
+        return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return self.slices["history"].stop
+
+    @property
+    def steps(self) -> int:
+        """How many earlier steps of `dt` the history covers."""
+        return sum(self.bins)
+
+
+class BoundarySampler:
+    """Boundary vectors of one character in one clip, at any time.
+
+    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the accelerations of the motion and not
+    those of its polyline. Before the clip the head goes on with its first velocity and does not turn; a loop is continued on both sides.
+    """
+
+    GRAVITY_LIMIT = 6.0
+    """Largest change of effective gravity that is passed on [g]: a teleport must not throw the network out of what it has seen."""
+    SPIN_LIMIT = 25.0
+    """Largest angular velocity that is passed on [rad/s]."""
+
+    def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
+        self.spec, self.character, self.clip = spec, character, clip
+        humanoid = character.humanoid
+        self._indices = [character.head, humanoid.nearest("upper_chest"), *(humanoid.nearest(n) for n in spec.pose_joints)]
+        self._stance = np.stack([_stance(character, name) for name in spec.pose_joints])
+        times, joints = _extended(clip)
+        rotations = character.relative_rotations(joints, self._indices)
+        quaternions = rotation.to_quaternion(rotations)
+        flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
+        quaternions[1:] *= flips[..., None]
+        values = np.concatenate([joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
+        self._start, self._end = times[0], times[-1]
+        if len(times) == 1:
+            self._spline = lambda t: np.broadcast_to(values[0], (len(t), values.shape[1])).copy()
+            self._speeds = np.zeros((2, 3))
+        else:
+            self._spline = CubicSpline(times, values, bc_type="natural")
+            self._speeds = self._spline(times[[0, -1]], 1)[:, :3]
+        self._taper = _taper(spec)
+        self._shape_cache: dict[bytes, np.ndarray] = {}
+
+    def vectors(self, times, material=(0.0,) * MATERIALS, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+        """Boundary vectors (n, spec.size) float32 at times (n,) [s].
+
+        Args:
+            times: (n,) [s].
+            material: log-ratios to the reference material, (4,) or (n, 4).
+            strength: motion strength; scales the history and is exact at 0 (the held pose).
+            joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, where they are known better than by the clip.
+        """
+        spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
+        lags = spec.dt * np.arange(spec.steps + 2)
+        position, turns = self._sample((times[:, None] - lags).ravel())
+        position, turns = position.reshape(len(times), -1, 3), turns.reshape(len(times), len(lags), -1, 3, 3)
+        now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self._indices)
+        result = np.zeros((len(times), spec.size), np.float32)
+        parts = spec.slices
+        head = now[:, 0]
+        relative = np.swapaxes(head[:, None], -1, -2) @ now[:, 2:] @ self._stance
+        result[:, parts["pose"]] = relative[..., :2].swapaxes(-1, -2).reshape(len(times), -1)
+        static = np.einsum("nji,j->ni", head, GRAVITY / 9.81)
+        result[:, parts["gravity"]] = static
+        result[:, parts["shape"]] = [self._measures(shape) for shape in self.clip.shape_at(times)]
+        result[:, parts["material"]] = material
+        if spec.bins:
+            result[:, parts["history"]] = strength * self._history(position, turns, static)
+        return result
+
+    def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
+        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured from."""
+        result = np.zeros(self.spec.size, np.float32)
+        parts = self.spec.slices
+        result[parts["pose"]] = self._stance[..., :2].swapaxes(-1, -2).ravel()
+        result[parts["gravity"]] = GRAVITY / 9.81
+        result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
+        result[parts["material"]] = material
+        return result
+
+    def _measures(self, shape: np.ndarray) -> np.ndarray:
+        key = shape.tobytes()
+        if key not in self._shape_cache:
+            if len(self._shape_cache) > 64:
+                self._shape_cache.clear()
+            self._shape_cache[key] = body_measures(self.character, shape)
+        return self._shape_cache[key]
+
+    def _sample(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Head positions (m, 3) and rotations (m, n, 3, 3) of the joints read."""
+        if self.clip.loop:
+            base = self.clip.wrapped(times)
+            laps = np.round((times - base) / max(self.clip.end - self.clip.start, 1e-9))
+            values = self._spline(base)
+            drift = self.clip.joints[-1, self.character.head, :3, 3] - self.clip.joints[0, self.character.head, :3, 3]
+            position = values[:, :3] + laps[:, None] * drift
+        else:
+            base = np.clip(times, self._start, self._end)
+            values = self._spline(base)
+            outside = times - base
+            position = values[:, :3] + outside[:, None] * np.where(outside[:, None] < 0, self._speeds[0], self._speeds[1])
+        return position, rotation.from_quaternion(values[:, 3:].reshape(len(times), -1, 4))
+
+    def _history(self, position, turns, static) -> np.ndarray:
+        """(n, per_bin * bins): means over the bins, newest first, tapered."""
+        spec = self.spec
+        to_head = np.swapaxes(turns[:, :-2, 0], -1, -2)
+        columns = []
+        if spec.linear == "gravity":
+            acceleration = (position[:, :-2] - 2 * position[:, 1:-1] + position[:, 2:]) / spec.dt**2
+            felt = np.einsum("nkij,nkj->nki", to_head, GRAVITY - acceleration) / 9.81
+            columns.append(_limited(felt - static[:, None], self.GRAVITY_LIMIT))
+        elif spec.linear == "velocity":
+            velocity = (position[:, :-2] - position[:, 1:-1]) / spec.dt
+            columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, velocity), self.SPIN_LIMIT))
+        for joint in (0, 1)[: 1 + spec.chest]:
+            step = turns[:, :-2, joint] @ np.swapaxes(turns[:, 1:-1, joint], -1, -2)
+            spin = rotation.to_vector(step) / spec.dt
+            columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, spin), self.SPIN_LIMIT))
+        rows = np.concatenate(columns, axis=-1)
+        ends = np.cumsum(spec.bins)
+        means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
+        return (means * self._taper[:, None]).reshape(len(rows), -1)
+
+
+def _stance(character: Character, name: str) -> np.ndarray:
+    """Rotation (3, 3) from a T-pose's upper arm to the rig's own bind pose; identity for other joints.
+
+    Without it the same hanging arm would read differently on a rig bound in T-pose and on one bound in A-pose.
+    """
+    side = name.removesuffix("_upper_arm")
+    arm, elbow = character.humanoid.get(name), character.humanoid.get(f"{side}_lower_arm")
+    if side == name or arm is None or elbow is None:
+        return np.eye(3)
+    bone = character.facing @ (character.skeleton.bind[elbow, :3, 3] - character.skeleton.bind[arm, :3, 3])
+    if np.linalg.norm(bone) < 1e-6:
+        return np.eye(3)
+    return rotation.between([1.0 if side == "left" else -1.0, 0.0, 0.0], bone)
+
+
+def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors * np.minimum(1.0, limit / np.maximum(length, 1e-9))
+
+
+def _taper(spec: BoundarySpec) -> np.ndarray:
+    """Weight of each bin: 1, falling as a cosine to 0 over the last `taper` of the history."""
+    if not spec.bins:
+        return np.zeros(0)
+    middle = np.cumsum(spec.bins) - np.asarray(spec.bins) / 2
+    into = np.clip((middle / spec.steps - (1 - spec.taper)) / max(spec.taper, 1e-9), 0, 1)
+    return 0.5 + 0.5 * np.cos(np.pi * into)
+
+
+def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is smooth."""
+    if not clip.loop or len(clip.times) < 3:
+        return clip.times, clip.joints
+    pad = min(len(clip.times) - 1, 8)
+    period = clip.end - clip.start
+    drift = np.zeros((clip.joints.shape[1], 4, 4))
+    drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
+    times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])
+    return times, np.concatenate([clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift])

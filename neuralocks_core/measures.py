@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Body shape as ten lengths that mean the same on every rig.
+
+The paper conditions on the coefficients of its statistical body; those mean nothing on another one. Ten lengths measured on the bind pose
+around the head tell the network the same: where head, neck, shoulders and back are.
+"""
+
+import numpy as np
+
+from neuralocks_core.character import Character
+
+MEASURES = (
+    "head half width",
+    "head height over its joint",
+    "head front",
+    "head back",
+    "neck below head joint",
+    "neck behind head joint",
+    "upper arm half distance",
+    "upper arm below head joint",
+    "upper arm behind head joint",
+    "back behind head joint",
+)
+AVERAGE = np.array([0.075, 0.17, 0.11, 0.10, 0.09, 0.02, 0.17, 0.20, 0.03, 0.13])
+"""An average adult [m], for what a rig does not have."""
+
+
+def body_measures(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
+    """The ten MEASURES (10,) [m] of the bind pose with blend shape weights `shape` (B,)."""
+    result = AVERAGE.copy()
+    to_canonical = np.linalg.inv(character.canonical_to_bind)
+    joints = character.skeleton.bind[:, :3, 3] @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    humanoid = character.humanoid
+    if "neck" in humanoid:
+        result[4:6] = -joints[humanoid["neck"], 1], -joints[humanoid["neck"], 2]
+    if "left_upper_arm" in humanoid and "right_upper_arm" in humanoid:
+        left, right = joints[humanoid["left_upper_arm"]], joints[humanoid["right_upper_arm"]]
+        result[6:9] = (left[0] - right[0]) / 2, -(left[1] + right[1]) / 2, -(left[2] + right[2]) / 2
+    mask = character.head_mask()
+    if mask is not None and mask.sum() >= 20:
+        points = character.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+        head = points[mask]
+        result[:4] = np.abs(head[:, 0]).max(), head[:, 1].max(), head[:, 2].max(), -head[:, 2].min()
+        # The back at shoulder height, where long hair lies.
+        torso = points[~mask & (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])]
+        if len(torso):
+            result[9] = -torso[:, 2].min()
+    return result

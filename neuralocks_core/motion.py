@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A clip of body motion, and its value at any time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from neuralocks_core.errors import NeuralocksError
+
+GRAVITY = np.array([0.0, -9.81, 0.0])
+"""[m/s^2], Y up."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """World transforms of every joint over time.
+
+    World, not local: constraints, inverse kinematics, drivers and moved roots are already in them.
+
+    Attributes:
+        times: ascending sample times, (T,) [s].
+        joints: world transforms, (T, J, 4, 4) [m].
+        shape: blend shape weights, (T, B) or (T, 0).
+        loop: whether the last sample is followed by the first, so that history is taken modulo the period.
+    """
+
+    times: np.ndarray
+    joints: np.ndarray
+    shape: np.ndarray = None
+    loop: bool = False
+
+    def __post_init__(self):
+        object.__setattr__(self, "times", np.asarray(self.times, float))
+        object.__setattr__(self, "joints", np.asarray(self.joints, float))
+        shape = np.zeros((len(self.times), 0)) if self.shape is None else np.asarray(self.shape, float)
+        object.__setattr__(self, "shape", shape)
+        count = len(self.times)
+        if not count:
+            raise NeuralocksError("animation: it has no samples; animate the skeleton over the frames to bake")
+        if self.joints.ndim != 4 or self.joints.shape[0] != count or self.joints.shape[2:] != (4, 4):
+            raise NeuralocksError(f"animation: {self.joints.shape} transforms for {count} times; give one (J, 4, 4) per time")
+        if shape.ndim != 2 or len(shape) != count:
+            raise NeuralocksError(f"animation: {shape.shape} blend shape weights for {count} times; give one row per time")
+        if (np.diff(self.times) <= 0).any():
+            raise NeuralocksError("animation: sample times do not ascend; sort them and remove doubles")
+        bad = ~np.isfinite(self.joints).all(axis=(1, 2, 3)) | ~np.isfinite(shape).all(axis=1) | ~np.isfinite(self.times)
+        if bad.any():
+            raise NeuralocksError(f"animation: NaN or infinity at {self.times[bad][0]:.4g} s; repair the animation there")
+
+    @property
+    def start(self) -> float:
+        """First sample time [s]."""
+        return float(self.times[0])
+
+    @property
+    def end(self) -> float:
+        """Last sample time [s]."""
+        return float(self.times[-1])
+
+    def at(self, times) -> np.ndarray:
+        """World joint transforms (n, J, 4, 4) at any times (n,) [s].
+
+        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the nearest sample is held
+        (or the loop goes on).
+        """
+        times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
+        low, fraction = self._bracket(times)
+        near = fraction < 1e-9
+        result = self.joints[low].copy()
+        for i in np.flatnonzero(~near):
+            result[i] = _blend(self.joints[low[i]], self.joints[low[i] + 1], fraction[i])
+        return result
+
+    def shape_at(self, times) -> np.ndarray:
+        """Blend shape weights (n, B) at times (n,) [s], linear between samples."""
+        times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
+        low, fraction = self._bracket(times)
+        high = np.minimum(low + 1, len(self.times) - 1)
+        return (1 - fraction)[:, None] * self.shape[low] + fraction[:, None] * self.shape[high]
+
+    def wrapped(self, times: np.ndarray) -> np.ndarray:
+        """Times inside the clip: clamped, or modulo the period of a loop."""
+        if self.loop and self.end > self.start:
+            inside = (times >= self.start) & (times <= self.end)
+            return np.where(inside, times, self.start + np.mod(times - self.start, self.end - self.start))
+        return np.clip(times, self.start, self.end)
+
+    def _bracket(self, times):
+        if len(self.times) == 1:
+            return np.zeros(len(times), int), np.zeros(len(times))
+        low = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        fraction = (times - self.times[low]) / (self.times[low + 1] - self.times[low])
+        # An exact sample must come back as it is, also the last one.
+        low, fraction = np.where(fraction > 1 - 1e-9, low + 1, low), np.where(fraction > 1 - 1e-9, 0.0, fraction)
+        return low, fraction
+
+
+def _blend(a: np.ndarray, b: np.ndarray, fraction: float) -> np.ndarray:
+    """Transforms (J, 4, 4) between a and b; rotation, scale and translation each on their own."""
+    scale_a, scale_b = (np.linalg.norm(m[:, :3, :3], axis=1, keepdims=True) for m in (a, b))
+    turn_a = Rotation.from_matrix(a[:, :3, :3] / scale_a)
+    turn = (turn_a.inv() * Rotation.from_matrix(b[:, :3, :3] / scale_b)).as_rotvec() * fraction
+    result = (1 - fraction) * a + fraction * b
+    result[:, :3, :3] = (turn_a * Rotation.from_rotvec(turn)).as_matrix() * ((1 - fraction) * scale_a + fraction * scale_b)
+    return result
