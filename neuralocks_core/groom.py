@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A groom: all strands of one hairstyle at rest, exactly as their author left them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .errors import NeuralocksError
+
+# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a millimetre.
+LARGEST_COORDINATE = 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class Groom:
+    """Strands at rest in metres, world space of the bind pose, Y up.
+
+    Vertex counts and strand order are the author's and never change: a bake writes back exactly this topology. Strands
+    with fewer than two distinct points stay in the groom; `strands.StrandSet.valid` keeps them out of the network.
+
+    Arrays are converted to the stated types and made read-only.
+
+    Raises:
+        NeuralocksError: a shape does not fit, a value is not finite, or there is no strand.
+    """
+
+    name: str
+    """What messages call the groom: a prim path or a file name."""
+    points: np.ndarray
+    """(P, 3) float32 [m], strand after strand, root first."""
+    counts: np.ndarray
+    """(S,) int32, vertices of each strand; they sum to P."""
+    widths: np.ndarray = None  # type: ignore[assignment]
+    """(P,), (S,) or (1,) float32 [m], the diameter; left out means 0.08 mm everywhere."""
+    root_uv: np.ndarray | None = None
+    """(S, 2) float32, the texture coordinate of the root on the scalp mesh, for shading only."""
+    guides: np.ndarray | None = None
+    """(S,) bool, true for the strands that other tools should treat as guides."""
+    group: np.ndarray | None = None
+    """(S,) int32, a number for each named part of the hairstyle."""
+
+    def __post_init__(self) -> None:
+        def put(field: str, value: np.ndarray) -> None:
+            value = value.view()
+            value.flags.writeable = False
+            object.__setattr__(self, field, value)
+
+        put("points", self._array("points", self.points, np.float32))
+        put("counts", self._whole_numbers("counts", self.counts))
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise self._error(f"points have shape {self.points.shape}", "give (P, 3)")
+        if self.counts.ndim != 1:
+            raise self._error(f"counts have shape {self.counts.shape}", "give one number a strand")
+        if len(self.counts) == 0:
+            raise self._error("holds no strands", "give a groom with at least one strand")
+        if self.counts.min() < 0:
+            raise self._error(f"strand {int(self.counts.argmin())} has a negative vertex count", "repair the groom")
+        total = int(self.counts.sum(dtype=np.int64))
+        if total != len(self.points):
+            raise self._error(f"vertex counts sum to {total} but there are {len(self.points)} points",
+                              "repair the groom's topology")
+        if total == 0:
+            raise self._error("has strands but no points", "give the strands their points")
+        self._check_values("points", self.points, LARGEST_COORDINATE, "m")
+
+        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
+        if widths.ndim != 1 or len(widths) not in {1, len(self.counts), total}:
+            raise self._error(f"widths have shape {widths.shape}",
+                              f"give 1, {len(self.counts)} (one a strand) or {total} (one a point)")
+        self._check_values("widths", widths, LARGEST_COORDINATE, "m")
+        put("widths", widths)
+
+        per_strand = (("root_uv", np.float32, (len(self.counts), 2)), ("guides", np.bool_, (len(self.counts),)))
+        for field, kind, shape in per_strand:
+            if getattr(self, field) is not None:
+                value = self._array(field, getattr(self, field), kind)
+                if value.shape != shape:
+                    raise self._error(f"{field} has shape {value.shape}", f"give {shape}")
+                if kind == np.float32:
+                    self._check_values(field, value, np.inf, "")
+                put(field, value)
+        if self.group is not None:
+            put("group", self._whole_numbers("group", self.group))
+            if self.group.shape != self.counts.shape:
+                raise self._error(f"group has shape {self.group.shape}", f"give ({len(self.counts)},)")
+
+    @property
+    def strand_count(self) -> int:
+        """S, the number of strands, valid or not."""
+        return len(self.counts)
+
+    @cached_property
+    def starts(self) -> np.ndarray:
+        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no points)."""
+        ends = np.cumsum(self.counts, dtype=np.int64)
+        return ends - self.counts
+
+    @cached_property
+    def strand_of_point(self) -> np.ndarray:
+        """(P,) int32, the strand that each point belongs to."""
+        return np.repeat(np.arange(self.strand_count, dtype=np.int32), self.counts)
+
+    @property
+    def roots(self) -> np.ndarray:
+        """(S, 3) float32 [m], first point of each strand (NaN for a strand without points)."""
+        roots = self.points[np.minimum(self.starts, len(self.points) - 1)].copy()
+        roots[self.counts == 0] = np.nan
+        return roots
+
+    def subset(self, strands: np.ndarray) -> Groom:
+        """The groom made of the given strands only, in the given order.
+
+        Args:
+            strands: (N,) int indices or (S,) bool mask.
+        """
+        chosen = np.arange(self.strand_count)[np.asarray(strands)]
+        counts = self.counts[chosen]
+        # Index of each kept point: its strand's start, plus its place within the strand.
+        within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(np.cumsum(counts, dtype=np.int64) - counts, counts)
+        kept = np.repeat(self.starts[chosen], counts) + within
+        widths = self.widths
+        if len(widths) == len(self.points) and len(self.points) > 1:
+            widths = widths[kept]
+        elif len(widths) == self.strand_count and self.strand_count > 1:
+            widths = widths[chosen]
+        pick = {f: None if getattr(self, f) is None else getattr(self, f)[chosen] for f in ("root_uv", "guides", "group")}
+        return replace(self, points=self.points[kept], counts=counts, widths=widths, **pick)
+
+    def _error(self, fact: str, remedy: str) -> NeuralocksError:
+        return NeuralocksError(f"{self.name}: {fact}; {remedy}")
+
+    def _array(self, field: str, value: object, kind: type) -> np.ndarray:
+        try:
+            with np.errstate(over="ignore"):
+                return np.ascontiguousarray(value, dtype=kind)
+        except (TypeError, ValueError):
+            raise self._error(f"{field} is not a plain array of numbers", "give one") from None
+
+    def _whole_numbers(self, field: str, value: object) -> np.ndarray:
+        try:
+            value = np.asarray(value)
+        except ValueError:
+            value = np.asarray(None)
+        if value.size and value.dtype.kind not in "iub":
+            raise self._error(f"{field} are not whole numbers", "give integers")
+        # Compared in Python: a uint64 would wrap around silently on conversion.
+        if value.size and not -(2**31) <= int(value.min()) <= int(value.max()) < 2**31:
+            raise self._error(f"{field} do not fit 32 bits", "repair the groom")
+        return np.ascontiguousarray(value, dtype=np.int32)
+
+    def _check_values(self, field: str, value: np.ndarray, largest: float, unit: str) -> None:
+        """Finite and of believable size; the message says where the first bad value lies."""
+        bad = ~(np.abs(value) <= largest) | ~np.isfinite(value)
+        if not bad.any():
+            return
+        rows = np.flatnonzero(bad.reshape(len(value), -1).any(axis=1))
+        first = value[rows[0]]
+        where = f"number {rows[0]}"
+        if len(value) == int(self.counts.sum(dtype=np.int64)):
+            where += f" (strand {int(self.strand_of_point[rows[0]])})"
+        if np.isfinite(first).all():
+            raise self._error(f"{field} lie farther than {largest:g} {unit} from the origin, first {where}",
+                              "check the unit")
+        raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")

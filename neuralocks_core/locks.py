@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Locks: clusters of neighbouring roots, what their strands share, and neighbours of single vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+STRANDS_A_LOCK = 8
+"""A lock holds at least about this many strands, or its mean code says nothing."""
+
+LOCK_SPACING = 0.012
+"""Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands, so
+that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
+
+_SAMPLE = 20_000
+_ITERATIONS = 12
+
+
+def lock_of_roots(roots: np.ndarray, locks: int | None = None, seed: int = 0) -> np.ndarray:
+    """Cluster strands by their roots (k-means; the paper, section 4.1, leaves the clustering open).
+
+    Args:
+        roots: (S, 3) [m].
+        locks: how many; if left out, by the size of the scalp and the number of strands.
+        seed: of the first centres; the same roots and seed always give the same locks.
+
+    Returns:
+        (S,) int32 lock of each strand, numbered without gaps from 0.
+    """
+    roots = np.asarray(roots, dtype=np.float64)
+    if locks is None:
+        cells = len(np.unique(np.floor(roots / LOCK_SPACING).astype(np.int64), axis=0))
+        locks = min(cells, -(-len(roots) // STRANDS_A_LOCK))
+    random = np.random.default_rng(seed)
+    sample = roots if len(roots) <= _SAMPLE else roots[random.choice(len(roots), _SAMPLE, replace=False)]
+    distinct = np.unique(sample, axis=0)  # a hair tie may hold many strands in one point
+    centres = random.choice(distinct, min(max(locks, 1), len(distinct)), replace=False)
+    for _ in range(_ITERATIONS):
+        nearest = cKDTree(centres).query(sample)[1]
+        size = np.bincount(nearest, minlength=len(centres))
+        total = np.stack([np.bincount(nearest, sample[:, axis], len(centres)) for axis in range(3)], axis=1)
+        centres = np.where(size[:, None] > 0, total / np.maximum(size, 1)[:, None], centres)
+    lock = cKDTree(centres).query(roots)[1]
+    return np.unique(lock, return_inverse=True)[1].astype(np.int32).ravel()
+
+
+def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
+    """Mean code of each strand's lock (z_lock of the paper, section 4.1).
+
+    Args:
+        codes: (S, D) strand codes.
+        lock: (S,) int lock of each strand.
+        valid: (S,) bool, strands that count; a lock without any takes the mean over its placeholders.
+
+    Returns:
+        (S, D) float32.
+    """
+    weight = np.ones(len(lock)) if valid is None else np.where(valid, 1.0, 1e-6)
+    share = np.bincount(lock, weight)
+    mean = np.stack([np.bincount(lock, weight * column) for column in np.asarray(codes, np.float64).T], axis=1)
+    return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)[lock]
+
+
+def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5) -> np.ndarray:
+    """The nearest vertices of other strands at rest, which adhesion keeps near.
+
+    Args:
+        rest: (S, K, 3) [m].
+        lock: (S,) int; if given, only strands of the same lock are neighbours.
+        radius: largest distance [m].
+        count: at most this many.
+
+    Returns:
+        (S, K, count) int32, index into the S K vertices, nearest first; -1 where there are fewer.
+    """
+    strands, vertices = rest.shape[:2]
+    points = np.asarray(rest, np.float64).reshape(-1, 3)
+    tree = cKDTree(points)
+    found = np.full((len(points), count), -1, np.int32)
+    todo, asked = np.arange(len(points)), 2 * count + 4
+    while len(todo):
+        asked = min(asked, len(points))
+        distance, index = tree.query(points[todo], np.arange(1, asked + 1), distance_upper_bound=radius)
+        present = index < len(points)
+        other = np.where(present, index, 0) // vertices
+        own = todo[:, None] // vertices
+        good = present & (other != own)
+        if lock is not None:
+            good &= lock[other] == lock[own]
+        first = np.argsort(~good, axis=1, kind="stable")[:, :count]
+        pick = np.where(np.take_along_axis(good, first, 1), np.take_along_axis(index, first, 1), -1)
+        found[todo, :pick.shape[1]] = pick
+        # Again, with more candidates, for those whose list ended before the radius did.
+        short = (good.sum(axis=1) < count) & np.isfinite(distance[:, -1])
+        if asked == len(points):
+            break
+        todo, asked = todo[short], 4 * asked
+    return found.reshape(strands, vertices, count)
