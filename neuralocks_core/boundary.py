@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The boundary history: what the body did up to a time, as the vector that a network reads (paper section 3.3).
+"""The boundary history: what the body did up to a time, as the vector that a network reads (paper section
+3.3).
 
-The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative to the head and the bind pose, so
-that joint orients and names cancel out; the shape is measured on the body, so that it means the same on every rig; and the history holds
-effective gravity in the head's frame, R^T (g - a), without which a jump cannot be seen. `docs/deviations.md` says why.
+The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative
+to the head and the bind pose, so
+that joint orients and names cancel out; the shape is measured on the body, so that it means the same on
+every rig; and the history holds
+effective gravity in the head's frame, R^T (g - a), without which a jump cannot be seen. `docs/deviations.md`
+says why.
 """
 
 from dataclasses import asdict, dataclass, fields
@@ -28,9 +32,11 @@ class BoundarySpec:
 
     Attributes:
         dt: the model's own time step [s].
-        bins: how many steps each history sample averages over, newest first; `(1,) * 30` is the paper's N = 30, `()` the static variant.
+        bins: how many steps each history sample averages over, newest first; `(1,) * 30` is the paper's N =
+            30, `()` the static variant.
         pose_joints: semantic joints whose rotation relative to the head is read.
-        linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes) or "none".
+        linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes)
+            or "none".
         chest: whether the upper chest's angular velocity is in the history beside the head's.
         taper: share of the history, at its old end, that fades to nothing so that no echo follows a stop.
     """
@@ -46,20 +52,28 @@ class BoundarySpec:
         object.__setattr__(self, "bins", tuple(int(b) for b in self.bins))
         object.__setattr__(self, "pose_joints", tuple(self.pose_joints))
         if not 1e-4 < self.dt < 1 or any(not 1 <= b <= 1000 for b in self.bins) or len(self.bins) > 1000:
-            raise NeuralocksError("model: its history has an impossible time step or bin; get an undamaged copy of the model")
+            raise NeuralocksError(
+                "model: its history has an impossible time step or bin; get an undamaged copy of the model"
+            )
         if self.linear not in ("gravity", "velocity", "none") or not set(self.pose_joints) <= set(SEMANTIC):
-            raise NeuralocksError("model: it reads something of the body that this version does not know; update neuralocks")
+            raise NeuralocksError(
+                "model: it reads something of the body that this version does not know; update neuralocks"
+            )
 
     @classmethod
     def from_json(cls, values: dict) -> "BoundarySpec":
         """From what `to_json` gave; unknown keys mean a later version."""
         unknown = set(values) - {f.name for f in fields(cls)}
         if unknown:
-            raise NeuralocksError(f"model: its boundary history has '{sorted(unknown)[0]}', unknown here; update neuralocks")
+            raise NeuralocksError(
+                f"model: its boundary history has '{sorted(unknown)[0]}', unknown here; update neuralocks"
+            )
         try:
             return cls(**values)
         except TypeError as error:
-            raise NeuralocksError(f"model: unreadable boundary history ({error}); get an undamaged copy") from None
+            raise NeuralocksError(
+                f"model: unreadable boundary history ({error}); get an undamaged copy"
+            ) from None
 
     def to_json(self) -> dict:
         """Plain values for the model file."""
@@ -81,7 +95,10 @@ class BoundarySpec:
             "history": self.per_bin * len(self.bins),
         }
         ends = np.cumsum(list(sizes.values()))
-        return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        return {
+            name: slice(int(end) - size, int(end))
+            for (name, size), end in zip(sizes.items(), ends, strict=True)
+        }
 
     @property
     def size(self) -> int:
@@ -97,26 +114,36 @@ class BoundarySpec:
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
-    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the accelerations of the motion and not
-    those of its polyline. Before the clip the head goes on with its first velocity and does not turn; a loop is continued on both sides.
+    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the
+    accelerations of the motion and not
+    those of its polyline. Before the clip the head goes on with its first velocity and does not turn; a loop
+    is continued on both sides.
     """
 
     GRAVITY_LIMIT = 6.0
-    """Largest change of effective gravity that is passed on [g]: a teleport must not throw the network out of what it has seen."""
+    """Largest change of effective gravity that is passed on [g]: a teleport must not throw the network out
+    of what it has seen.
+    """
     SPIN_LIMIT = 25.0
     """Largest angular velocity that is passed on [rad/s]."""
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         self.spec, self.character, self.clip = spec, character, clip
         humanoid = character.humanoid
-        self._indices = [character.head, humanoid.nearest("upper_chest"), *(humanoid.nearest(n) for n in spec.pose_joints)]
+        self._indices = [
+            character.head,
+            humanoid.nearest("upper_chest"),
+            *(humanoid.nearest(n) for n in spec.pose_joints),
+        ]
         self._stance = np.stack([_stance(character, name) for name in spec.pose_joints])
         times, joints = _extended(clip)
         rotations = character.relative_rotations(joints, self._indices)
         quaternions = rotation.to_quaternion(rotations)
         flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
         quaternions[1:] *= flips[..., None]
-        values = np.concatenate([joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
+        values = np.concatenate(
+            [joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1
+        )
         self._start, self._end = times[0], times[-1]
         if len(times) == 1:
             self._spline = lambda t: np.broadcast_to(values[0], (len(t), values.shape[1])).copy()
@@ -127,14 +154,17 @@ class BoundarySampler:
         self._taper = _taper(spec)
         self._shape_cache: dict[bytes, np.ndarray] = {}
 
-    def vectors(self, times, material=(0.0,) * MATERIALS, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+    def vectors(
+        self, times, material=(0.0,) * MATERIALS, strength: float = 1.0, joints: np.ndarray | None = None
+    ) -> np.ndarray:
         """Boundary vectors (n, spec.size) float32 at times (n,) [s].
 
         Args:
             times: (n,) [s].
             material: log-ratios to the reference material, (4,) or (n, 4).
             strength: motion strength; scales the history and is exact at 0 (the held pose).
-            joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, where they are known better than by the clip.
+            joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, where they are
+                known better than by the clip.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
         lags = spec.dt * np.arange(spec.steps + 2)
@@ -155,7 +185,9 @@ class BoundarySampler:
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
-        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured from."""
+        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured
+        from.
+        """
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
         result[parts["pose"]] = self._stance[..., :2].swapaxes(-1, -2).ravel()
@@ -178,13 +210,18 @@ class BoundarySampler:
             base = self.clip.wrapped(times)
             laps = np.round((times - base) / max(self.clip.end - self.clip.start, 1e-9))
             values = self._spline(base)
-            drift = self.clip.joints[-1, self.character.head, :3, 3] - self.clip.joints[0, self.character.head, :3, 3]
+            drift = (
+                self.clip.joints[-1, self.character.head, :3, 3]
+                - self.clip.joints[0, self.character.head, :3, 3]
+            )
             position = values[:, :3] + laps[:, None] * drift
         else:
             base = np.clip(times, self._start, self._end)
             values = self._spline(base)
             outside = times - base
-            position = values[:, :3] + outside[:, None] * np.where(outside[:, None] < 0, self._speeds[0], self._speeds[1])
+            position = values[:, :3] + outside[:, None] * np.where(
+                outside[:, None] < 0, self._speeds[0], self._speeds[1]
+            )
         return position, rotation.from_quaternion(values[:, 3:].reshape(len(times), -1, 4))
 
     def _history(self, position, turns, static) -> np.ndarray:
@@ -205,14 +242,17 @@ class BoundarySampler:
             columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, spin), self.SPIN_LIMIT))
         rows = np.concatenate(columns, axis=-1)
         ends = np.cumsum(spec.bins)
-        means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
+        means = (
+            np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
+        )
         return (means * self._taper[:, None]).reshape(len(rows), -1)
 
 
 def _stance(character: Character, name: str) -> np.ndarray:
     """Rotation (3, 3) from a T-pose's upper arm to the rig's own bind pose; identity for other joints.
 
-    Without it the same hanging arm would read differently on a rig bound in T-pose and on one bound in A-pose.
+    Without it the same hanging arm would read differently on a rig bound in T-pose and on one bound in
+    A-pose.
     """
     side = name.removesuffix("_upper_arm")
     arm, elbow = character.humanoid.get(name), character.humanoid.get(f"{side}_lower_arm")
@@ -239,7 +279,9 @@ def _taper(spec: BoundarySpec) -> np.ndarray:
 
 
 def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is smooth."""
+    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its
+    seam is smooth.
+    """
     if not clip.loop or len(clip.times) < 3:
         return clip.times, clip.joints
     pad = min(len(clip.times) - 1, 8)
@@ -247,4 +289,6 @@ def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     drift = np.zeros((clip.joints.shape[1], 4, 4))
     drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
     times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])
-    return times, np.concatenate([clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift])
+    return times, np.concatenate(
+        [clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift]
+    )

@@ -34,10 +34,16 @@ class Skeleton:
             raise NeuralocksError("skeleton: it has no joints; choose a skeleton with a head joint")
         if len(set(self.names)) != count:
             raise NeuralocksError("skeleton: two joints have the same path; make joint paths unique")
-        if self.parents.shape != (count,) or (self.parents >= np.arange(count)).any() or self.parents.min() < -1:
+        if (
+            self.parents.shape != (count,)
+            or (self.parents >= np.arange(count)).any()
+            or self.parents.min() < -1
+        ):
             raise NeuralocksError("skeleton: a joint comes before its parent; order the joints root first")
         if self.bind.shape != (count, 4, 4) or not np.isfinite(self.bind).all():
-            raise NeuralocksError(f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose")
+            raise NeuralocksError(
+                f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose"
+            )
 
 
 @dataclass(frozen=True)
@@ -62,10 +68,14 @@ class Body:
         """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`."""
         if weights is None or not len(self.shapes):
             return self.points
-        return self.points + np.einsum("b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values())))
+        return self.points + np.einsum(
+            "b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values()))
+        )
 
     def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""
+        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind)
+        transforms.
+        """
         points = self.shaped(weights)
         blended = np.einsum("vi,vixy->vxy", self.joint_weights, skinning[self.joint_indices, :3])
         return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
@@ -77,7 +87,8 @@ class Character:
 
     Attributes:
         skeleton: the joints.
-        body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
+        body: the surface that hair rests on; None leaves the hair without a collider and with average
+            measures.
         humanoid: semantic names of joints; found by name and hierarchy where left out.
     """
 
@@ -102,7 +113,9 @@ class Character:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right
+        joints lie.
+        """
         bind = self.skeleton.bind[:, :3, 3]
         for part in ("upper_arm", "shoulder", "upper_leg", "eye"):
             left, right = self.humanoid.get(f"left_{part}"), self.humanoid.get(f"right_{part}")
@@ -141,7 +154,11 @@ class Character:
 
     def posed_body(self, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray | None:
         """World points (V, 3) of the body for one pose, joints (J, 4, 4)."""
-        return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
+        return (
+            None
+            if self.body is None
+            else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
+        )
 
     def head_mask(self) -> np.ndarray | None:
         """Which body vertices (V,) move mainly with the head or what hangs below it."""
@@ -161,6 +178,7 @@ class Character:
             return np.array([0.0, 0.08, 0.02])
         points = (self.body.points[mask] - self.canonical_to_bind[:3, 3]) @ self.facing.T
         low, high = points.min(axis=0), points.max(axis=0)
-        # The chin and the neck's skin belong to the head's vertices but not to the skull: measure from the top.
+        # The chin and the neck's skin belong to the head's vertices but not to the skull: measure from the
+        # top.
         width = high[0] - low[0]
         return np.array([(low[0] + high[0]) / 2, high[1] - 0.65 * width, (low[2] + high[2]) / 2])

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
-The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a capital), parts by
-their usual names, and the trunk by hierarchy: the upper chest is where the ways from the head and from the arms meet.
+The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l`
+before a capital), parts by
+their usual names, and the trunk by hierarchy: the upper chest is where the ways from the head and from the
+    arms meet.
 """
 
 import re
@@ -26,7 +28,25 @@ PARTS = {
 TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_NOISE = {"bip", "bip01", "bip001", "j", "c", "def", "org", "mixamorig", "cc", "base", "bone", "jnt", "joint", "skin", "b", "sk", "valvebiped"}
+_NOISE = {
+    "bip",
+    "bip01",
+    "bip001",
+    "j",
+    "c",
+    "def",
+    "org",
+    "mixamorig",
+    "cc",
+    "base",
+    "bone",
+    "jnt",
+    "joint",
+    "skin",
+    "b",
+    "sk",
+    "valvebiped",
+}
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
@@ -41,7 +61,9 @@ class Humanoid(Mapping):
         try:
             return self.joints[name]
         except KeyError:
-            raise NeuralocksError(f"skeleton: no joint found for '{name}'; name it by hand (--head JOINT or a joint map)") from None
+            raise NeuralocksError(
+                f"skeleton: no joint found for '{name}'; name it by hand (--head JOINT or a joint map)"
+            ) from None
 
     def get(self, name: str, default=None):
         """The joint index, or `default` where the rig has no such joint."""
@@ -57,9 +79,14 @@ class Humanoid(Mapping):
         return len(self.joints)
 
     def nearest(self, name: str) -> int:
-        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can drive a model."""
+        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can
+        drive a model.
+        """
         side = name.split("_")[0] if name.split("_")[0] in ("left", "right") else ""
-        ways = {"neck": ["neck", "head"], "upper_chest": ["upper_chest", "chest", "spine", "hips", "neck", "head"]}
+        ways = {
+            "neck": ["neck", "head"],
+            "upper_chest": ["upper_chest", "chest", "spine", "hips", "neck", "head"],
+        }
         if side:
             part = name[len(side) + 1 :]
             arm = ["upper_arm", "shoulder"] if part != "shoulder" else ["shoulder"]
@@ -91,7 +118,9 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
 
     for name, wanted in (by_hand or {}).items():
         if name not in SEMANTIC:
-            raise NeuralocksError(f"joint map: '{name}' is no semantic joint; use one of {', '.join(SEMANTIC)}")
+            raise NeuralocksError(
+                f"joint map: '{name}' is no semantic joint; use one of {', '.join(SEMANTIC)}"
+            )
         put(name, find_joint(names, wanted), "given by hand")
 
     sides, keys = zip(*(_side_and_key(name) for name in names), strict=True)
@@ -112,9 +141,15 @@ def find_joint(names, wanted: str) -> int:
     Raises:
         NeuralocksError: there is none, or several.
     """
-    hits = [i for i, name in enumerate(names) if name == wanted] or [i for i, name in enumerate(names) if _leaf(name) == wanted]
+    hits = [i for i, name in enumerate(names) if name == wanted] or [
+        i for i, name in enumerate(names) if _leaf(name) == wanted
+    ]
     if len(hits) != 1:
-        fact = "several joints have that name; give its full path" if hits else f"no such joint; it has {', '.join(map(_leaf, names[:12]))} ..."
+        fact = (
+            "several joints have that name; give its full path"
+            if hits
+            else f"no such joint; it has {', '.join(map(_leaf, names[:12]))} ..."
+        )
         raise NeuralocksError(f"joint '{wanted}': {fact}")
     return hits[0]
 
@@ -166,7 +201,8 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
     collar = first(("clavicle", "collar", "collarbone", "clav"))
     plain = first(("shoulder",))
     if found["upper_arm"] is None and plain is not None:
-        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no arm is named.
+        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no
+        # arm is named.
         found["upper_arm"], found["shoulder"] = plain, collar
     if found["upper_arm"] is None and found["lower_arm"] is not None and parents[found["lower_arm"]] >= 0:
         found["upper_arm"] = int(parents[found["lower_arm"]])
@@ -180,7 +216,13 @@ def _find_head(names, sides, keys, parents, positions):
         key = keys[i]
         return (key != "head", not key.endswith("head"), _depth(i, parents), i)
 
-    hits = [i for i in range(len(keys)) if "head" in keys[i] and not sides[i] and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)]
+    hits = [
+        i
+        for i in range(len(keys))
+        if "head" in keys[i]
+        and not sides[i]
+        and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)
+    ]
     if hits:
         best = min(hits, key=score)
         return best, f"by name '{_leaf(names[best])}'"
@@ -190,7 +232,8 @@ def _find_head(names, sides, keys, parents, positions):
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
             return children[0], f"child of the neck '{_leaf(names[neck])}'"
-    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head.
+    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the
+    # head.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
         best = max(spine, key=lambda i: _depth(i, parents))
@@ -220,7 +263,9 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
     put("neck", neck, f"between head and chest, '{_leaf(names[neck])}'" if neck is not None else "")
     if "upper_chest" in joints:
-        below = head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
+        below = (
+            head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
+        )
         if "hips" in joints and joints["hips"] in below:
             below = below[: below.index(joints["hips"])]
         if below:

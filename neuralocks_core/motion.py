@@ -37,16 +37,28 @@ class Clip:
         object.__setattr__(self, "shape", shape)
         count = len(self.times)
         if not count:
-            raise NeuralocksError("animation: it has no samples; animate the skeleton over the frames to bake")
+            raise NeuralocksError(
+                "animation: it has no samples; animate the skeleton over the frames to bake"
+            )
         if self.joints.ndim != 4 or self.joints.shape[0] != count or self.joints.shape[2:] != (4, 4):
-            raise NeuralocksError(f"animation: {self.joints.shape} transforms for {count} times; give one (J, 4, 4) per time")
+            raise NeuralocksError(
+                f"animation: {self.joints.shape} transforms for {count} times; give one (J, 4, 4) per time"
+            )
         if shape.ndim != 2 or len(shape) != count:
-            raise NeuralocksError(f"animation: {shape.shape} blend shape weights for {count} times; give one row per time")
+            raise NeuralocksError(
+                f"animation: {shape.shape} blend shape weights for {count} times; give one row per time"
+            )
         if (np.diff(self.times) <= 0).any():
             raise NeuralocksError("animation: sample times do not ascend; sort them and remove doubles")
-        bad = ~np.isfinite(self.joints).all(axis=(1, 2, 3)) | ~np.isfinite(shape).all(axis=1) | ~np.isfinite(self.times)
+        bad = (
+            ~np.isfinite(self.joints).all(axis=(1, 2, 3))
+            | ~np.isfinite(shape).all(axis=1)
+            | ~np.isfinite(self.times)
+        )
         if bad.any():
-            raise NeuralocksError(f"animation: NaN or infinity at {self.times[bad][0]:.4g} s; repair the animation there")
+            raise NeuralocksError(
+                f"animation: NaN or infinity at {self.times[bad][0]:.4g} s; repair the animation there"
+            )
 
     @property
     def start(self) -> float:
@@ -61,7 +73,8 @@ class Clip:
     def at(self, times) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) at any times (n,) [s].
 
-        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the nearest sample is held
+        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the
+        nearest sample is held
         (or the loop goes on).
         """
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
@@ -92,7 +105,10 @@ class Clip:
         low = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         fraction = (times - self.times[low]) / (self.times[low + 1] - self.times[low])
         # An exact sample must come back as it is, also the last one.
-        low, fraction = np.where(fraction > 1 - 1e-9, low + 1, low), np.where(fraction > 1 - 1e-9, 0.0, fraction)
+        low, fraction = (
+            np.where(fraction > 1 - 1e-9, low + 1, low),
+            np.where(fraction > 1 - 1e-9, 0.0, fraction),
+        )
         return low, fraction
 
 
@@ -102,5 +118,7 @@ def _blend(a: np.ndarray, b: np.ndarray, fraction: float) -> np.ndarray:
     turn_a = Rotation.from_matrix(a[:, :3, :3] / scale_a)
     turn = (turn_a.inv() * Rotation.from_matrix(b[:, :3, :3] / scale_b)).as_rotvec() * fraction
     result = (1 - fraction) * a + fraction * b
-    result[:, :3, :3] = (turn_a * Rotation.from_rotvec(turn)).as_matrix() * ((1 - fraction) * scale_a + fraction * scale_b)
+    result[:, :3, :3] = (turn_a * Rotation.from_rotvec(turn)).as_matrix() * (
+        (1 - fraction) * scale_a + fraction * scale_b
+    )
     return result

@@ -34,7 +34,9 @@ def from_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any normal."""
+    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about
+    any normal.
+    """
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
     a, b = np.broadcast_arrays(a, b)
@@ -61,6 +63,8 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
         raise NeuralocksError(f"{subject}: a transform has zero scale; give every joint a scale above zero")
     linear = linear / scale
     if (np.linalg.det(linear) <= 0).any():
-        raise NeuralocksError(f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale")
+        raise NeuralocksError(
+            f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale"
+        )
     u, _, vt = np.linalg.svd(linear)  # nearest rotation, so that shear from non-uniform scale cannot leak in
     return u @ vt

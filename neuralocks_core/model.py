@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one-file model, `*.neuralocks`: a zip of ONNX graphs and one JSON. Nothing in it is ever executed but
+the graphs.
+"""
+
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from neuralocks_core.errors import NeuralocksError
+
+FORMAT = 1
+KINDS = {
+    "strands": ("encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"),
+    "rig": ("rig.onnx",),
+}
+_LARGEST = 64 << 20
+"""Bytes of one unpacked entry; a model has about one million, so a bomb is told from a model."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model as read from disk: `meta` is the JSON, `graphs` the ONNX files by name."""
+
+    path: Path
+    meta: dict
+    graphs: dict[str, bytes] = field(repr=False)
+
+    @property
+    def kind(self) -> str:
+        """`strands` or `rig`."""
+        return self.meta["kind"]
+
+
+def shipped(kind: str = "strands") -> Path:
+    """Path of the model that is used when none is named.
+
+    Raises:
+        NeuralocksError: this installation does not hold it.
+    """
+    path = Path(__file__).parent / "shipped" / f"{kind}.neuralocks"
+    if not path.is_file():
+        raise NeuralocksError(
+            f"{path.name}: the shipped model is missing from this installation; reinstall or give --model"
+        )
+    return path
+
+
+def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path:
+    """Write a model file at once under its final name.
+
+    Args:
+        path: ends in `.neuralocks`.
+        meta: plain JSON values; `kind` is needed, `format` is set here.
+        graphs: the ONNX files that `KINDS[kind]` lists.
+    """
+    path = Path(path)
+    if path.suffix != ".neuralocks":
+        raise NeuralocksError(f"{path}: a model file ends in .neuralocks; choose such a name")
+    if set(graphs) != set(KINDS[meta["kind"]]):
+        raise ValueError(f"a {meta['kind']} model holds {KINDS[meta['kind']]}, not {tuple(graphs)}")
+    text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+                for name, data in {"model.json": text.encode(), **graphs}.items():
+                    # A fixed date: the same training gives the same bytes.
+                    archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, path)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+    except OSError as error:
+        raise NeuralocksError(
+            f"{path}: cannot be written ({error.strerror}); choose another folder"
+        ) from None
+    return path
+
+
+def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
+    """Read a model file.
+
+    Args:
+        path: the file.
+        kind: what it must be, `strands` or `rig`.
+
+    Raises:
+        NeuralocksError: it is missing, damaged, of a later format or of another kind.
+    """
+    path = Path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = {info.filename: info for info in archive.infolist()}
+            if "model.json" not in entries:
+                raise NeuralocksError(
+                    f"{path}: it is no neuralocks model (no model.json inside); choose a .neuralocks file"
+                )
+            meta = json.loads(_entry(archive, entries["model.json"], path))
+            _check(meta, path, kind)
+            missing = [name for name in KINDS[meta["kind"]] if name not in entries]
+            if missing:
+                raise NeuralocksError(f"{path}: it lacks {missing[0]}; get an undamaged copy of the model")
+            graphs = {name: _entry(archive, entries[name], path) for name in KINDS[meta["kind"]]}
+    except FileNotFoundError:
+        raise NeuralocksError(
+            f"{path}: no such model file; check the path or leave --model out for the shipped one"
+        ) from None
+    except (
+        OSError,
+        zipfile.BadZipFile,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        UnicodeDecodeError,
+        json.JSONDecodeError,
+        RecursionError,
+    ) as error:
+        raise NeuralocksError(
+            f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy"
+        ) from None
+    return ModelFile(path, meta, graphs)
+
+
+def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes:
+    if info.file_size > _LARGEST:
+        raise NeuralocksError(
+            f"{path}: {info.filename} claims {info.file_size} bytes, more than a model has; get another copy"
+        )
+    import zlib
+
+    try:
+        with archive.open(info) as file:
+            data = file.read(_LARGEST + 1)
+    except zlib.error as error:
+        raise NeuralocksError(
+            f"{path}: {info.filename} is damaged ({_first_line(error)}); get an undamaged copy"
+        ) from None
+    if len(data) > _LARGEST:
+        raise NeuralocksError(f"{path}: {info.filename} unpacks to more than a model has; get another copy")
+    return data
+
+
+def _check(meta, path: Path, kind: str | None) -> None:
+    if not isinstance(meta, dict) or not isinstance(meta.get("format"), int):
+        raise NeuralocksError(f"{path}: model.json has no format number; get an undamaged copy of the model")
+    if meta["format"] > FORMAT:
+        raise NeuralocksError(
+            f"{path}: it has format {meta['format']}, this version reads up to {FORMAT}; update neuralocks"
+        )
+    if meta.get("kind") not in KINDS:
+        raise NeuralocksError(f"{path}: it holds a '{meta.get('kind')}', unknown here; update neuralocks")
+    if kind and meta["kind"] != kind:
+        names = {"strands": "strand hair", "rig": "rigged mesh hair"}
+        raise NeuralocksError(
+            f"{path}: it is a model for {names[meta['kind']]}, not for {names[kind]}; give such a one"
+        )
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0]

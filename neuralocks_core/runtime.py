@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Strand inference with onnxruntime: what is the same for all frames once, what is the same for all strands
+once a frame.
+
+The first layer is linear in the strand and in the body, so its two parts are computed apart and added:
+    exact, and a third of the
+arithmetic is left per strand and frame. Strands go through in chunks that stay in the processor's cache.
+"""
+
+import os
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core import model as model_file
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.locks import lock_codes
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands import K, StrandSet, scalp_local
+
+CHUNK = 2048
+"""Strands in one call: 2 MB of hidden values, about a core's second-level cache. Fixed, so that results do
+not depend on the machine.
+"""
+
+
+class StrandModel:
+    """A strand model ready to run.
+
+    Args:
+        file: a model read by `model.read`.
+        threads: of onnxruntime; the result does not depend on it.
+    """
+
+    def __init__(self, file: model_file.ModelFile, threads: int | None = None):
+        self.file = file
+        self.meta = file.meta
+        self.spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
+        self.anchored = bool(file.meta.get("anchored", False))
+        self.threads = threads or min(os.cpu_count() or 1, 8)
+        self._sessions = {name: self._session(name) for name in model_file.KINDS["strands"]}
+        frame = self._sessions["frame.onnx"].get_inputs()[0].shape
+        if frame[-1] != self.spec.size:
+            raise NeuralocksError(
+                f"{file.path}: its network reads {frame[-1]} values, its description gives {self.spec.size}; "
+                "get another copy"
+            )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
+        """From a file; the shipped model where `path` is None."""
+        return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
+
+    def prepare(self, strands: StrandSet) -> "StrandSession":
+        """Compute once what depends on the strands alone."""
+        return StrandSession(self, strands)
+
+    def sampler(self, character: Character, clip: Clip) -> BoundarySampler:
+        """Boundary vectors as this model reads them."""
+        return BoundarySampler(self.spec, character, clip)
+
+    def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
+        """One output of one graph, float32."""
+        return self._sessions[graph].run([output], inputs)[0]
+
+    def frame_part(self, vector: np.ndarray) -> np.ndarray:
+        """First layer, body part (1, 256), of a boundary vector (spec.size,)."""
+        return self.run("frame.onnx", "frame_part", frame=np.asarray(vector, np.float32).reshape(1, -1))
+
+    def _session(self, name: str):
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = self.threads
+        options.log_severity_level = 3
+        try:
+            return onnxruntime.InferenceSession(
+                self.file.graphs[name], options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
+            fact = str(error).splitlines()[0][:120]
+            raise NeuralocksError(
+                f"{self.file.path}: {name} cannot be loaded ({fact}); get an undamaged copy"
+            ) from None
+
+
+class StrandSession:
+    """A model bound to one groom.
+
+    Attributes:
+        strands: the groom.
+        codes: latent codes z_rest, (S, 32).
+    """
+
+    def __init__(self, model: StrandModel, strands: StrandSet):
+        self.model, self.strands = model, strands
+        count = len(strands.rest)
+        shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
+        self.codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
+        inputs = strand_inputs(strands, self.codes)
+        self._strand_part = self._by_chunk(
+            lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256
+        )
+        edges = np.zeros((count, K, 3), np.float32)
+        edges[:, 1:] = np.diff(strands.rest, axis=1)
+        self._edges = edges.reshape(count, 3 * K)
+        self._anchor = np.zeros((count, 3 * K), np.float32)
+        self._anchored_at: np.ndarray | None = None
+
+    def anchor(self, vector: np.ndarray) -> None:
+        """Measure an anchored model's answers from this boundary vector: the bind pose, held, with the
+        materials in use.
+
+        Costs one inference, and nothing when the vector is the one already in use.
+        """
+        if not self.model.anchored or (
+            self._anchored_at is not None and np.array_equal(vector, self._anchored_at)
+        ):
+            return
+        self._anchor[:] = 0
+        self._anchor[:] = self._tail("offsets", vector)
+        self._anchored_at = np.array(vector)
+
+    def displacement(
+        self, vector: np.ndarray, strands: slice = slice(None), out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Displacement (n, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
+
+        Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
+        """
+        result = self._tail("displacement", vector, strands, out)
+        still = ~self.strands.valid[strands]
+        if still.any():
+            result[still] = 0
+        return result.reshape(len(result), K, 3)
+
+    def _tail(self, output, vector, strands: slice = slice(None), out=None) -> np.ndarray:
+        frame = self.model.frame_part(vector)
+        start, stop, _ = strands.indices(len(self._edges))
+        result = (
+            np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
+        )
+        # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the
+        # groom's end: the sums in a
+        # matrix product may depend on its height, and a bake must not depend on how it was split.
+        for low in range(start - start % CHUNK, stop, CHUNK):
+            chunk = slice(low, min(low + CHUNK, len(self._edges)))
+            values = self.model.run(
+                "tail.onnx",
+                output,
+                strand_part=self._strand_part[chunk],
+                frame_part=frame,
+                anchor=self._anchor[chunk],
+                edges=self._edges[chunk],
+            )
+            a, b = max(low, start), min(chunk.stop, stop)
+            result[a - start : b - start] = values[a - low : b - low]
+        return result
+
+    def _by_chunk(self, function, width: int) -> np.ndarray:
+        count = len(self.strands.rest)
+        result = np.empty((count, width), np.float32)
+        for low in range(0, count, CHUNK):
+            result[low : low + CHUNK] = function(slice(low, low + CHUNK))
+        return result
+
+    @cached_property
+    def nbytes(self) -> int:
+        """Memory held for this groom [bytes]."""
+        return self._strand_part.nbytes + self._edges.nbytes + self._anchor.nbytes + self.codes.nbytes
+
+
+def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
+    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3,
+    length 1.
+    """
+    locks = lock_codes(codes, strands.lock, strands.valid)
+    return np.concatenate(
+        [strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1
+    ).astype(np.float32)
