@@ -23,10 +23,10 @@ _RESIDUAL_FLOOR = 2e-7
 class Carrier:
     """Moves the groom's own vertices as the network's vertices move.
 
-    An own vertex takes the displacement of the network polyline at its arc length. What separates it from that
-    polyline (the turns of a coil, say) is carried along rigidly: turned by the smallest rotation that takes the
-    polyline's rest segment to the deformed one. Zero displacement gives the groom's own points bit for bit, and
-    strands that the network does not move (`StrandSet.valid` false) always stay.
+    An own vertex takes the displacement of the network polyline at its arc length. What separates it from
+    that polyline (the turns of a coil, say) is carried along rigidly: turned by the smallest rotation that
+    takes the polyline's rest segment to the deformed one. Zero displacement gives the groom's own points bit
+    for bit, and strands that the network does not move (`StrandSet.valid` false) always stay.
 
     Args:
         groom: the groom that `strands` was made of.
@@ -37,7 +37,9 @@ class Carrier:
         self._groom = groom
         self._rest = strands.rest
         self._valid = strands.valid
-        self._facing = None if np.array_equal(strands.facing, np.eye(3)) else strands.facing.astype(np.float32)
+        self._facing = (
+            None if np.array_equal(strands.facing, np.eye(3)) else strands.facing.astype(np.float32)
+        )
         self._all_valid = bool(strands.valid.all())
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
         self._negative_zero = bool((np.signbit(groom.points) & (groom.points == 0)).any())
@@ -46,7 +48,9 @@ class Carrier:
         canonical = (groom.points - strands.head_origin) @ strands.facing.T
         owner = groom.strand_of_point
         self._direct = bool((groom.counts == segments + 1).all()) and bool(
-            np.abs(canonical.reshape(-1, segments + 1, 3) - strands.rest)[strands.valid].max(initial=0.0) < 1e-6)
+            np.abs(canonical.reshape(-1, segments + 1, 3) - strands.rest)[strands.valid].max(initial=0.0)
+            < 1e-6
+        )
         if self._direct:
             return
 
@@ -59,17 +63,20 @@ class Carrier:
         on_line = flat[self._segment] * (1.0 - self._weight) + flat[self._segment + 1] * self._weight
         residual = canonical - on_line
         residual[~strands.valid[owner]] = 0.0
-        # The length is what matters: a strand drawn with straight pieces between network vertices needs no turning.
+        # A strand that lies on the network's polyline needs no turning.
         bent = np.linalg.norm(residual, axis=1) > _RESIDUAL_FLOOR
         self._bent = np.zeros(groom.strand_count, np.bool_)
         self._bent[owner[bent]] = True
         self._residual = residual.astype(np.float32)
 
-    def carry(self, displacement: np.ndarray, out: np.ndarray | None = None, strands: slice | None = None) -> np.ndarray:
+    def carry(
+        self, displacement: np.ndarray, out: np.ndarray | None = None, strands: slice | None = None
+    ) -> np.ndarray:
         """The groom's own points after a deformation.
 
         Args:
-            displacement: (N, K, 3) float32 [m], canonical axes, for the strands of the slice (all S without one).
+            displacement: (N, K, 3) float32 [m], canonical axes, for the strands of the slice (all S without
+                one).
             out: (points of these strands, 3) float32, filled and returned; made if left out.
             strands: a slice of consecutive strands.
 
@@ -86,8 +93,8 @@ class Carrier:
             out = np.empty((self._ends[last] - begin, 3), np.float32)
         for start in range(first, last, CHUNK):
             stop = min(start + CHUNK, last)
-            part = out[self._ends[start] - begin:self._ends[stop] - begin]
-            self._carry(np.asarray(displacement[start - first:stop - first], np.float32), start, stop, part)
+            part = out[self._ends[start] - begin : self._ends[stop] - begin]
+            self._carry(np.asarray(displacement[start - first : stop - first], np.float32), start, stop, part)
         return out
 
     def _carry(self, displacement: np.ndarray, start: int, stop: int, out: np.ndarray) -> None:
@@ -98,8 +105,9 @@ class Carrier:
         else:
             moved = self._between(displacement, start, stop)
         if self._facing is not None:
-            moved = moved @ self._facing  # the inverse of a rotation: rows times R are columns times its transpose
-        own = self._groom.points[self._ends[start]:self._ends[stop]]
+            # The inverse of a rotation: rows times R are columns times its transpose.
+            moved = moved @ self._facing
+        own = self._groom.points[self._ends[start] : self._ends[stop]]
         np.add(own, moved, out=out)
         if self._negative_zero:  # -0 + 0 is +0: the one value that adding nothing changes
             np.copyto(out, own, where=moved == 0)

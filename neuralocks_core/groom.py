@@ -10,7 +10,8 @@ import numpy as np
 
 from .errors import NeuralocksError
 
-# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a millimetre.
+# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a
+# millimetre.
 LARGEST_COORDINATE = 1e4
 
 
@@ -18,8 +19,9 @@ LARGEST_COORDINATE = 1e4
 class Groom:
     """Strands at rest in metres, world space of the bind pose, Y up.
 
-    Vertex counts and strand order are the author's and never change: a bake writes back exactly this topology. Strands
-    with fewer than two distinct points stay in the groom; `strands.StrandSet.valid` keeps them out of the network.
+    Vertex counts and strand order are the author's and never change: a bake writes back exactly this
+    topology. Strands with fewer than two distinct points stay in the groom; `strands.StrandSet.valid` keeps
+    them out of the network.
 
     Arrays are converted to the stated types and made read-only.
 
@@ -57,23 +59,36 @@ class Groom:
         if len(self.counts) == 0:
             raise self._error("holds no strands", "give a groom with at least one strand")
         if self.counts.min() < 0:
-            raise self._error(f"strand {int(self.counts.argmin())} has a negative vertex count", "repair the groom")
+            raise self._error(
+                f"strand {int(self.counts.argmin())} has a negative vertex count", "repair the groom"
+            )
         total = int(self.counts.sum(dtype=np.int64))
         if total != len(self.points):
-            raise self._error(f"vertex counts sum to {total} but there are {len(self.points)} points",
-                              "repair the groom's topology")
+            raise self._error(
+                f"vertex counts sum to {total} but there are {len(self.points)} points",
+                "repair the groom's topology",
+            )
         if total == 0:
             raise self._error("has strands but no points", "give the strands their points")
         self._check_values("points", self.points, LARGEST_COORDINATE, "m")
 
-        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
+        widths = (
+            np.full(1, 8e-5, np.float32)
+            if self.widths is None
+            else self._array("widths", self.widths, np.float32)
+        )
         if widths.ndim != 1 or len(widths) not in {1, len(self.counts), total}:
-            raise self._error(f"widths have shape {widths.shape}",
-                              f"give 1, {len(self.counts)} (one a strand) or {total} (one a point)")
+            raise self._error(
+                f"widths have shape {widths.shape}",
+                f"give 1, {len(self.counts)} (one a strand) or {total} (one a point)",
+            )
         self._check_values("widths", widths, LARGEST_COORDINATE, "m")
         put("widths", widths)
 
-        per_strand = (("root_uv", np.float32, (len(self.counts), 2)), ("guides", np.bool_, (len(self.counts),)))
+        per_strand = (
+            ("root_uv", np.float32, (len(self.counts), 2)),
+            ("guides", np.bool_, (len(self.counts),)),
+        )
         for field, kind, shape in per_strand:
             if getattr(self, field) is not None:
                 value = self._array(field, getattr(self, field), kind)
@@ -94,7 +109,8 @@ class Groom:
 
     @cached_property
     def starts(self) -> np.ndarray:
-        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no points)."""
+        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no
+        points)."""
         ends = np.cumsum(self.counts, dtype=np.int64)
         return ends - self.counts
 
@@ -119,14 +135,19 @@ class Groom:
         chosen = np.arange(self.strand_count)[np.asarray(strands)]
         counts = self.counts[chosen]
         # Index of each kept point: its strand's start, plus its place within the strand.
-        within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(np.cumsum(counts, dtype=np.int64) - counts, counts)
+        within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(
+            np.cumsum(counts, dtype=np.int64) - counts, counts
+        )
         kept = np.repeat(self.starts[chosen], counts) + within
         widths = self.widths
         if len(widths) == len(self.points) and len(self.points) > 1:
             widths = widths[kept]
         elif len(widths) == self.strand_count and self.strand_count > 1:
             widths = widths[chosen]
-        pick = {f: None if getattr(self, f) is None else getattr(self, f)[chosen] for f in ("root_uv", "guides", "group")}
+        pick = {
+            f: None if getattr(self, f) is None else getattr(self, f)[chosen]
+            for f in ("root_uv", "guides", "group")
+        }
         return replace(self, points=self.points[kept], counts=counts, widths=widths, **pick)
 
     def _error(self, fact: str, remedy: str) -> NeuralocksError:
@@ -162,6 +183,10 @@ class Groom:
         if len(value) == int(self.counts.sum(dtype=np.int64)):
             where += f" (strand {int(self.strand_of_point[rows[0]])})"
         if np.isfinite(first).all():
-            raise self._error(f"{field} lie farther than {largest:g} {unit} from the origin, first {where}",
-                              "check the unit")
-        raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")
+            raise self._error(
+                f"{field} lie farther than {largest:g} {unit} from the origin, first {where}",
+                "check the unit",
+            )
+        raise self._error(
+            f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom"
+        )

@@ -10,8 +10,8 @@ STRANDS_A_LOCK = 8
 """A lock holds at least about this many strands, or its mean code says nothing."""
 
 LOCK_SPACING = 0.012
-"""Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands, so
-that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
+"""Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands,
+so that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
 
 _SAMPLE = 20_000
 _ITERATIONS = 12
@@ -58,11 +58,15 @@ def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = N
     """
     weight = np.ones(len(lock)) if valid is None else np.where(valid, 1.0, 1e-6)
     share = np.bincount(lock, weight)
-    mean = np.stack([np.bincount(lock, weight * column) for column in np.asarray(codes, np.float64).T], axis=1)
+    mean = np.stack(
+        [np.bincount(lock, weight * column) for column in np.asarray(codes, np.float64).T], axis=1
+    )
     return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)[lock]
 
 
-def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5) -> np.ndarray:
+def neighbours(
+    rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5
+) -> np.ndarray:
     """The nearest vertices of other strands at rest, which adhesion keeps near.
 
     Args:
@@ -90,7 +94,7 @@ def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float =
             good &= lock[other] == lock[own]
         first = np.argsort(~good, axis=1, kind="stable")[:, :count]
         pick = np.where(np.take_along_axis(good, first, 1), np.take_along_axis(index, first, 1), -1)
-        found[todo, :pick.shape[1]] = pick
+        found[todo, : pick.shape[1]] = pick
         # Again, with more candidates, for those whose list ended before the radius did.
         short = (good.sum(axis=1) < count) & np.isfinite(distance[:, -1])
         if asked == len(points):

@@ -28,11 +28,13 @@ class StrandSet:
     rest: np.ndarray
     """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand."""
     valid: np.ndarray
-    """(S,) bool, false where the groom's strand has no two distinct points; all else there is a placeholder."""
+    """(S,) bool, false where the groom's strand has no two distinct points; all else there is a
+    placeholder."""
     uv: np.ndarray
     """(S, 2) float32 in [0, 1], direction of the root seen from the head's centre."""
     root_frame: np.ndarray
-    """(S, 3, 3) float32, rotation from canonical to scalp axes (rows are the scalp axes; +Y leaves the head)."""
+    """(S, 3, 3) float32, rotation from canonical to scalp axes (rows are the scalp axes; +Y leaves the
+    head)."""
     lock: np.ndarray
     """(S,) int32, which lock each strand belongs to; numbered without gaps from 0."""
     length: np.ndarray
@@ -46,17 +48,33 @@ class StrandSet:
 
     @property
     def root_normal(self) -> np.ndarray:
-        """(S, 3) float32, canonical unit vector out of the head at the root: the scalp frame's second axis."""
+        """(S, 3) float32, canonical unit vector out of the head at the root: the scalp frame's second
+        axis."""
         return self.root_frame[:, 1]
 
     def subset(self, strands: np.ndarray) -> StrandSet:
         """The same for the given strands only ((N,) indices or (S,) mask). Lock numbers stay as they are."""
-        return StrandSet(self.rest[strands], self.valid[strands], self.uv[strands], self.root_frame[strands],
-                         self.lock[strands], self.length[strands], self.head_origin, self.head_centre, self.facing)
+        return StrandSet(
+            self.rest[strands],
+            self.valid[strands],
+            self.uv[strands],
+            self.root_frame[strands],
+            self.lock[strands],
+            self.length[strands],
+            self.head_origin,
+            self.head_centre,
+            self.facing,
+        )
 
 
-def strand_set(groom: Groom, head_origin: np.ndarray, head_centre: np.ndarray, facing: np.ndarray | None = None, *,
-               locks: int | None = None) -> StrandSet:
+def strand_set(
+    groom: Groom,
+    head_origin: np.ndarray,
+    head_centre: np.ndarray,
+    facing: np.ndarray | None = None,
+    *,
+    locks: int | None = None,
+) -> StrandSet:
     """The groom resampled to K vertices a strand, with what else the network reads of it.
 
     Args:
@@ -97,9 +115,11 @@ def scalp_local(strands: StrandSet) -> np.ndarray:
 
 
 def root_uv(roots: np.ndarray, head_centre: np.ndarray) -> np.ndarray:
-    """(S, 2) float32 in [0, 1]: Lambert's equal-area azimuthal map of the root's direction, its pole at the crown.
+    """(S, 2) float32 in [0, 1]: Lambert's equal-area azimuthal map of the root's direction, its pole at the
+    crown.
 
-    It depends on no mesh's own chart, so one network serves any head. Singular only straight down, inside the neck.
+    It depends on no mesh's own chart, so one network serves any head. Singular only straight down, inside the
+    neck.
 
     Args:
         roots: (S, 3) [m] in canonical space.
@@ -113,13 +133,14 @@ def root_uv(roots: np.ndarray, head_centre: np.ndarray) -> np.ndarray:
 
 
 def root_frames(normal: np.ndarray) -> np.ndarray:
-    """(S, 3, 3) smallest rotations that take the unit vectors `normal` (S, 3) to +Y; a half turn about X for -Y."""
+    """(S, 3, 3) smallest rotations that take the unit vectors `normal` (S, 3) to +Y; a half turn about X for
+    -Y."""
     x, y, z = normal.T
     # Rodrigues' formula for the axis n x Y; written out, it needs no trigonometry and one division.
     turn = 1.0 / np.maximum(1.0 + y, 1e-12)
-    frames = np.stack([1.0 - x * x * turn, -x, -x * z * turn,
-                       x, y, z,
-                       -x * z * turn, -z, 1.0 - z * z * turn], axis=1).reshape(-1, 3, 3)
+    frames = np.stack(
+        [1.0 - x * x * turn, -x, -x * z * turn, x, y, z, -x * z * turn, -z, 1.0 - z * z * turn], axis=1
+    ).reshape(-1, 3, 3)
     frames[y < -1.0 + 1e-9] = np.diag([1.0, -1.0, -1.0])
     return frames
 

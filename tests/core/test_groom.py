@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A groom refuses what no hair can be, and says which groom and why."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+
+POINTS = np.arange(15, dtype=float).reshape(5, 3) * 0.01
+
+
+def test_types_and_defaults():
+    groom = Groom("/hair", POINTS, [3, 2])
+    assert (groom.points.dtype, groom.counts.dtype, groom.widths.dtype) == (np.float32, np.int32, np.float32)
+    assert groom.widths.shape == (1,)
+    np.testing.assert_array_equal(groom.starts, [0, 3])
+    np.testing.assert_array_equal(groom.strand_of_point, [0, 0, 0, 1, 1])
+    with pytest.raises(ValueError, match="read-only"):
+        groom.points[0] = 0
+
+
+def test_subset_takes_everything_along():
+    groom = Groom(
+        "/hair",
+        POINTS,
+        [2, 0, 3],
+        widths=np.arange(5),
+        root_uv=np.arange(6).reshape(3, 2),
+        guides=[True, False, False],
+        group=[7, 8, 9],
+    )
+    part = groom.subset([2, 0])
+    np.testing.assert_array_equal(part.points, np.asarray(POINTS, np.float32)[[2, 3, 4, 0, 1]])
+    np.testing.assert_array_equal(part.counts, [3, 2])
+    np.testing.assert_array_equal(part.widths, [2, 3, 4, 0, 1])
+    np.testing.assert_array_equal(part.root_uv, [[4, 5], [0, 1]])
+    np.testing.assert_array_equal(part.guides, [False, True])
+    np.testing.assert_array_equal(part.group, [9, 7])
+
+
+@pytest.mark.parametrize(
+    ("changes", "fact"),
+    [
+        (
+            {"points": np.where(np.arange(15).reshape(5, 3) == 10, np.nan, 0.0)},
+            r"1 of 5 points are not finite.*number 3",
+        ),
+        ({"points": np.full((5, 3), np.inf)}, "not finite"),
+        ({"points": POINTS * 1e9}, "farther than 10000 m"),
+        ({"points": POINTS[:, :2]}, r"shape \(5, 2\)"),
+        ({"points": [["a"]]}, "plain array"),
+        ({"counts": [3, 3]}, "sum to 6 but there are 5"),
+        ({"counts": []}, "no strands"),
+        ({"counts": [6, -1]}, "strand 1 has a negative"),
+        ({"counts": [2.5, 2.5]}, "whole numbers"),
+        ({"counts": [2**40, 5]}, "32 bits"),
+        ({"counts": [[3, 2]]}, "counts have shape"),
+        ({"points": np.zeros((0, 3)), "counts": [0, 0]}, "no points"),
+        ({"widths": [1, 2, 3]}, "widths have shape"),
+        ({"widths": [np.nan]}, "widths are not finite"),
+        ({"root_uv": np.zeros((5, 2))}, "root_uv has shape"),
+        ({"root_uv": np.full((2, 2), np.inf)}, "root_uv are not finite"),
+        ({"group": [1]}, "group has shape"),
+    ],
+)
+def test_bad_input_names_the_groom(changes, fact):
+    with pytest.raises(NeuralocksError, match=f"^/hair: .*{fact}.*; "):
+        Groom(**{"name": "/hair", "points": POINTS, "counts": [3, 2], **changes})
