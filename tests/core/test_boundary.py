@@ -1,0 +1,111 @@
+"""The boundary history sees what matters and nothing else."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core import rotation
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
+from tests.core.rigs import bind, moved, person
+
+SPEC = BoundarySpec(bins=(1,) * 30, taper=0.0)
+
+
+def history(vectors, spec=SPEC):
+    return vectors[:, spec.slices["history"]].reshape(len(vectors), len(spec.bins), -1)
+
+
+def swing(t):
+    return rotation.from_vector(np.stack([0 * t, 0.8 * np.sin(3 * t), 0 * t], axis=-1))
+
+
+def test_effective_gravity_of_a_jump_is_what_mechanics_says():
+    """Free fall is weightless: g - a = 0, so the change of effective gravity is +1 g upwards."""
+    times = np.arange(0, 1, 1 / 60)
+    sampler = BoundarySampler(SPEC, person(), moved(times, lambda t: np.stack([0 * t, -0.5 * 9.81 * t**2, 0 * t], -1)))
+    newest = history(sampler.vectors([0.7]))[0, 0]
+    assert newest[:3] == pytest.approx([0, 1, 0], abs=2e-3)
+
+
+def test_constant_speed_is_no_motion():
+    sampler = BoundarySampler(SPEC, person(), moved(np.arange(0, 2, 1 / 24), lambda t: np.stack([3 * t, 0 * t, t], -1)))
+    assert np.abs(history(sampler.vectors([0.0, 0.5, 1.5]))).max() < 1e-5
+
+
+def test_spin_is_read_in_head_axes():
+    turn = np.stack([np.zeros(90), 2.0 * np.arange(90) / 30, np.zeros(90)], axis=-1)
+    clip = moved(np.arange(90) / 30, None, lambda t: rotation.from_vector(turn))
+    assert history(BoundarySampler(SPEC, person(), clip).vectors([2.0]))[0, 0, 3:6] == pytest.approx([0, 2, 0], abs=1e-4)
+
+
+@pytest.mark.parametrize("rate", [24, 25, 60])
+def test_frame_rates_agree(rate):
+    """The same motion sampled at any rate gives the same history, up to what the samples can hold."""
+
+    def sample(fps):
+        clip = moved(np.arange(0, 3, 1 / fps), lambda t: np.stack([0.1 * np.sin(6 * t), 0 * t, 0 * t], -1), swing)
+        return BoundarySampler(BoundarySpec(), person(), clip).vectors([1.5, 2.0])
+
+    assert np.abs(sample(rate) - sample(240)).max() < 0.01
+
+
+def test_a_rig_turned_or_with_other_joint_axes_reads_the_same():
+    times = np.arange(0, 2, 1 / 30)
+    plain = moved(times, lambda t: np.stack([0.2 * np.sin(5 * t), 0 * t, 0 * t], -1), swing)
+    expected = BoundarySampler(SPEC, person(), plain).vectors([1.0])
+    turn = rotation.from_vector([0.0, 1.1, 0.0])
+    whole = np.eye(4)
+    whole[:3, :3] = turn
+    turned = Clip(times, whole @ plain.joints)
+    assert BoundarySampler(SPEC, person(turn), turned).vectors([1.0]) == pytest.approx(expected, abs=1e-5)
+    orient = np.tile(np.eye(4), (6, 1, 1))
+    orient[:, :3, :3] = rotation.from_vector(np.random.default_rng(0).normal(size=(6, 3)))
+    character = person()
+    oriented = type(character)(type(character.skeleton)(character.skeleton.names, character.skeleton.parents, bind() @ orient))
+    assert BoundarySampler(SPEC, oriented, Clip(times, plain.joints @ orient)).vectors([1.0]) == pytest.approx(
+        expected, abs=1e-5
+    )
+
+
+def test_motion_strength_zero_is_the_held_pose():
+    times = np.arange(0, 2, 1 / 30)
+    clip = moved(times, lambda t: np.stack([0.2 * np.sin(5 * t), 0 * t, 0 * t], -1), swing)
+    held = Clip([0.0], clip.at([1.0]))
+    moving = BoundarySampler(SPEC, person(), clip).vectors([1.0], strength=0.0)
+    still = BoundarySampler(SPEC, person(), held).vectors([0.0])
+    assert moving == pytest.approx(still, abs=1e-5)
+
+
+def test_the_bind_pose_held_is_the_anchor():
+    sampler = BoundarySampler(SPEC, person(), moved([0.0]))
+    assert np.array_equal(sampler.vectors([0.0])[0], sampler.held_bind())
+
+
+def test_one_time_or_many_give_the_same_bits():
+    clip = moved(np.arange(0, 2, 1 / 24), None, swing)
+    sampler = BoundarySampler(BoundarySpec(), person(), clip)
+    times = np.array([0.3, 1.7, 0.9])
+    together = sampler.vectors(times)
+    assert all(np.array_equal(sampler.vectors([t])[0], row) for t, row in zip(times, together))
+
+
+def test_a_loop_has_no_seam():
+    times = np.linspace(0, 2, 49)
+    clip = moved(times, lambda t: np.stack([0.1 * np.sin(np.pi * t), 0 * t, 0 * t], -1), loop=True)
+    sampler = BoundarySampler(SPEC, person(), clip)
+    assert sampler.vectors([0.05]) == pytest.approx(sampler.vectors([2.05]), abs=1e-5)
+    assert np.abs(sampler.vectors([0.0]) - sampler.vectors([2.0])).max() < 1e-5
+
+
+def test_a_teleport_is_bounded():
+    clip = moved(np.arange(60) / 30, lambda t: np.stack([100.0 * (t > 1), 0 * t, 0 * t], -1))
+    values = history(BoundarySampler(SPEC, person(), clip).vectors(np.arange(60) / 30))
+    assert np.isfinite(values).all()
+    assert np.linalg.norm(values[..., :3], axis=-1).max() <= BoundarySampler.GRAVITY_LIMIT + 1e-5
+
+
+def test_unknown_description_asks_for_an_update():
+    with pytest.raises(NeuralocksError, match="update"):
+        BoundarySpec.from_json({**SPEC.to_json(), "wind": True})
+    assert BoundarySpec.from_json(SPEC.to_json()) == SPEC

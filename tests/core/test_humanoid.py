@@ -1,0 +1,85 @@
+"""Semantic joints are found on the rigs that people have."""
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import find_humanoid
+
+
+def rig(text: str) -> tuple[list[str], list[int]]:
+    """Joint paths and parents from an indented outline."""
+    paths, stack = [], []
+    for line in text.strip("\n").split("\n"):
+        depth = len(line) - len(line.lstrip())
+        stack = [*stack[:depth], line.strip()]
+        paths.append("/".join(stack))
+    index = {path: i for i, path in enumerate(paths)}
+    return paths, [index.get(path.rpartition("/")[0], -1) for path in paths]
+
+
+RIGS = {
+    "MotionBuilder": (
+        "Hips\n LeftUpLeg\n RightUpLeg\n LowerBack\n  Spine1\n   Neck\n    Neck1\n     Head\n      HeadTop_End\n"
+        "   LeftShoulder\n    LeftArm\n     LeftForeArm\n   RightShoulder\n    RightArm",
+        {"head": "Head", "neck": "Neck", "upper_chest": "Spine1", "left_shoulder": "LeftShoulder",
+         "left_upper_arm": "LeftArm", "left_lower_arm": "LeftForeArm", "hips": "Hips"},
+    ),
+    "3ds Max": (
+        "Hips\n Chest\n  Chest2\n   LeftCollar\n    LeftShoulder\n     LeftElbow\n   RightCollar\n    RightShoulder\n"
+        "   Neck\n    Head\n LeftHip\n RightHip",
+        {"head": "Head", "upper_chest": "Chest2", "left_shoulder": "LeftCollar", "left_upper_arm": "LeftShoulder"},
+    ),
+    "Poser": (
+        "hip\n abdomen\n  chest\n   neck\n    head\n     leftEye\n   rCollar\n    rShldr\n   lCollar\n    lShldr",
+        {"head": "head", "neck": "neck", "upper_chest": "chest", "right_upper_arm": "rShldr", "left_eye": "leftEye"},
+    ),
+    "VRoid": (
+        "J_Bip_C_Hips\n J_Bip_C_Spine\n  J_Bip_C_UpperChest\n   J_Bip_C_Neck\n    J_Bip_C_Head\n     J_Sec_Hair1\n"
+        "   J_Bip_L_Shoulder\n    J_Bip_L_UpperArm\n   J_Bip_R_Shoulder\n    J_Bip_R_UpperArm",
+        {"head": "J_Bip_C_Head", "upper_chest": "J_Bip_C_UpperChest", "right_upper_arm": "J_Bip_R_UpperArm"},
+    ),
+    "Unreal": (
+        "pelvis\n spine_01\n  spine_03\n   clavicle_l\n    upperarm_l\n   clavicle_r\n    upperarm_r\n   neck_01\n    head",
+        {"head": "head", "neck": "neck_01", "upper_chest": "spine_03", "left_shoulder": "clavicle_l"},
+    ),
+    "Mixamo": (
+        "mixamorig:Hips\n mixamorig:Spine2\n  mixamorig:Neck\n   mixamorig:Head\n    mixamorig:HeadTop_End\n"
+        "  mixamorig:LeftShoulder\n   mixamorig:LeftArm\n  mixamorig:RightShoulder\n   mixamorig:RightArm",
+        {"head": "mixamorig:Head", "left_upper_arm": "mixamorig:LeftArm", "upper_chest": "mixamorig:Spine2"},
+    ),
+    "Rigify": (
+        "DEF-spine\n DEF-spine.001\n  DEF-spine.002\n   DEF-spine.003\n    DEF-spine.004\n     DEF-spine.005\n"
+        "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",
+        {"head": "DEF-spine.006", "neck": "DEF-spine.004", "upper_chest": "DEF-spine.003"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_finds_the_joints_of_common_rigs(name):
+    text, expected = RIGS[name]
+    paths, parents = rig(text)
+    humanoid = find_humanoid(paths, parents)
+    assert {key: paths[humanoid[key]].rpartition("/")[2] for key in expected} == expected
+
+
+def test_joints_by_hand_win_and_are_checked():
+    paths, parents = rig("root\n a\n  b")
+    assert find_humanoid(paths, parents, by_hand={"head": "b"})["head"] == 2
+    with pytest.raises(NeuralocksError, match="no such joint"):
+        find_humanoid(paths, parents, by_hand={"head": "missing"})
+    with pytest.raises(NeuralocksError, match="no semantic joint"):
+        find_humanoid(paths, parents, by_hand={"skull": "b"})
+
+
+def test_a_rig_without_a_head_is_refused_with_the_remedy():
+    paths, parents = rig("root\n wheel_L\n wheel_R")
+    with pytest.raises(NeuralocksError, match="--head"):
+        find_humanoid(paths, parents)
+
+
+def test_missing_joints_fall_back_towards_the_trunk():
+    paths, parents = rig("hips\n spine\n  head")
+    humanoid = find_humanoid(paths, parents)
+    assert paths[humanoid.nearest("left_upper_arm")] in paths
+    assert humanoid.nearest("neck") == humanoid["head"] or "neck" in humanoid

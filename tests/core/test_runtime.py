@@ -1,0 +1,140 @@
+"""The one-file model and its inference: exact splitting, no dependence on chunks, clear refusals."""
+
+import json
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.runtime import StrandModel, strand_inputs
+from neuralocks_core.strands import strand_set
+
+torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
+from neuralocks_core.training.autoencoder import StrandAutoencoder  # noqa: E402
+from neuralocks_core.training.export import strand_graphs  # noqa: E402
+from neuralocks_core.training.networks import StrandNet, deform  # noqa: E402
+
+SPEC = BoundarySpec()
+
+
+@pytest.fixture(scope="module")
+def net():
+    torch.manual_seed(0)
+    net, encoder = StrandNet(SPEC.size), StrandAutoencoder()
+    with torch.no_grad():
+        net.out.weight.mul_(20)
+    return net, encoder
+
+
+@pytest.fixture(scope="module", params=["direction", "displacement"])
+def path(request, net, tmp_path_factory):
+    meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "output": request.param}
+    file = tmp_path_factory.mktemp("model") / f"{request.param}.neuralocks"
+    return model.write(file, meta, strand_graphs(net[1], net[0], request.param))
+
+
+@pytest.fixture(scope="module")
+def strands():
+    rng = np.random.default_rng(0)
+    normal = rng.normal(size=(5000, 3))
+    normal[:, 1] = np.abs(normal[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    points = normal[:, None] * (0.09 + np.linspace(0, 0.3, 24)[None, :, None]) + rng.normal(size=(5000, 24, 3)) * 2e-3
+    points[7] = points[7, :1]  # a strand without two distinct points
+    groom = Groom("g", points.reshape(-1, 3).astype(np.float32), np.full(5000, 24), np.full(1, 1e-4, np.float32))
+    return strand_set(groom, np.zeros(3), np.zeros(3))
+
+
+def test_split_inference_equals_the_whole_network(path, net, strands):
+    vector, bind = np.random.default_rng(1).normal(size=(2, SPEC.size)).astype(np.float32)
+    session = StrandModel.load(path).prepare(strands)
+    session.anchor(bind)
+    with torch.no_grad():
+        inputs = torch.tensor(strand_inputs(strands, session.codes))
+        offsets = net[0](inputs, torch.tensor(np.stack([vector, bind])))
+        expected = deform(offsets[:1], torch.tensor(strands.rest), offsets[1:], path.stem)[0].numpy()
+    expected[7] = 0
+    assert np.abs(session.displacement(vector) - expected).max() < 1e-5
+
+
+def test_parts_of_a_groom_give_the_same_bits(path, strands):
+    vector = np.random.default_rng(2).normal(size=SPEC.size).astype(np.float32)
+    whole = StrandModel.load(path, threads=2).prepare(strands).displacement(vector)
+    session = StrandModel.load(path, threads=1).prepare(strands)
+    parts = [session.displacement(vector, slice(a, b)) for a, b in ((0, 1), (1, 1999), (1999, 4100), (4100, 5000))]
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_the_held_bind_pose_is_exactly_the_groom(path, strands):
+    bind = np.random.default_rng(3).normal(size=SPEC.size).astype(np.float32)
+    session = StrandModel.load(path).prepare(strands)
+    session.anchor(bind)
+    assert not session.displacement(bind).any()
+
+
+def test_lengths_are_kept(path, strands):
+    if path.stem == "displacement":
+        pytest.skip("only the direction output keeps lengths by construction")
+    vector = 3 * np.random.default_rng(4).normal(size=SPEC.size).astype(np.float32)
+    points = strands.rest + StrandModel.load(path).prepare(strands).displacement(vector)
+    before = np.linalg.norm(np.diff(strands.rest, axis=1), axis=2)
+    assert np.abs(np.linalg.norm(np.diff(points, axis=1), axis=2) - before).max() < 1e-6
+
+
+def rewritten(path, target, **changes):
+    """A copy of a model file with entries replaced; None leaves one out."""
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            data = changes.get(name.replace(".", "_"), old.read(name))
+            if data is not None:
+                new.writestr(name, data)
+    return target
+
+
+@pytest.mark.parametrize(
+    ("changes", "fact"),
+    [
+        ({"tail_onnx": None}, "lacks tail.onnx"),
+        ({"model_json": b"{"}, "damaged"),
+        ({"model_json": json.dumps({"format": 99, "kind": "strands"})}, "update neuralocks"),
+        ({"model_json": json.dumps({"format": 1, "kind": "cloth"})}, "unknown here"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [1]}})}, "reads 305 values"),
+        ({"tail_onnx": b"nonsense"}, "cannot be loaded"),
+    ],
+)
+def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
+    with pytest.raises(NeuralocksError, match=fact) as caught:
+        StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_truncated_missing_and_foreign_files_are_refused(path, tmp_path):
+    cut = tmp_path / "cut.neuralocks"
+    cut.write_bytes(path.read_bytes()[:-500])
+    for file in (cut, tmp_path / "missing.neuralocks", tmp_path):
+        with pytest.raises(NeuralocksError):
+            StrandModel.load(file)
+    with pytest.raises(NeuralocksError, match="strand hair, not for rigged"):
+        model.read(path, "rig")
+
+
+def test_writing_twice_gives_the_same_bytes(path, tmp_path):
+    file = model.read(path)
+    copies = [model.write(tmp_path / f"{i}.neuralocks", file.meta, file.graphs).read_bytes() for i in (1, 2)]
+    assert copies[0] == copies[1]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["1.neuralocks", "2.neuralocks"]
+
+
+def test_the_runtime_imports_without_torch_usd_or_blender():
+    code = (
+        "import sys\n"
+        "for name in ('torch', 'pxr', 'bpy', 'onnx', 'warp'): sys.modules[name] = None\n"
+        "import neuralocks_core.runtime, neuralocks_core.groom, neuralocks_core.hairstyles, neuralocks_core.formats"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
