@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The part of a body that hair can touch, coarse enough to be posed for every frame of thousands of clips."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neuralocks_core.character import Body, Character
+
+CELL = 0.012
+"""[m] Vertices within one such cell become one; on a head's curvature that moves the surface by 0.2 mm."""
+
+
+def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | None:
+    """The body from the top of the head down to `reach` [m] under the head joint, arms to the elbow.
+
+    Every vertex kept is one of the body's own, so its skinning weights and blend shapes stay true.
+    """
+    body = character.body
+    if body is None:
+        return None
+    to_canonical = np.linalg.inv(character.canonical_to_bind)
+    points = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    near = (points[:, 1] > -reach) & (np.abs(points[:, 0]) < 0.45)
+    faces = body.triangles[near[body.triangles].all(axis=1)]
+    used = np.unique(faces)
+    if not len(used):
+        return None
+    # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs it hangs
+    # beside.
+    main = body.joint_indices[np.arange(len(points)), body.joint_weights.argmax(axis=1)]
+    key = np.column_stack([np.floor(points[used] / cell).astype(np.int64), main[used]])
+    _, group, size = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    group = group.ravel()
+    middle = np.stack([np.bincount(group, points[used, axis]) for axis in range(3)], axis=1) / size[:, None]
+    order = np.lexsort([np.linalg.norm(points[used] - middle[group], axis=1), group])
+    keeper = used[order[np.unique(group[order], return_index=True)[1]]]
+    new = np.full(len(points), -1)
+    new[used] = group
+    faces = new[faces]
+    whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return Body(
+        body.points[keeper],
+        faces[whole].astype(np.int32),
+        body.joint_indices[keeper],
+        body.joint_weights[keeper],
+        {name: offsets[keeper] for name, offsets in body.shapes.items()},
+    )
+
+
+def posed_over_time(body: Body, skinning: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:
+    """World points (T, V, 3) float32 for skinning transforms (T, J, 4, 4): one matrix product for all
+    frames.
+    """
+    joints, local = np.unique(body.joint_indices, return_inverse=True)
+    weights = np.zeros((len(body.points), len(joints)), np.float32)
+    np.add.at(
+        weights,
+        (np.arange(len(weights))[:, None], local.reshape(body.joint_indices.shape)),
+        body.joint_weights,
+    )
+    rows = skinning[:, joints, :3].astype(np.float32)
+    blended = weights @ rows.transpose(1, 0, 2, 3).reshape(len(joints), -1)
+    blended = blended.reshape(len(weights), len(skinning), 3, 4)
+    points = body.shaped(shape).astype(np.float32)
+    return (np.einsum("vtij,vj->tvi", blended[..., :3], points) + blended[..., 3].transpose(1, 0, 2)).copy()

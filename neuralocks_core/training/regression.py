@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training on rollouts of our own solver: positions, frame differences and the body they must stay out of.
+
+The paper's detached inertia term (its section 3.3.5) is an iteration that diverges for weakly damped hair;
+here each step is pulled to
+where the converged solver went instead. `selfsupervised.py` has the paper's way.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.networks import StrandNet, deform
+from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene, load
+
+MARGIN = 0.004
+"""[m] Distance to the body that the solver keeps, and below which the collision term acts."""
+
+
+@dataclass(frozen=True)
+class RegressionOptions:
+    """How rollouts are learned.
+
+    Attributes:
+        minutes: wall-clock budget; `steps` wins where it is given.
+        steps: number of steps, for reproducible runs.
+        clips: rollouts in a step.
+        moments: pairs of consecutive frames from each.
+        strands: strands from each.
+        rate: AdamW's first step size, falling along a cosine.
+        velocity: weight of the frame difference against the position, both in strand lengths.
+        collision: weight of the depth under the target's body plane, in strand lengths.
+        output: "direction" or "displacement".
+        motion: "linear" or "encoder", see StrandNet.
+        static: learn without history (the quasi-static variant, and the baseline of equal budget).
+        seed: of weights and batches.
+        device: torch device.
+    """
+
+    minutes: float = 10.0
+    steps: int | None = None
+    clips: int = 48
+    moments: int = 4
+    strands: int = 8
+    rate: float = 1.5e-3
+    velocity: float = 20.0
+    collision: float = 10.0
+    output: str = "direction"
+    motion: str = "linear"
+    static: bool = False
+    seed: int = 0
+    device: str = "cpu"
+
+
+class RolloutBank:
+    """Rollouts in memory, with what the network reads of their strands.
+
+    Args:
+        scene: the one that the rollouts were made from.
+        codes: latent codes of each groom's strands, one (S, 32) a groom.
+    """
+
+    def __init__(self, scene: TrainingScene, codes: list[np.ndarray]):
+        self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
+        self.rests = [groom.rest for groom in scene.grooms]
+        self.lengths = [groom.length for groom in scene.grooms]
+        self.rollouts: list[Rollout] = []
+        self._seen: set[Path] = set()
+
+    def add(self, files: list[Path]) -> int:
+        """Read the files that are new; returns how many rollouts are there."""
+        for path in files:
+            if path not in self._seen:
+                self._seen.add(path)
+                self.rollouts.append(load(path))
+        return len(self.rollouts)
+
+    def batch(self, rng: np.random.Generator, options: RegressionOptions) -> dict[str, Tensor]:
+        """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's
+        vector last.
+        """
+        rows: dict[str, list] = {
+            name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")
+        }
+        for index in rng.integers(len(self.rollouts), size=options.clips):
+            rollout = self.rollouts[index]
+            count = len(rollout.strands)
+            pick = rng.choice(count, options.strands, replace=count < options.strands)
+            late = rng.integers(max(rollout.first, 1), len(rollout.vectors), size=options.moments)
+            moments = np.stack([late - 1, late], axis=1).ravel()
+            chosen = rollout.strands[pick]
+            rows["strands"].append(self.inputs[rollout.groom][chosen])
+            rows["rest"].append(self.rests[rollout.groom][chosen])
+            rows["length"].append(self.lengths[rollout.groom][chosen])
+            rows["frames"].append(np.concatenate([rollout.vectors[moments], rollout.bind[None]]))
+            rows["moved"].append(rollout.moved[moments[:, None], pick])
+            rows["planes"].append(rollout.planes[moments[:, None], pick])
+        batch = {name: torch.from_numpy(np.stack(values)).to(options.device) for name, values in rows.items()}
+        batch["moved"] = batch["moved"].float() * STEP
+        batch["planes"] = batch["planes"].float()
+        return batch
+
+
+def regress(
+    bank: RolloutBank,
+    net: StrandNet,
+    options: RegressionOptions,
+    new_files: Callable[[], list[Path]],
+    *,
+    state: dict | None = None,
+    each: Callable[[dict], None] | None = None,
+) -> Iterator[dict]:
+    """Train `net` in place; yields what a caller may show, measure or save about every second.
+
+    Args:
+        bank: holds rollouts already; grows by what `new_files` gives.
+        net: normalised.
+        options: see there.
+        new_files: the rollouts on disk by now.
+        state: `{"step", "done", "optimiser"}` of an earlier run to go on from.
+        each: called with every batch's losses, for tests.
+
+    Yields:
+        `{"step", "done" (0..1), "losses": {name: value}, "optimiser": state}`.
+    """
+    net.to(options.device).train()
+    optimiser = torch.optim.AdamW(net.parameters(), lr=options.rate, weight_decay=1e-4)
+    step, before = 0, 0.0
+    if state is not None:
+        step, before = int(state["step"]), float(state["done"])
+        if state.get("optimiser"):
+            optimiser.load_state_dict(state["optimiser"])
+    rng = np.random.default_rng([options.seed, step])
+    start = shown = time.monotonic()
+    done, running = before, None
+    while done < 1.0:
+        for group in optimiser.param_groups:
+            warm = min(1.0, (step + 1) / 200)
+            group["lr"] = options.rate * warm * (0.005 + 0.995 * 0.5 * (1 + np.cos(np.pi * done)))
+        losses = regression_losses(net, bank.batch(rng, options), options)
+        total = sum(losses.values())
+        optimiser.zero_grad(set_to_none=True)
+        total.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        optimiser.step()
+        step += 1
+        now = time.monotonic()
+        done = step / options.steps if options.steps else before + (now - start) / (60 * options.minutes)
+        values = np.array([float(v.detach()) for v in losses.values()])
+        running = values if running is None else 0.99 * running + 0.01 * values
+        if each:
+            each(dict(zip(losses, values)))
+        if now - shown > 1.0 or done >= 1.0:
+            shown = now
+            bank.add(new_files())
+            named = dict(zip(losses, map(float, running)))
+            yield {"step": step, "done": min(done, 1.0), "losses": named, "optimiser": optimiser.state_dict()}
+    net.eval()
+
+
+def regression_losses(
+    net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions
+) -> dict[str, Tensor]:
+    """Weighted losses of a batch, each a mean over vertices in units of strand length.
+
+    `position` |x - x*|, `velocity` the same of frame differences, `collision` how far x lies under the plane
+    of the body next to x*,
+    beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    """
+    strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
+    offsets = net.tail(strands[:, None], moments[:, :, None])
+    offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
+    moved = deform(offsets[:, :-1], batch["rest"][:, None], offsets[:, -1:], options.output)
+    error = moved - batch["moved"]
+    length = batch["length"][:, None, :, None]
+    position = _norm(error) / length
+    pairs = error.unflatten(1, (-1, 2))
+    velocity = _norm(pairs[:, :, 1] - pairs[:, :, 0]) / length
+    normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
+    target = (normals * batch["moved"]).sum(-1) - offset
+    depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
+    depth = torch.where(offset > -100, depth, torch.zeros_like(depth))
+    return {
+        "position": position.mean(),
+        "velocity": options.velocity * velocity.mean(),
+        "collision": options.collision * (depth / length).mean(),
+    }
+
+
+@torch.no_grad()
+def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str = "direction") -> np.ndarray:
+    """The network's displacement (T, n, 24, 3) float32 [m] over a whole rollout."""
+    chosen = rollout.strands
+    device = next(net.parameters()).device
+    strands = net.strand_part(torch.from_numpy(bank.inputs[rollout.groom][chosen]).to(device))
+    frames = torch.from_numpy(np.concatenate([rollout.vectors, rollout.bind[None]])).to(device)
+    offsets = net.tail(strands[None], net.frame_part(frames)[:, None])
+    offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
+    rest = torch.from_numpy(bank.rests[rollout.groom][chosen]).to(device)
+    return deform(offsets[:-1], rest, offsets[-1:], output).cpu().numpy()
+
+
+def _norm(vectors: Tensor) -> Tensor:
+    # Smooth at zero: a tenth of a millimetre.
+    return vectors.square().sum(-1).add(1e-8).sqrt()

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training material made on the fly: short simulations of a few locks of hair on a moving body.
+
+No data from anyone is needed: the motion is random, the solver is our own. Rollout number i depends on the
+    seed and on i alone, so any
+process can make any of them, and a run that was killed goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.character import Character
+from neuralocks_core.locks import neighbours
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands import StrandSet
+from neuralocks_core.training.hair_body import hair_body, posed_over_time
+
+STEP = 2.0**-15
+"""[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes."""
+PREROLL = 30
+"""Frames at the head of a cut from motion capture that are simulated but not learned from: the hair was not
+at rest there.
+"""
+
+
+@dataclass(frozen=True)
+class TrainingScene:
+    """What rollouts are drawn from.
+
+    Attributes:
+        character: with its body.
+        grooms: strands at rest; only valid ones are simulated.
+        clips: motion to cut from, beside the random one; may be empty.
+        spec: what the network reads.
+        seed: of everything random.
+        frames: length of a rollout, in steps of `spec.dt`.
+        strands: strands of a rollout, in whole locks.
+        rest_support: whether the bind pose is an equilibrium.
+        substeps: of the solver in a step.
+        held_out: draw from the locks and the random numbers that training never sees.
+    """
+
+    character: Character
+    grooms: tuple[StrandSet, ...]
+    clips: tuple[Clip, ...] = ()
+    spec: BoundarySpec = field(default_factory=BoundarySpec)
+    seed: int = 0
+    frames: int = 110
+    strands: int = 64
+    rest_support: bool = True
+    substeps: int = 1
+    held_out: bool = False
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """One simulated clip.
+
+    Attributes:
+        groom: index into the scene's grooms.
+        strands: (n,) indices of its strands.
+        first: first frame to learn from.
+        vectors: boundary vectors (T, F) float32.
+        bind: the anchor's vector (F,) float32.
+        moved: displacement in canonical space (T, n, 24, 3) int16, in units of STEP.
+        planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest
+            vertex.
+        residual: of the solver, rms relative to weight.
+    """
+
+    groom: int
+    strands: np.ndarray
+    first: int
+    vectors: np.ndarray
+    bind: np.ndarray
+    moved: np.ndarray
+    planes: np.ndarray
+    residual: float
+
+
+class RolloutMaker:
+    """Makes the rollouts of a scene; what all share is computed once."""
+
+    def __init__(self, scene: TrainingScene):
+        self.scene = scene
+        lowest = min(groom.rest[..., 1].min() for groom in scene.grooms)
+        self._body = hair_body(scene.character, reach=0.2 - float(lowest))
+        self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
+        self._carried = [self._scalp_vertices(groom) for groom in scene.grooms]
+
+    def make(self, index: int) -> Rollout:
+        """Rollout number `index`."""
+        from neuralocks_core.reference import simulate
+
+        scene, rng = self.scene, np.random.default_rng([self.scene.seed, self.scene.held_out, index])
+        which = int(rng.integers(len(scene.grooms)))
+        groom = scene.grooms[which]
+        chosen = self._locks(which, rng)
+        material = Material.random(rng)
+        shape = self._shape(rng)
+        clip, times, first = self._motion(rng, shape)
+        sampler = BoundarySampler(scene.spec, scene.character, clip)
+        joints = clip.at(times)
+        rest = groom.rest[chosen].astype(np.float64) + self._scalp_offset(which, chosen, shape)[:, None]
+        result = simulate(
+            rest,
+            scene.character.canonical_to_world(joints),
+            None
+            if self._body is None
+            else posed_over_time(self._body, joints @ scene.character.inverse_bind, shape),
+            None if self._body is None else self._body.triangles,
+            material,
+            dt=scene.spec.dt,
+            substeps=scene.substeps,
+            rest_support=scene.rest_support,
+            neighbours=neighbours(rest, groom.lock[chosen]),
+        )
+        moved = result.points - rest[None].astype(np.float32)
+        planes = result.planes.copy()
+        planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
+        log = material.log_ratios()
+        return Rollout(
+            which,
+            chosen,
+            first,
+            sampler.vectors(times, log),
+            sampler.held_bind(log, shape),
+            np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
+            np.clip(planes, -1000, 1000).astype(np.float16),
+            float(np.median(result.residual)),
+        )
+
+    def _locks(self, which: int, rng) -> np.ndarray:
+        """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a
+        neighbourhood.
+        """
+        groom, usable = self.scene.grooms[which], self._usable[which]
+        chosen: list[int] = []
+        while len(chosen) < min(self.scene.strands, len(usable)):
+            seed = usable[rng.integers(len(usable))]
+            lock = usable[groom.lock[usable] == groom.lock[seed]]
+            near = np.argsort(
+                np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable"
+            )[:8]
+            chosen.extend(int(i) for i in lock[near] if i not in chosen)
+        return np.array(sorted(chosen[: self.scene.strands]))
+
+    def _shape(self, rng) -> np.ndarray:
+        count = 0 if self.scene.character.body is None else len(self.scene.character.body.shapes)
+        return rng.uniform(-1, 1, count) * rng.choice([0.0, 0.6])
+
+    def _motion(self, rng, shape) -> tuple[Clip, np.ndarray, int]:
+        from neuralocks_core.random_motion import random_clip
+
+        scene = self.scene
+        span = (scene.frames - 1) * scene.spec.dt
+        clips = [clip for clip in scene.clips if clip.end - clip.start > 0.6 * span]
+        if clips and rng.random() < 0.35:
+            source = clips[rng.integers(len(clips))]
+            start = rng.uniform(source.start, max(source.start, source.end - span))
+            clip, first = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1))), PREROLL
+        else:
+            source = random_clip(scene.character, rng, span)
+            start, first = source.start, 1
+            clip = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1)))
+        return clip, start + scene.spec.dt * np.arange(scene.frames), first
+
+    def _scalp_vertices(self, groom: StrandSet) -> np.ndarray | None:
+        """For each strand the body vertex whose blend shape offset its root follows."""
+        body = self.scene.character.body
+        if body is None or not body.shapes:
+            return None
+        to_bind = self.scene.character.canonical_to_bind
+        return cKDTree(body.points).query(groom.rest[:, 0] @ to_bind[:3, :3].T + to_bind[:3, 3])[1]
+
+    def _scalp_offset(self, which: int, chosen: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """(n, 3) canonical: a head of another shape takes its hair with it."""
+        if self._carried[which] is None:
+            return np.zeros((len(chosen), 3))
+        body = self.scene.character.body
+        vertices = self._carried[which][chosen]
+        offset = sum(w * offsets[vertices] for w, offsets in zip(shape, body.shapes.values()))
+        return np.asarray(offset) @ self.scene.character.facing.T
+
+
+def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
+    """Indices of the valid strands in every eighth lock (`held_out`), or in the others; all where there are
+    too few locks.
+    """
+    kept_back = (groom.lock % 8 == 7) == held_out
+    usable = np.flatnonzero(groom.valid & kept_back)
+    return usable if len(usable) else np.flatnonzero(groom.valid)
+
+
+def save(path: Path, rollout: Rollout) -> None:
+    """Write a rollout at once under its final name."""
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    with open(temporary, "wb") as file:
+        np.savez(file, **vars(rollout))
+    os.replace(temporary, path)
+
+
+def load(path: Path) -> Rollout:
+    """Read what `save` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        values = {name: arrays[name] for name in arrays.files}
+    return Rollout(
+        **{
+            **values,
+            "groom": int(values["groom"]),
+            "first": int(values["first"]),
+            "residual": float(values["residual"]),
+        }
+    )
+
+
+class RolloutFarm:
+    """Processes that fill a folder with rollouts while training goes on; a context manager.
+
+    Args:
+        scene: what to draw from.
+        folder: where the files go, one per rollout, numbered.
+        count: how many to make.
+        processes: how many at a time.
+    """
+
+    def __init__(self, scene: TrainingScene, folder: Path, count: int, processes: int = 1):
+        self.folder = Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        context = multiprocessing.get_context("spawn")
+        self._processes = [
+            context.Process(target=_work, args=(scene, self.folder, range(i, count, processes)), daemon=True)
+            for i in range(processes)
+        ]
+
+    def __enter__(self) -> RolloutFarm:
+        # One thread each: the trainer has the other cores.
+        kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        os.environ.update({name: "1" for name in kept})
+        for process in self._processes:
+            process.start()
+        for name, value in kept.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+        return self
+
+    def __exit__(self, *_) -> None:
+        for process in self._processes:
+            process.terminate()
+            process.join()
+        for leftover in self.folder.glob("*.tmp"):
+            leftover.unlink(missing_ok=True)
+
+    def files(self) -> list[Path]:
+        """The rollouts that are there by now, in order."""
+        return sorted(self.folder.glob("*.npz"))
+
+    @property
+    def alive(self) -> bool:
+        """Whether any process still works."""
+        return any(process.is_alive() for process in self._processes)
+
+    def failed(self) -> bool:
+        """Whether a process ended by an error."""
+        return any(process.exitcode not in (None, 0) for process in self._processes)
+
+
+def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
+    parent = multiprocessing.parent_process()
+    maker = RolloutMaker(scene)
+    for index in indices:
+        path = folder / f"{index:06d}.npz"
+        if not path.exists():
+            save(path, maker.make(index))
+        if parent is not None and not parent.is_alive():
+            return
