@@ -4,10 +4,13 @@ once a frame.
 
 The first layer is linear in the strand and in the body, so its two parts are computed apart and added:
     exact, and a third of the
-arithmetic is left per strand and frame. Strands go through in chunks that stay in the processor's cache.
+arithmetic is left per strand and frame. Strands go through in chunks that stay in a core's cache, several
+cores each at one of its own.
 """
 
 import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
 import numpy as np
@@ -20,10 +23,10 @@ from neuralocks_core.locks import lock_codes
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands import K, StrandSet, scalp_local
 
-CHUNK = 2048
-"""Strands in one call: 2 MB of hidden values, about a core's second-level cache. Fixed, so that results do
-not depend on the machine.
-"""
+CHUNK = 512
+"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
+so that
+results do not depend on the machine."""
 
 
 class StrandModel:
@@ -31,7 +34,7 @@ class StrandModel:
 
     Args:
         file: a model read by `model.read`.
-        threads: of onnxruntime; the result does not depend on it.
+        threads: chunks of strands worked on at a time; the result does not depend on it.
     """
 
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
@@ -40,6 +43,7 @@ class StrandModel:
         self.spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
         self.anchored = bool(file.meta.get("anchored", False))
         self.threads = threads or min(os.cpu_count() or 1, 8)
+        self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")
         self._sessions = {name: self._session(name) for name in model_file.KINDS["strands"]}
         frame = self._sessions["frame.onnx"].get_inputs()[0].shape
         if frame[-1] != self.spec.size:
@@ -65,6 +69,14 @@ class StrandModel:
         """One output of one graph, float32."""
         return self._sessions[graph].run([output], inputs)[0]
 
+    def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
+        """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds
+        `start` on.
+        """
+        chunks = [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
+        for _ in self._pool.map(function, chunks):
+            pass
+
     def frame_part(self, vector: np.ndarray) -> np.ndarray:
         """First layer, body part (1, 256), of a boundary vector (spec.size,)."""
         return self.run("frame.onnx", "frame_part", frame=np.asarray(vector, np.float32).reshape(1, -1))
@@ -73,7 +85,8 @@ class StrandModel:
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = self.threads
+        options.intra_op_num_threads = 1  # the cores share chunks instead, which needs no waiting between
+        layers
         options.log_severity_level = 3
         try:
             return onnxruntime.InferenceSession(
@@ -142,11 +155,11 @@ class StrandSession:
         result = (
             np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
         )
+
         # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the
-        # groom's end: the sums in a
-        # matrix product may depend on its height, and a bake must not depend on how it was split.
-        for low in range(start - start % CHUNK, stop, CHUNK):
-            chunk = slice(low, min(low + CHUNK, len(self._edges)))
+        # groom's
+        # end: the sums in a matrix product may depend on its height, and a bake must not depend on its split.
+        def work(chunk: slice) -> None:
             values = self.model.run(
                 "tail.onnx",
                 output,
@@ -155,15 +168,19 @@ class StrandSession:
                 anchor=self._anchor[chunk],
                 edges=self._edges[chunk],
             )
-            a, b = max(low, start), min(chunk.stop, stop)
-            result[a - start : b - start] = values[a - low : b - low]
+            a, b = max(chunk.start, start), min(chunk.stop, stop)
+            result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
+
+        self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self._edges)), start)
         return result
 
     def _by_chunk(self, function, width: int) -> np.ndarray:
-        count = len(self.strands.rest)
-        result = np.empty((count, width), np.float32)
-        for low in range(0, count, CHUNK):
-            result[low : low + CHUNK] = function(slice(low, low + CHUNK))
+        result = np.empty((len(self.strands.rest), width), np.float32)
+
+        def work(chunk: slice) -> None:
+            result[chunk] = function(chunk)
+
+        self.model.by_chunk(work, len(result))
         return result
 
     @cached_property
