@@ -85,8 +85,7 @@ class StrandModel:
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1  # the cores share chunks instead, which needs no waiting between
-        layers
+        options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
         options.log_severity_level = 3
         try:
             return onnxruntime.InferenceSession(
