@@ -115,7 +115,7 @@ def regress(
     options: RegressionOptions,
     new_files: Callable[[], list[Path]],
     *,
-    state: dict | None = None,
+    resume: Callable[[torch.optim.Optimizer], dict] | None = None,
     each: Callable[[dict], None] | None = None,
 ) -> Iterator[dict]:
     """Train `net` in place; yields what a caller may show, measure or save about every second.
@@ -125,7 +125,7 @@ def regress(
         net: normalised.
         options: see there.
         new_files: the rollouts on disk by now.
-        state: `{"step", "done", "optimiser"}` of an earlier run to go on from.
+        resume: fills the optimiser from a checkpoint and returns its `{"step", "done"}`.
         each: called with every batch's losses, for tests.
 
     Yields:
@@ -134,10 +134,9 @@ def regress(
     net.to(options.device).train()
     optimiser = torch.optim.AdamW(net.parameters(), lr=options.rate, weight_decay=1e-4)
     step, before = 0, 0.0
-    if state is not None:
+    if resume is not None:
+        state = resume(optimiser)
         step, before = int(state["step"]), float(state["done"])
-        if state.get("optimiser"):
-            optimiser.load_state_dict(state["optimiser"])
     rng = np.random.default_rng([options.seed, step])
     start = shown = time.monotonic()
     done, running = before, None

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What hair is made of: the four numbers that an artist moves and the network reads."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+RANGES = {
+    "bend": (2e-4, 5e-3),
+    "weight": (0.5, 2.0),
+    "damping": (4.0, 20.0),
+    "clumping": (0.0, 240.0),
+}
+"""What models are trained on; values outside are refused."""
+
+ALIASES = {"stiffness": "bend"}
+"""Names that artists use for the same."""
+
+_SOFT = 20.0  # clumping may be 0, which has no logarithm: it is counted from here
+
+
+@dataclass(frozen=True)
+class Material:
+    """Constants of the rods, per unit line density.
+
+    Attributes:
+        bend: bending stiffness [m^4/s^2].
+        weight: factor on gravity.
+        damping: of velocity relative to the head [1/s].
+        clumping: stiffness of the ties between neighbours (adhesion) [1/s^2].
+
+    Raises:
+        NeuralocksError: a value is not finite or outside RANGES.
+    """
+
+    bend: float = 1e-3
+    weight: float = 1.0
+    damping: float = 10.0
+    clumping: float = 60.0
+
+    def __post_init__(self):
+        for name, value in asdict(self).items():
+            low, high = RANGES[name]
+            if not np.isfinite(value) or not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+                raise NeuralocksError(f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside")
+
+    def log_ratios(self) -> np.ndarray:
+        """(4,) float32: logarithms of the ratios to the default material, zero for it; what the network reads."""
+        default = Material()
+        ratios = [
+            self.bend / default.bend,
+            self.weight / default.weight,
+            self.damping / default.damping,
+            (self.clumping + _SOFT) / (default.clumping + _SOFT),
+        ]
+        return np.log(ratios).astype(np.float32)
+
+    @classmethod
+    def random(cls, rng: np.random.Generator) -> Material:
+        """A material for a training rollout: each constant the default in a third of all cases, else anywhere in its range."""
+        values = {}
+        for name, (low, high) in RANGES.items():
+            shift = _SOFT if name == "clumping" else 0.0
+            anywhere = float(np.exp(rng.uniform(np.log(low + shift), np.log(high + shift))) - shift)
+            values[name] = getattr(cls(), name) if rng.random() < 1 / 3 else float(np.clip(anywhere, low, high))
+        return cls(**values)
+
+    @classmethod
+    def parse(cls, settings: list[str] | tuple[str, ...]) -> Material:
+        """From `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
+
+        Raises:
+            NeuralocksError: an unknown name, no number, or a value outside its range.
+        """
+        material = cls()
+        for setting in settings:
+            name, _, text = setting.partition("=")
+            name = ALIASES.get(name.strip(), name.strip())
+            if name not in RANGES:
+                raise NeuralocksError(f"material '{setting}': unknown name; use {', '.join(RANGES)} as NAME=VALUE")
+            try:
+                factor = text.strip().endswith("x")
+                value = float(text.strip().removesuffix("x"))
+            except ValueError:
+                raise NeuralocksError(f"material '{setting}': no number after '='; write for example {name}=1.5x") from None
+            material = replace(material, **{name: value * getattr(cls(), name) if factor else value})
+        return material

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checkpoints that survive a kill: one .npz of plain arrays, replaced at once. No pickle."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from neuralocks_core.errors import NeuralocksError
+
+
+def save(path: Path, meta: dict, modules: dict[str, torch.nn.Module], optimiser: dict | None = None) -> None:
+    """Write modules, an optimiser's state_dict and JSON values.
+
+    Args:
+        path: ends in `.npz`.
+        meta: plain JSON values.
+        modules: by name; all their parameters and buffers are kept.
+        optimiser: `state_dict()` of Adam or AdamW.
+    """
+    arrays = {"meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)}
+    for name, module in modules.items():
+        for key, value in module.state_dict().items():
+            arrays[f"module/{name}/{key}"] = value.detach().cpu().numpy()
+    for index, values in (optimiser or {}).get("state", {}).items():
+        for key, value in values.items():
+            arrays[f"optimiser/{index}/{key}"] = torch.as_tensor(value).detach().cpu().numpy()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(".tmp")
+    with open(temporary, "wb") as file:
+        np.savez(file, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(temporary, path)
+
+
+def load(path: Path, modules: dict[str, torch.nn.Module], optimiser: torch.optim.Optimizer | None = None) -> dict:
+    """Fill modules (and the optimiser) from a checkpoint; returns its JSON values.
+
+    Raises:
+        NeuralocksError: it is damaged, or belongs to other settings.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        meta = json.loads(arrays["meta"].tobytes())
+        for name, module in modules.items():
+            prefix = f"module/{name}/"
+            values = {k.removeprefix(prefix): torch.from_numpy(v) for k, v in arrays.items() if k.startswith(prefix)}
+            module.load_state_dict(values)
+    except (OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile) as error:
+        fact = str(error).splitlines()[0]
+        raise NeuralocksError(
+            f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
+        ) from None
+    if optimiser is not None:
+        state: dict[int, dict] = {}
+        for name, value in arrays.items():
+            if name.startswith("optimiser/"):
+                _, index, key = name.split("/")
+                state.setdefault(int(index), {})[key] = torch.from_numpy(value)
+        if state:
+            optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+    return meta
