@@ -46,7 +46,9 @@ class Material:
         for name, value in asdict(self).items():
             low, high = RANGES[name]
             if not np.isfinite(value) or not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-                raise NeuralocksError(f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside")
+                raise NeuralocksError(
+                    f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside"
+                )
 
     def log_ratios(self) -> np.ndarray:
         """(4,) float32: logarithms of the ratios to the default material, zero for it; what the network reads."""
@@ -61,7 +63,9 @@ class Material:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> Material:
-        """A material for a training rollout: each constant the default in a third of all cases, else anywhere in its range."""
+        """A material for a training rollout: each constant the default in a third of all cases, else anywhere in its
+        range.
+        """
         values = {}
         for name, (low, high) in RANGES.items():
             shift = _SOFT if name == "clumping" else 0.0
@@ -86,6 +90,8 @@ class Material:
                 factor = text.strip().endswith("x")
                 value = float(text.strip().removesuffix("x"))
             except ValueError:
-                raise NeuralocksError(f"material '{setting}': no number after '='; write for example {name}=1.5x") from None
+                raise NeuralocksError(
+                    f"material '{setting}': no number after '='; write for example {name}=1.5x"
+                ) from None
             material = replace(material, **{name: value * getattr(cls(), name) if factor else value})
         return material
