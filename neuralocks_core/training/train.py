@@ -83,7 +83,7 @@ def train_strands(
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
         coder = _coder(scene, work, options, report)
-        codes = [_codes(coder, groom) for groom in scene.grooms]
+        codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
         bank, held = RolloutBank(scene, codes), RolloutBank(scene_out, codes)
         _wait(farm, min(FIRST, rollouts), report)
         bank.add(farm.files())
@@ -133,7 +133,9 @@ def train_strands(
         "rollouts": len(bank.rollouts),
         "solver residual": float(np.median([r.residual for r in bank.rollouts])),
         "strands": [int(groom.valid.sum()) for groom in scene.grooms],
-        "strand code error [mm]": round(float(np.mean([_code_error(coder, g) for g in scene.grooms])), 2),
+        "strand code error [mm]": round(
+            float(np.mean([1e3 * coder.errors(scalp_local(g)[g.valid]).mean() for g in scene.grooms])), 2
+        ),
         "options": asdict(options),
     }
     description = {
@@ -177,18 +179,6 @@ def _coder(scene, work: Path, options: RegressionOptions, report) -> StrandAutoe
     ).cpu()
     checkpoint.save(saved, {}, {"coder": coder})
     return coder
-
-
-@torch.no_grad()
-def _codes(coder: StrandAutoencoder, groom) -> np.ndarray:
-    return coder.encode(torch.from_numpy(scalp_local(groom).reshape(len(groom.rest), -1))).numpy()
-
-
-@torch.no_grad()
-def _code_error(coder: StrandAutoencoder, groom) -> float:
-    """Mean distance of a decoded vertex from the true one [mm]."""
-    shapes = torch.from_numpy(scalp_local(groom)[groom.valid].reshape(int(groom.valid.sum()), -1))
-    return float(1e3 * (coder(shapes) - shapes).unflatten(1, (-1, 3)).norm(dim=-1).mean())
 
 
 def _wait(farm: RolloutFarm, count: int, report) -> None:
