@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The strand autoencoder: a strand's rest shape in 32 numbers (paper section 3.2)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from neuralocks_core.errors import NeuralocksError
+
+LATENT = 32
+
+
+def train_autoencoder(
+    shapes: np.ndarray,
+    *,
+    seconds: float = 35.0,
+    steps: int | None = None,
+    batch: int = 1024,
+    rate: float = 1e-3,
+    seed: int = 0,
+    device: str = "cpu",
+    progress: Callable[[int, int, str], None] | None = None,
+) -> StrandAutoencoder:
+    """Trains on all strands of all grooms and returns the autoencoder with frozen weights.
+
+    Only the encoder goes on living; the decoder is there to show what a code is worth
+    (`StrandAutoencoder.errors`).
+
+    Args:
+        shapes: (n, 24, 3) strands in scalp-local, root-relative coordinates, metres.
+        seconds: wall-clock budget.
+        steps: number of steps instead of a time budget; makes the result reproducible.
+        batch: strands a step.
+        rate: Adam's first step size; it falls to 1 % along a cosine.
+        seed: of the weights and the batches.
+        device: torch device.
+        progress: called with done, total, message.
+
+    Raises:
+        NeuralocksError: there are no strands, or they are not finite.
+    """
+    shapes = np.asarray(shapes, np.float32)
+    if shapes.ndim != 3 or shapes.shape[1:] != (24, 3) or not len(shapes):
+        raise NeuralocksError(f"strand shapes: {shapes.shape} is not (n > 0, 24, 3); give resampled strands")
+    if not np.isfinite(shapes).all():
+        raise NeuralocksError("strand shapes: some vertices are not finite; clean the groom first")
+    generator = torch.Generator().manual_seed(seed)
+    data = torch.from_numpy(shapes.reshape(len(shapes), 72)).to(device)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        model = StrandAutoencoder().to(device)
+    model.set_normalisation(data)
+    optimiser = torch.optim.Adam(model.parameters(), lr=rate)
+    # A millimetre on short hair is a larger part of its shape than on long hair.
+    weight = 1.0 / (data[:, -3:].square().sum(1) + 0.05**2)
+    weight = weight / weight.mean()
+    start, step, done = time.monotonic(), 0, 0.0
+    while done < 1.0:
+        pick = torch.randint(len(data), (min(batch, len(data)),), generator=generator).to(device)
+        target = data[pick]
+        loss = ((model(target) - target).square().mean(1) * weight[pick]).mean()
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        for group in optimiser.param_groups:
+            group["lr"] = rate * (0.01 + 0.99 * 0.5 * (1.0 + np.cos(np.pi * done)))
+        optimiser.step()
+        step += 1
+        done = step / steps if steps else (time.monotonic() - start) / seconds
+        if progress and step % 200 == 0:
+            progress(
+                int(1000 * min(done, 1.0)), 1000, f"strand codes: error {1e3 * loss.item() ** 0.5:.1f} mm"
+            )
+    return model.eval().requires_grad_(False)
+
+
+class StrandAutoencoder(nn.Module):
+    """72 numbers -> 256 -> 256 -> 32 and back, ReLU; coordinates in metres."""
+
+    def __init__(self, hidden: int = 256, latent: int = LATENT):
+        super().__init__()
+        self.encoder = _mlp(72, hidden, latent)
+        self.decoder = _mlp(latent, hidden, 72)
+        self.register_buffer("mean", torch.zeros(72))
+        self.register_buffer("scale", torch.ones(72))
+
+    @torch.no_grad()
+    def set_normalisation(self, shapes: Tensor) -> None:
+        """Takes the mean of each coordinate, and the spread of each vertex in all three, from (n, 72)
+        shapes."""
+        self.mean.copy_(shapes.mean(0))
+        spread = (shapes - self.mean).square().reshape(-1, 24, 3).mean((0, 2)).sqrt()
+        # Vertices near the root hardly vary: dividing by nothing would make noise of them.
+        spread = spread.clamp_min(max(float(spread.max()) * 0.1, 1e-4))
+        self.scale.copy_((1.0 / spread).repeat_interleave(3))
+
+    def encode(self, shapes: Tensor) -> Tensor:
+        """(..., 72) scalp-local root-relative coordinates -> (..., 32) codes."""
+        return self.encoder((shapes - self.mean) * self.scale)
+
+    def forward(self, shapes: Tensor) -> Tensor:
+        """(..., 72) -> (..., 72) reconstruction, metres."""
+        return self.decoder(self.encode(shapes)) / self.scale + self.mean
+
+    @torch.no_grad()
+    def errors(self, shapes: np.ndarray) -> np.ndarray:
+        """(n, 24, 3) strands -> (n, 24) distance between each vertex and its reconstruction, metres."""
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 72)).to(self.mean.device)
+        return (self(flat) - flat).reshape(-1, 24, 3).norm(dim=-1).cpu().numpy()
+
+    @torch.no_grad()
+    def codes(self, shapes: np.ndarray) -> np.ndarray:
+        """(n, 24, 3) strands -> (n, 32) float32 codes."""
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 72)).to(self.mean.device)
+        return self.encode(flat).cpu().numpy()
+
+
+def _mlp(inputs: int, hidden: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Linear(inputs, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(), nn.Linear(hidden, outputs)
+    )

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From trained torch modules to the four ONNX graphs of a model file."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import nn
+
+from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.networks import StrandNet
+
+OPSET = 17
+IR_VERSION = 8  # the oldest that goes with this opset, for the oldest onnxruntime a user may have
+
+
+def strand_graphs(
+    autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction"
+) -> dict[str, bytes]:
+    """The graphs that `model.write` stores, by file name.
+
+    Normalisation is folded into the weights, so all inputs are SI:
+
+    - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
+    - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
+    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256);
+    - `tail.onnx`: `strand_part` (S, 256), `frame_part` (1, 256), `anchor` (S, 72) offsets of the held bind
+    pose, `edges`
+      (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
+    """
+    encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale), *autoencoder.encoder[1:]]
+    frame = _folded(net.frame, net.frame_mean, net.frame_scale)
+    deep = None
+    if net.encoder is not None:
+        deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale), *net.encoder[1:]]
+    return {
+        "encoder.onnx": _encoder_graph(encoder),
+        "strand.onnx": _linear_graph("strand", _folded(net.strand, net.strand_mean, net.strand_scale)),
+        "frame.onnx": _linear_graph("frame", frame, deep),
+        "tail.onnx": _tail_graph(net, output),
+    }
+
+
+def _folded(layer: nn.Linear, mean: torch.Tensor, scale: torch.Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """(in, out) weight and (out,) bias of `layer((x - mean) * scale)`, summed in float64."""
+    weight = layer.weight.detach().double() * scale.double()
+    bias = torch.zeros(len(weight)) if layer.bias is None else layer.bias.detach()
+    bias = bias.double().to(weight.device) - weight @ mean.double()
+    return weight.T.float().cpu().numpy(), bias.float().cpu().numpy()
+
+
+def _weights(layer: nn.Linear | tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    if isinstance(layer, tuple):
+        return layer
+    return layer.weight.detach().T.float().cpu().numpy(), layer.bias.detach().float().cpu().numpy()
+
+
+class _Graph:
+    """A chain of layers under construction."""
+
+    def __init__(self, name: str):
+        from onnx import helper, numpy_helper
+
+        self.helper, self.numpy_helper = helper, numpy_helper
+        self.name, self.nodes, self.constants = name, [], []
+
+    def linear(self, value: str, layer, output: str | None = None) -> str:
+        output = output or f"linear{len(self.nodes)}"
+        names = [f"{output}.weight", f"{output}.bias"]
+        for name, array in zip(names, _weights(layer), strict=True):
+            self.constant(name, array)
+        return self.node("Gemm", [value, *names], output)
+
+    def mlp(self, value: str, layers, output: str) -> str:
+        """Layers as in `nn.Sequential`: linear ones (or their folded arrays) with ReLU between."""
+        last = len(layers) - 1
+        for i, layer in enumerate(layers):
+            value = (
+                self.node("Relu", [value], f"relu{len(self.nodes)}")
+                if isinstance(layer, nn.ReLU)
+                else self.linear(value, layer, output if i == last else None)
+            )
+        return value
+
+    def constant(self, name: str, array: np.ndarray) -> str:
+        self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
+        return name
+
+    def node(self, kind: str, inputs: list[str], output: str) -> str:
+        self.nodes.append(self.helper.make_node(kind, inputs, [output]))
+        return output
+
+    def finish(self, inputs: dict[str, tuple], outputs: dict[str, tuple]) -> bytes:
+        import onnx
+
+        def describe(values):
+            return [
+                self.helper.make_tensor_value_info(k, onnx.TensorProto.FLOAT, v) for k, v in values.items()
+            ]
+
+        graph = self.helper.make_graph(
+            self.nodes, self.name, describe(inputs), describe(outputs), self.constants
+        )
+        model = self.helper.make_model(
+            graph,
+            opset_imports=[self.helper.make_opsetid("", OPSET)],
+            ir_version=IR_VERSION,
+            producer_name="neuralocks",
+        )
+        onnx.checker.check_model(model)
+        return model.SerializeToString(deterministic=True)
+
+
+def _encoder_graph(layers) -> bytes:
+    graph = _Graph("encoder")
+    graph.mlp("shape", layers, "code")
+    return graph.finish({"shape": ("S", 72)}, {"code": ("S", len(_weights(layers[-1])[1]))})
+
+
+def _linear_graph(name: str, layer, deep=None) -> bytes:
+    graph, (weight, bias) = _Graph(name), layer
+    if deep is None:
+        graph.linear(name, layer, f"{name}_part")
+    else:
+        graph.node("Add", [graph.linear(name, layer, "flat"), graph.mlp(name, deep, "deep")], f"{name}_part")
+    rows = "S" if name == "strand" else "B"
+    return graph.finish({name: (rows, len(weight))}, {f"{name}_part": (rows, len(bias))})
+
+
+def _tail_graph(net: StrandNet, output: str) -> bytes:
+    """Second layer, output layer, and `networks.deform` written in ONNX, so that all of it runs in the
+    runtime's chunks."""
+    graph, hidden, width = _Graph("tail"), net.middle.in_features, net.out.out_features
+    count = width // 3
+    graph.node("Add", ["strand_part", "frame_part"], "sum")
+    graph.mlp(graph.node("Relu", ["sum"], "first"), [net.middle, nn.ReLU(), net.out], "offsets")
+    free = np.repeat(np.arange(count) >= 2, 3).astype(np.float32)
+    graph.node("Sub", ["offsets", "anchor"], "change")
+    graph.node(
+        "Mul", ["change", graph.constant("free", free)], "o" if output == "direction" else "displacement"
+    )
+    if output == "direction":
+        graph.constant("rows", np.array([-1, count, 3]))
+        graph.constant("flat", np.array([-1, width]))
+        graph.constant("axis", np.array([2]))
+        graph.constant("tiny", np.float32(1e-18))
+        for name in ("o", "edges"):
+            graph.node("Reshape", [name, "rows"], f"{name}3")
+        for name, source in (("l", "edges3"), ("n", "v")):
+            if name == "n":
+                graph.node("Add", ["edges3", graph.node("Mul", ["l", "o3"], "lo")], "v")
+            graph.node("ReduceSum", [graph.node("Mul", [source, source], f"{name}2"), "axis"], f"{name}sum")
+            graph.node("Sqrt", [graph.node("Max", [f"{name}sum", "tiny"], f"{name}max")], name)
+        graph.node("Mul", ["v", graph.node("Div", ["l", "n"], "stretch")], "turned")
+        graph.node("Reshape", [graph.node("Sub", ["turned", "edges3"], "d3"), "flat"], "d")
+        # A running sum along the strand as one matrix product, which runtimes do faster than a scan.
+        running = np.kron(np.triu(np.ones((count, count))), np.eye(3)).astype(np.float32)
+        graph.node("MatMul", ["d", graph.constant("running", running)], "displacement")
+    inputs = {
+        "strand_part": ("S", hidden),
+        "frame_part": (1, hidden),
+        "anchor": ("S", width),
+        "edges": ("S", width),
+    }
+    return graph.finish(inputs, {"offsets": ("S", width), "displacement": ("S", width)})

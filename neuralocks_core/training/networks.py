@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The strand simulator network: two hidden layers, its first layer split into a strand part and a frame
+part."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+VERTICES = 24
+OUTPUTS = ("direction", "displacement")
+MOTIONS = ("linear", "encoder")
+
+
+class StrandNet(nn.Module):
+    """Maps what a strand is and what the body did to offsets of 24 vertices (paper section 3.3, figure 2).
+
+    The first layer is one linear map of the whole input, written as a sum of two: the strand part is
+    constant for a groom,
+    the frame part for a frame, so a bake computes each once. Inputs are SI; normalisation lies in buffers
+    and is
+    folded into the weights at export.
+
+    Args:
+        frame_size: length of the boundary vector, `BoundarySpec.size`.
+        strand_size: uv 2, rest code 32, lock code 32, root normal 3, length 1.
+        hidden: width of both hidden layers.
+        outputs: 3 for each of the 24 vertices.
+        motion: `"linear"`, as in the paper, or `"encoder"`: a deeper map of the boundary vector is added to
+        the linear
+            one. It runs once per frame, so it costs nothing per strand.
+    """
+
+    def __init__(
+        self,
+        frame_size: int,
+        strand_size: int = 70,
+        hidden: int = 256,
+        outputs: int = 3 * VERTICES,
+        *,
+        motion: str = "linear",
+    ):
+        super().__init__()
+        if motion not in MOTIONS:
+            raise ValueError(f"motion: {motion!r} is not one of {MOTIONS}")
+        self.motion = motion
+        self.strand = nn.Linear(strand_size, hidden, bias=False)
+        self.frame = nn.Linear(frame_size, hidden)
+        # Both halves start as the slices of one Linear over the whole input would.
+        bound = (strand_size + frame_size) ** -0.5
+        for parameter in (self.strand.weight, self.frame.weight, self.frame.bias):
+            nn.init.uniform_(parameter, -bound, bound)
+        self.encoder = None
+        if motion == "encoder":
+            self.encoder = nn.Sequential(
+                nn.Linear(frame_size, hidden),
+                nn.ReLU(),
+                nn.Linear(hidden, hidden),
+                nn.ReLU(),
+                nn.Linear(hidden, hidden),
+            )
+        self.middle = nn.Linear(hidden, hidden)
+        self.out = nn.Linear(hidden, outputs)
+        with (
+            torch.no_grad()
+        ):  # hair starts at rest: zero offsets are both the groom and a direction that exists
+            self.out.weight.mul_(0.1)
+            self.out.bias.zero_()
+        for name, size in (("strand", strand_size), ("frame", frame_size)):
+            self.register_buffer(f"{name}_mean", torch.zeros(size))
+            self.register_buffer(f"{name}_scale", torch.ones(size))
+
+    @torch.no_grad()
+    def set_normalisation(
+        self,
+        strands: Tensor,
+        frames: Tensor,
+        history: slice,
+        *,
+        history_scale: float = 0.25,
+        static: bool = False,
+    ) -> None:
+        """Takes mean and standard deviation of the inputs from training samples.
+
+        Args:
+            strands: (n, strand_size) sampled strand inputs.
+            frames: (m, frame_size) sampled boundary vectors.
+            history: where the velocity history lies in the boundary vector.
+            history_scale: the many history entries are scaled down after normalisation, or they drown the
+            pose.
+            static: the quasi-static variant: the history is not read at all.
+        """
+        for name, samples in (("strand", strands), ("frame", frames)):
+            samples = samples.to(torch.float64)
+            mean, std = samples.mean(0), samples.std(0, unbiased=False)
+            # What never varied was never learned: reading it later could only add noise.
+            floor = 1e-5 * (1.0 + mean.abs())
+            scale = torch.where(std > floor, 1.0 / std.clamp_min(1e-12), torch.zeros_like(std))
+            if name == "frame":
+                mean[history] = 0.0  # a held pose is exactly zero here and stays so
+                rms = samples[:, history].square().mean(0).sqrt()
+                live = torch.where(rms > 1e-6, history_scale / rms.clamp_min(1e-12), torch.zeros_like(rms))
+                scale[history] = 0.0 if static else live
+            getattr(self, f"{name}_mean").copy_(mean)
+            getattr(self, f"{name}_scale").copy_(scale)
+
+    def strand_part(self, strands: Tensor) -> Tensor:
+        """First layer, strand part: (..., S, strand_size) -> (..., S, hidden)."""
+        return self.strand((strands - self.strand_mean) * self.strand_scale)
+
+    def frame_part(self, frames: Tensor) -> Tensor:
+        """First layer, body part and bias: (..., frame_size) -> (..., hidden)."""
+        normal = (frames - self.frame_mean) * self.frame_scale
+        part = self.frame(normal)
+        return part if self.encoder is None else part + self.encoder(normal)
+
+    def tail(self, strand_part: Tensor, frame_part: Tensor) -> Tensor:
+        """All that is left per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
+        hidden = torch.relu(strand_part + frame_part)
+        return self.out(torch.relu(self.middle(hidden)))
+
+    def forward(self, strands: Tensor, frames: Tensor) -> Tensor:
+        """Offsets for every frame and strand.
+
+        Args:
+            strands: (S, strand_size), the same strands in all frames, or (B, S, strand_size), own ones in
+            each.
+            frames: (B, frame_size) boundary vectors.
+
+        Returns:
+            (B, S, 24, 3) offsets; see `deform` for what they mean.
+        """
+        out = self.tail(self.strand_part(strands), self.frame_part(frames)[:, None, :])
+        return out.reshape(*out.shape[:-1], -1, 3)
+
+
+def deform(
+    offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None, output: str = "direction"
+) -> Tensor:
+    """Displacement of the vertices that the network's offsets stand for.
+
+    `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch
+    cannot happen and
+    hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest +
+    o`.
+    Vertices 0 and 1 are clamped in both; zero offsets give exactly zero.
+
+    Args:
+        offsets: (..., S, 24, 3) network output.
+        rest: (S, 24, 3), or broadcastable to the offsets; canonical space, metres.
+        anchored_offsets: the network's answer for the held bind pose, subtracted so that this pose gives
+        the groom.
+        output: `"direction"` or `"displacement"`.
+
+    Returns:
+        (..., S, 24, 3) displacement from rest, metres, canonical space.
+
+    Raises:
+        ValueError: `output` is neither of the two.
+    """
+    if anchored_offsets is not None:
+        offsets = offsets - anchored_offsets
+    if output == "displacement":
+        clamped = torch.zeros_like(offsets[..., :2, :])
+        return torch.cat([clamped, offsets[..., 2:, :]], dim=-2)
+    if output != "direction":
+        raise ValueError(f"output: {output!r} is not one of {OUTPUTS}")
+    edges = rest[..., 1:, :] - rest[..., :-1, :]
+    lengths = edges.square().sum(-1, keepdim=True).sqrt()
+    turned = edges[..., 1:, :] + lengths[..., 1:, :] * offsets[..., 2:, :]
+    # The tiny number keeps edges of no length, and offsets that cancel an edge, finite in value and gradient.
+    norm = turned.square().sum(-1, keepdim=True).clamp_min(1e-18).sqrt()
+    change = turned * (lengths[..., 1:, :] / norm) - edges[..., 1:, :]
+    moved = torch.cumsum(change, dim=-2)
+    return torch.cat([torch.zeros_like(moved[..., :2, :]), moved], dim=-2)

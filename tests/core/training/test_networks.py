@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The strand network, what its offsets mean, and its way into ONNX."""
+
+import numpy as np
+import pytest
+import torch
+
+from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
+from neuralocks_core.training.export import strand_graphs
+from neuralocks_core.training.networks import StrandNet, deform
+
+HISTORY = slice(40, 100)
+
+
+@pytest.fixture
+def rest():
+    generator = torch.Generator().manual_seed(3)
+    steps = torch.randn(6, 24, 3, generator=generator) * 0.01 + torch.tensor([0.0, -0.01, 0.0])
+    return steps.cumsum(1)
+
+
+def _net(motion="linear", static=False):
+    torch.manual_seed(0)
+    net = StrandNet(100, motion=motion)
+    frames = torch.randn(64, 100) * torch.linspace(0.01, 30, 100) + 2
+    frames[:, 7] = 0.3
+    net.set_normalisation(torch.randn(50, 70) * 3 + 1, frames, HISTORY, static=static)
+    return net
+
+
+def _run(graph, output=None, **inputs):
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    return session.run(output and [output], {k: v.numpy() for k, v in inputs.items()})[0]
+
+
+def test_the_split_first_layer_is_one_linear_layer():
+    net = _net()
+    whole = torch.nn.Linear(170, 256)
+    with torch.no_grad():
+        whole.weight.copy_(torch.cat([net.strand.weight, net.frame.weight], 1))
+        whole.bias.copy_(net.frame.bias)
+    strands, frame = torch.randn(5, 70), torch.randn(1, 100)
+    normal = torch.cat(
+        [
+            (strands - net.strand_mean) * net.strand_scale,
+            ((frame - net.frame_mean) * net.frame_scale).expand(5, -1),
+        ],
+        1,
+    )
+    torch.testing.assert_close(
+        net.strand_part(strands) + net.frame_part(frame), whole(normal), atol=2e-5, rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize(("motion", "output"), [("linear", "direction"), ("encoder", "displacement")])
+def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
+    net, autoencoder = _net(motion), StrandAutoencoder()
+    shapes = torch.randn(9, 72) * 0.1 + 0.3
+    autoencoder.set_normalisation(shapes)
+    graphs = strand_graphs(autoencoder, net, output)
+    assert set(graphs) == {"encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"}
+    np.testing.assert_allclose(
+        _run(graphs["encoder.onnx"], shape=shapes), autoencoder.encode(shapes).detach(), atol=1e-5
+    )
+    strands, frame = torch.randn(9, 70) * 3 + 1, torch.randn(1, 100) * torch.linspace(0.01, 30, 100) + 2
+    rest = (torch.randn(9, 24, 3) * 0.01 + torch.tensor([0.0, -0.01, 0.0])).cumsum(1)
+    anchor = torch.randn(9, 24, 3)
+    inputs = {
+        "strand_part": torch.from_numpy(_run(graphs["strand.onnx"], strand=strands)),
+        "frame_part": torch.from_numpy(_run(graphs["frame.onnx"], frame=frame)),
+        "anchor": anchor.reshape(9, 72),
+        "edges": torch.cat([torch.zeros(9, 1, 3), rest.diff(dim=1)], 1).reshape(9, 72),
+    }
+    offsets = net(strands, frame)[0]
+    np.testing.assert_allclose(
+        _run(graphs["tail.onnx"], **inputs), offsets.detach().reshape(9, 72), atol=1e-5
+    )
+    moved = _run(graphs["tail.onnx"], "displacement", **inputs)
+    np.testing.assert_allclose(
+        moved, deform(offsets, rest, anchor, output).detach().reshape(9, 72), atol=2e-6
+    )
+    assert strand_graphs(autoencoder, net, output) == graphs, "the same weights give the same bytes"
+
+
+def test_a_static_network_does_not_read_the_history():
+    net = _net(static=True)
+    frames = torch.randn(1, 100).repeat(2, 1)
+    frames[1, HISTORY] += 100.0
+    still, moving = net(torch.randn(4, 70), frames)
+    assert torch.equal(still, moving)
+    assert not torch.equal(*_net()(torch.randn(4, 70), frames))
+
+
+def test_an_input_that_never_varied_is_not_read():
+    net = _net()
+    frames = torch.zeros(2, 100)
+    frames[1, 7] = 50.0
+    assert torch.equal(*net(torch.randn(4, 70), frames))
+
+
+def test_own_strands_in_each_frame_equal_the_same_strands_for_all():
+    net, strands, frames = _net(), torch.randn(4, 70), torch.randn(3, 100)
+    torch.testing.assert_close(net(strands, frames), net(strands.expand(3, 4, 70), frames))
+
+
+def test_zero_offsets_are_exactly_the_groom(rest):
+    for output in ("direction", "displacement"):
+        assert not deform(torch.zeros(2, 6, 24, 3), rest, output=output).any()
+
+
+def test_direction_keeps_every_edge_length_and_clamps_the_first_edge(rest):
+    moved = rest + deform(torch.randn(5, 6, 24, 3), rest)
+    torch.testing.assert_close(
+        moved.diff(dim=-2).norm(dim=-1), rest.diff(dim=-2).norm(dim=-1).expand(5, 6, 23)
+    )
+    assert torch.equal(moved[..., :2, :], rest[:, :2].expand(5, 6, 2, 3))
+
+
+def test_direction_turns_the_edge_that_ends_at_the_vertex():
+    rest = torch.zeros(1, 24, 3)
+    rest[0, :, 1] = -torch.arange(24.0)
+    offsets = torch.zeros(1, 24, 3)
+    offsets[0, 5] = torch.tensor([1.0, 1.0, 0.0])  # (0,-1,0) + (1,1,0) = (1,0,0)
+    moved = deform(offsets, rest)[0]
+    assert not moved[:5].any()
+    torch.testing.assert_close(moved[5:], torch.tensor([1.0, 1.0, 0.0]).expand(19, 3))
+
+
+def test_the_anchor_gives_the_groom_in_the_anchored_pose(rest):
+    offsets = torch.randn(1, 6, 24, 3)
+    assert not deform(offsets, rest, anchored_offsets=offsets).any()
+
+
+def test_degenerate_edges_and_opposite_offsets_stay_finite():
+    rest = torch.zeros(1, 24, 3)
+    rest[0, 2:, 1] = -torch.arange(22.0)
+    offsets = torch.zeros(1, 24, 3)
+    offsets[0, 5] = torch.tensor([0.0, 1.0, 0.0])  # cancels the edge
+    offsets.requires_grad_()
+    moved = deform(offsets, rest)
+    moved.square().sum().backward()
+    assert moved.isfinite().all() and offsets.grad.isfinite().all()
+
+
+def test_the_autoencoder_learns_strands_and_is_reproducible():
+    rng = np.random.default_rng(0)
+    along = np.linspace(0, 1, 24)[None, :, None]
+    curl = rng.uniform(0, 6, (400, 1, 1)) * along
+    length = rng.uniform(0.05, 0.3, (400, 1, 1))
+    shapes = length * np.concatenate([along + 0 * length, 0.2 * np.sin(curl), 0.2 * along * np.cos(curl)], -1)
+    first = train_autoencoder(shapes[:300], steps=400, batch=128)
+    again = train_autoencoder(shapes[:300], steps=400, batch=128)
+    assert first.errors(shapes[300:]).mean() < 0.01
+    np.testing.assert_array_equal(first.codes(shapes), again.codes(shapes))
+    assert first.codes(shapes).shape == (400, 32)
+    assert not any(p.requires_grad for p in first.parameters())
