@@ -101,3 +101,32 @@ def neighbours(
             break
         todo, asked = todo[short], 4 * asked
     return found.reshape(strands, vertices, count)
+
+
+def lock_mates(rest: np.ndarray, lock: np.ndarray, count: int = 5, radius: float = 0.02) -> np.ndarray:
+    """The strands of the same lock that lie nearest at rest, which clumping ties together.
+
+    Args:
+        rest: (S, K, 3) [m].
+        lock: (S,) int.
+        count: at most this many.
+        radius: largest mean distance between the two strands [m].
+
+    Returns:
+        (S, count) int32, nearest first; -1 where there are fewer.
+    """
+    found = np.full((len(rest), count), -1, np.int32)
+    order = np.argsort(lock, kind="stable")
+    for members in np.split(order, np.flatnonzero(np.diff(lock[order])) + 1):
+        if len(members) < 2:
+            continue
+        # Of a large lock only the strands with the nearest roots are looked at along their length.
+        near = cKDTree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * count))[1]
+        apart = np.linalg.norm(rest[members[near]] - rest[members][:, None], axis=-1).mean(axis=-1)
+        apart[members[near] == members[:, None]] = np.inf
+        apart[apart > radius] = np.inf
+        first = np.argsort(apart, axis=1, kind="stable")[:, :count]
+        close = np.isfinite(np.take_along_axis(apart, first, 1))
+        mates = np.where(close, np.take_along_axis(members[near], first, 1), -1)
+        found[members, : mates.shape[1]] = mates
+    return found

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.locks import neighbours
+from neuralocks_core.locks import lock_mates
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands import StrandSet
@@ -122,7 +122,8 @@ class RolloutMaker:
             dt=scene.spec.dt,
             substeps=scene.substeps,
             rest_support=scene.rest_support,
-            neighbours=neighbours(rest, groom.lock[chosen]),
+            neighbours=lock_mates(rest, groom.lock[chosen]),
+            bind_body=None if self._body is None else self._bind_body(shape),
         )
         moved = result.points - rest[None].astype(np.float32)
         planes = result.planes.copy()
@@ -138,6 +139,10 @@ class RolloutMaker:
             np.clip(planes, -1000, 1000).astype(np.float16),
             float(np.median(result.residual)),
         )
+
+    def _bind_body(self, shape: np.ndarray) -> np.ndarray:
+        to_bind = self.scene.character.canonical_to_bind
+        return (self._body.shaped(shape) - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
         """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a
