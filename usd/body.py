@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write a character as a UsdSkel asset: skeleton, skinned mesh, blend shapes, scalp."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.statistical_body import StatisticalBody, statistical_body
+
+ROOT = "/Body"
+SKELETON = f"{ROOT}/Rig"
+MESH = f"{ROOT}/Skin"
+FORMATS = (".usd", ".usda", ".usdc")
+
+
+def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str, float] | None = None) -> Path:
+    """Write the statistical body as a USD character: metres, Y up, facing +Z, at rest.
+
+    Args:
+        path: file to write (.usd, .usda, .usdc); replaced as a whole when all is written.
+        body: what to write; the default builds anny, about a minute the first time.
+        phenotype: anny's parameters, 0..1, for the default body.
+
+    Raises:
+        NeuralocksError: the path has another ending or cannot be written, anny is missing or a phenotype is wrong.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise NeuralocksError(f"{path}: a body is written as USD; end the name with {', '.join(FORMATS)}")
+    body = statistical_body(phenotype) if body is None else body
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".body-") as folder:
+            part = Path(folder) / path.name
+            stage = Usd.Stage.CreateNew(str(part))
+            _author(stage, body)
+            stage.GetRootLayer().Save()
+            del stage
+            os.replace(part, path)
+    except OSError as error:
+        raise NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose a folder you can write to") from None
+    return path
+
+
+def _author(stage, body: StatisticalBody) -> None:
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    root = UsdSkel.Root.Define(stage, ROOT)
+    stage.SetDefaultPrim(root.GetPrim())
+    Usd.ModelAPI(root).SetKind("component")
+    skeleton = _skeleton(stage, body.character.skeleton)
+    mesh = _mesh(stage, body)
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+    skin, influences = body.character.body, body.character.body.joint_indices.shape[1]
+    binding.CreateJointIndicesPrimvar(False, influences).Set(Vt.IntArray.FromNumpy(np.int32(skin.joint_indices).ravel()))
+    binding.CreateJointWeightsPrimvar(False, influences).Set(Vt.FloatArray.FromNumpy(np.float32(skin.joint_weights).ravel()))
+    _blend_shapes(stage, binding, skin.shapes)
+    # A skinned mesh moves beyond its own points: the root's extent is the answer that usdview and the validators read.
+    low, high = skin.points.min(axis=0), skin.points.max(axis=0)
+    UsdGeom.Boundable(root).CreateExtentAttr([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
+
+
+def _skeleton(stage, joints):
+    skeleton = UsdSkel.Skeleton.Define(stage, SKELETON)
+    bind = joints.bind
+    parents = np.array([bind[p] if p >= 0 else np.eye(4) for p in joints.parents])
+    skeleton.CreateJointsAttr(list(joints.names))
+    skeleton.CreateBindTransformsAttr(_matrices(bind))
+    skeleton.CreateRestTransformsAttr(_matrices(np.linalg.inv(parents) @ bind))
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+    return skeleton
+
+
+def _matrices(transforms):
+    # USD multiplies row vectors: its matrices are the transposes of ours.
+    return Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(np.swapaxes(transforms, -1, -2)))
+
+
+def _mesh(stage, body):
+    points = np.float32(body.character.body.points)
+    mesh = UsdGeom.Mesh.Define(stage, MESH)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(body.faces), body.faces.shape[1], np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.int32(body.faces).ravel()))
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
+    # Normals would have to be skinned too; a subdivision surface is shaded smoothly without any.
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.catmullClark)
+    color = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    color.Set(Vt.Vec3fArray.FromNumpy(np.float32(body.colors)))
+    UsdGeom.Subset.CreateGeomSubset(mesh, "scalp", UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(np.int32(body.scalp)), "hair")
+    return mesh
+
+
+def _blend_shapes(stage, binding, shapes) -> None:
+    paths = []
+    for name, offsets in shapes.items():
+        shape = UsdSkel.BlendShape.Define(stage, f"{MESH}/{name}")
+        # Only points that move by a hundredth of a millimetre are stored.
+        moved = np.flatnonzero(np.abs(offsets).max(axis=1) > 1e-5)
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.float32(offsets[moved])))
+        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(np.int32(moved)))
+        paths.append(Sdf.Path(str(shape.GetPath())))
+    binding.CreateBlendShapesAttr(list(shapes))
+    binding.CreateBlendShapeTargetsRel().SetTargets(paths)
