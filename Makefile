@@ -1,0 +1,70 @@
+# make demo   see moving hair: installs the runtime without torch, bakes the shipped shot, makes a picture and a clip
+# make test   installs everything that the tests need, and runs the linter and all tests
+# make addon  builds the Blender extension into dist/
+# PYTHON=/path/to/python3.11 chooses another interpreter (3.11 or newer).
+
+PYTHON ?= python3
+VENV   ?= .venv
+OUT    ?= out/demo
+BIN    := $(VENV)/bin
+PIP     = $(BIN)/python -m pip --disable-pip-version-check
+# One thread a process: the tests run in two processes, and small matrices only get slower with more.
+ONE_THREAD = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: demo test lint tests blender addon bench clean
+
+demo: $(VENV)/installed-demo
+	$(BIN)/neuralocks demo -o $(OUT)
+
+test: lint tests
+
+lint: $(VENV)/installed-test
+	$(BIN)/ruff check .
+
+tests: $(VENV)/installed-test blender
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -q
+
+addon: $(VENV)/installed-test
+	$(BIN)/python dcc_addon/build.py
+
+bench: $(VENV)/installed-test
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf build dist out .pytest_cache .ruff_cache .hypothesis
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "python: $$($(PYTHON) --version 2>&1) is too old; install 3.11 or newer, or: make PYTHON=/path/to/it"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed-demo: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) install -q -c constraints.txt -e ".[preview]"
+	touch $@
+
+# torch first and by its number: left to the resolver, a newer build with several gigabytes of CUDA would come.
+$(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) install -q "$$(grep '^torch==' constraints.txt)"
+	$(PIP) install -q -c constraints.txt -e ".[train,body,preview,compare,test]"
+	touch $@ $(VENV)/installed-demo
+
+# Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
+# wheel is missing, the tests that need it say so and are skipped.
+BLENDER_NEEDS = onnxruntime usd-core scipy trimesh
+PYTHON_3_11 = $(firstword $(wildcard $(shell command -v python3.11) $(HOME)/.pyenv/versions/3.11*/bin/python3.11))
+PYTHON_3_13 = $(firstword $(wildcard $(shell command -v python3.13) $(HOME)/.pyenv/versions/3.13*/bin/python3.13))
+
+blender: .venv-blender-4.2/installed .venv-blender-5.2/installed
+
+.venv-blender-4.2/installed:
+	$(call blender-venv,$(PYTHON_3_11),4.2.23)
+.venv-blender-5.2/installed:
+	$(call blender-venv,$(PYTHON_3_13),5.2.3)
+
+define blender-venv
+@if [ -z "$(1)" ]; then echo "Blender $(2): its Python is not installed; its tests will be skipped"; else \
+    echo "Blender $(2): installing into $(@D)"; \
+    { [ -d $(@D) ] || $(1) -m venv $(@D); } && \
+    { $(@D)/bin/python -m pip --disable-pip-version-check install -q bpy==$(2) $(BLENDER_NEEDS) && touch $@; } || \
+    echo "Blender $(2): could not be installed; its tests will be skipped"; fi
+endef
