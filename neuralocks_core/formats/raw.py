@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a groom file holds, before units and axes are settled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import NeuralocksError
+
+
+@dataclass(frozen=True, eq=False)
+class RawGroom:
+    """Arrays as in the file; `reading.read` converts and checks them."""
+
+    points: np.ndarray
+    """(P, 3) in the file's units and axes."""
+    counts: np.ndarray
+    """(S,) vertices of each strand."""
+    widths: np.ndarray | None = None
+    """(P,), (S,) or (1,) in the file's units, or None."""
+    root_uv: np.ndarray | None = None
+    """(S, 2) or None."""
+    unit: float | None = None
+    """Metres per unit where the format prescribes one."""
+    up: str = "Y"
+    """The upward axis usual for the format."""
+    notes: list[str] = field(default_factory=list)
+    """One line for each thing assumed or left out."""
+
+
+def bad_file(subject: str, fact: str, remedy: str = "export it again") -> NeuralocksError:
+    """The error for a file that cannot be what it says."""
+    return NeuralocksError(f"{subject}: {fact}; {remedy}")
+
+
+def floats(content: bytes, offset: int, count: int, subject: str, what: str) -> np.ndarray:
+    """(count,) little-endian float32 at a byte offset, not copied; refused where the file is too short for
+    them.
+
+    Python integers do not overflow, so the check holds for any offset and count that a file may claim.
+    """
+    if offset < 0 or count < 0 or offset + 4 * count > len(content):
+        raise bad_file(
+            subject,
+            f"{what} need {4 * count} bytes at {offset} but the file has {len(content)}",
+            "it is truncated or damaged: export it again",
+        )
+    return np.frombuffer(content, "<f4", count, offset)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a groom file of whatever kind into metres, Y up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import NeuralocksError
+from ..groom import LARGEST_COORDINATE, Groom
+from . import cemyuksel, counted, tressfx, tressfx_text
+from .raw import RawGroom, bad_file
+
+EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
+"""What `read` knows by name; the content decides where it says what it is."""
+
+UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
+"""Metres per unit of the names that users may write."""
+
+LARGEST_FILE = 4 * 2**30
+"""Bytes; a groom of a million strands of 100 vertices is a third of it."""
+
+WIDEST = 0.005
+"""A hair wider than this [m] says that the file's thickness is in another unit than its points."""
+
+
+def read(path: str | Path, unit: str | float | None = None, up: str | None = None) -> Groom:
+    """The groom in a TressFX, Cem Yuksel, USC-HairSalon or CT2Hair file.
+
+    Args:
+        path: the file; its stem becomes the groom's name.
+        unit: metres per unit of the file, or "mm", "cm", "m", "in"; left out, the unit that the format
+            prescribes, else the one of mm, cm and m that suits a human scalp.
+        up: "Y" or "Z", the file's upward axis; left out, the one usual for the format.
+
+    Raises:
+        NeuralocksError: the file cannot be read, is truncated or malformed, or holds no usable groom.
+    """
+    return read_with_notes(path, unit, up)[0]
+
+
+def read_with_notes(
+    path: str | Path, unit: str | float | None = None, up: str | None = None
+) -> tuple[Groom, list[str]]:
+    """The same as `read`, and one line for each thing that was assumed or left out."""
+    path = Path(path)
+    wanted = None if unit is None else _metres_per_unit(unit)
+    if up is not None and str(up).upper() not in {"Y", "Z"}:
+        raise NeuralocksError(f"--up {up}: is not an axis; give Y or Z")
+    content = _content(path)
+    raw = _reader(path, content)(content, str(path))
+    notes = list(raw.notes)
+    points = raw.points.astype(np.float32, copy=False)
+    _check_finite(points, path)
+
+    scale = wanted if wanted is not None else raw.unit
+    if scale is None:
+        scale = _likely_unit(raw, points)
+        name = next(n for n, value in UNITS.items() if value == scale)
+        notes.append(
+            f"{path}: does not state its unit; took 1 {name}, which suits a human scalp; --unit says
+            otherwise"
+        )
+    axis = str(up or raw.up).upper()
+    with np.errstate(over="ignore"):  # Groom refuses what overflows
+        points = points * np.float32(scale)
+    if axis == "Z":
+        points = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+
+    widths = None if raw.widths is None else raw.widths.astype(np.float32) * np.float32(scale)
+    if widths is not None and not (np.isfinite(widths).all() and 0 < widths.max(initial=0.0) <= WIDEST):
+        notes.append(f"{path}: its thickness is not that of hair; took 0.08 mm")
+        widths = None
+    root_uv = raw.root_uv
+    if root_uv is not None and not np.isfinite(root_uv).all():
+        notes.append(f"{path}: its strand texture coordinates are not finite; left out")
+        root_uv = None
+    if not (np.abs(points) <= LARGEST_COORDINATE).all():
+        raise bad_file(
+            str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit"
+        )
+    return Groom(path.stem or "groom", points, raw.counts, widths, root_uv), notes
+
+
+def _metres_per_unit(unit: str | float) -> float:
+    try:
+        value = UNITS[unit] if unit in UNITS else float(unit)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not 1e-6 <= value <= 1e6:
+        raise NeuralocksError(f"--unit {unit}: is not a unit; give mm, cm, m, in, or metres per unit")
+    return float(value)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if not path.is_file():
+            fact = "is not a file" if path.exists() else "there is no such file"
+            raise NeuralocksError(f"{path}: {fact}; give a groom file ({' '.join(EXTENSIONS)})")
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise bad_file(
+                str(path), f"has {size} bytes, more than the {LARGEST_FILE} that are read", "split it"
+            )
+        return path.read_bytes()
+    except (OSError, ValueError, MemoryError) as error:
+        if isinstance(error, NeuralocksError):
+            raise
+        raise bad_file(str(path), f"cannot be read ({error})", "check the path and its permissions") from None
+
+
+def _reader(path: Path, content: bytes):
+    """By content where the format marks itself, else by extension."""
+    suffix = path.suffix.lower()
+    if content[:4] == b"HAIR":
+        return cemyuksel.read
+    if content[:8].lstrip().lower().startswith(b"version"):
+        return tressfx_text.read
+    if suffix == ".tfx":
+        return tressfx.read
+    if suffix == ".data":
+        return counted.read_hairsalon
+    if suffix == ".bin":
+        return counted.read_ct2hair
+    if suffix == ".hair":
+        raise bad_file(str(path), "does not begin with HAIR", "give a file in Cem Yuksel's format")
+    raise bad_file(
+        str(path), "is no groom file that is known by its content or name", f"give {' '.join(EXTENSIONS)}"
+    )
+
+
+def _check_finite(points: np.ndarray, path: Path) -> None:
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        raise bad_file(
+            str(path),
+            f"{bad.sum()} of {len(bad)} points are not finite, first number {bad.argmax()}",
+            "repair it",
+        )
+
+
+def _likely_unit(raw: RawGroom, points: np.ndarray) -> float:
+    """The one of m, cm and mm that makes the roots' extent nearest to a scalp's 20 cm, in ratio."""
+    starts = np.cumsum(raw.counts, dtype=np.int64) - raw.counts
+    roots = points[starts[raw.counts > 0]].astype(np.float64)
+    extent = float(np.ptp(np.percentile(roots, [2, 98], axis=0), axis=0).max()) if len(roots) else 0.0
+    if extent <= 0.0:  # one strand, or all from one point
+        extent = float(np.ptp(points.astype(np.float64), axis=0).max(initial=0.0)) / 2
+    return min((1.0, 0.01, 0.001), key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / 0.20)))
