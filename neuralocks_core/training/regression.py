@@ -70,7 +70,6 @@ class RolloutBank:
 
     def __init__(self, scene: TrainingScene, codes: list[np.ndarray]):
         self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
-        self.rests = [groom.rest for groom in scene.grooms]
         self.lengths = [groom.length for groom in scene.grooms]
         self.rollouts: list[Rollout] = []
         self._seen: set[Path] = set()
@@ -87,9 +86,7 @@ class RolloutBank:
         """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's
         vector last.
         """
-        rows: dict[str, list] = {
-            name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")
-        }
+        rows: dict[str, list] = {name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")}
         for index in rng.integers(len(self.rollouts), size=options.clips):
             rollout = self.rollouts[index]
             count = len(rollout.strands)
@@ -98,7 +95,7 @@ class RolloutBank:
             moments = np.stack([late - 1, late], axis=1).ravel()
             chosen = rollout.strands[pick]
             rows["strands"].append(self.inputs[rollout.groom][chosen])
-            rows["rest"].append(self.rests[rollout.groom][chosen])
+            rows["rest"].append(rollout.rest[pick])
             rows["length"].append(self.lengths[rollout.groom][chosen])
             rows["frames"].append(np.concatenate([rollout.vectors[moments], rollout.bind[None]]))
             rows["moved"].append(rollout.moved[moments[:, None], pick])
@@ -165,9 +162,7 @@ def regress(
     net.eval()
 
 
-def regression_losses(
-    net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions
-) -> dict[str, Tensor]:
+def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
     """Weighted losses of a batch, each a mean over vertices in units of strand length.
 
     `position` |x - x*|, `velocity` the same of frame differences, `collision` how far x lies under the plane
@@ -203,7 +198,7 @@ def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str =
     frames = torch.from_numpy(np.concatenate([rollout.vectors, rollout.bind[None]])).to(device)
     offsets = net.tail(strands[None], net.frame_part(frames)[:, None])
     offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
-    rest = torch.from_numpy(bank.rests[rollout.groom][chosen]).to(device)
+    rest = torch.from_numpy(rollout.rest).to(device)
     return deform(offsets[:-1], rest, offsets[-1:], output).cpu().numpy()
 
 

@@ -26,6 +26,8 @@ from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
 STEP = 2.0**-15
 """[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes."""
+FOLLOW = 0.04
+"""[m] How far from the body hair still follows a change of its shape."""
 PREROLL = 30
 """Frames at the head of a cut from motion capture that are simulated but not learned from: the hair was not
 at rest there.
@@ -68,6 +70,7 @@ class Rollout:
     Attributes:
         groom: index into the scene's grooms.
         strands: (n,) indices of its strands.
+        rest: their rest points on the body's shape (n, 24, 3) float32, canonical space.
         first: first frame to learn from.
         vectors: boundary vectors (T, F) float32.
         bind: the anchor's vector (F,) float32.
@@ -79,6 +82,7 @@ class Rollout:
 
     groom: int
     strands: np.ndarray
+    rest: np.ndarray
     first: int
     vectors: np.ndarray
     bind: np.ndarray
@@ -95,7 +99,9 @@ class RolloutMaker:
         lowest = min(groom.rest[..., 1].min() for groom in scene.grooms)
         self._body = hair_body(scene.character, reach=0.2 - float(lowest))
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
-        self._carried = [self._scalp_vertices(groom) for groom in scene.grooms]
+        self._surface = None
+        if scene.character.body is not None and scene.character.body.shapes:
+            self._surface = cKDTree(self._canonical(scene.character.body.points))
 
     def make(self, index: int) -> Rollout:
         """Rollout number `index`."""
@@ -110,20 +116,18 @@ class RolloutMaker:
         clip, times, first = self._motion(rng, shape)
         sampler = BoundarySampler(scene.spec, scene.character, clip)
         joints = clip.at(times)
-        rest = groom.rest[chosen].astype(np.float64) + self._scalp_offset(which, chosen, shape)[:, None]
+        rest = self._fitted(groom.rest[chosen].astype(np.float64), shape)
         result = simulate(
             rest,
             scene.character.canonical_to_world(joints),
-            None
-            if self._body is None
-            else posed_over_time(self._body, joints @ scene.character.inverse_bind, shape),
+            None if self._body is None else posed_over_time(self._body, joints @ scene.character.inverse_bind, shape),
             None if self._body is None else self._body.triangles,
             material,
             dt=scene.spec.dt,
             substeps=scene.substeps,
             rest_support=scene.rest_support,
             neighbours=lock_mates(rest, groom.lock[chosen]),
-            bind_body=None if self._body is None else self._bind_body(shape),
+            bind_body=None if self._body is None else self._canonical(self._body.shaped(shape)),
         )
         moved = result.points - rest[None].astype(np.float32)
         planes = result.planes.copy()
@@ -132,6 +136,7 @@ class RolloutMaker:
         return Rollout(
             which,
             chosen,
+            rest.astype(np.float32),
             first,
             sampler.vectors(times, log),
             sampler.held_bind(log, shape),
@@ -140,9 +145,10 @@ class RolloutMaker:
             float(np.median(result.residual)),
         )
 
-    def _bind_body(self, shape: np.ndarray) -> np.ndarray:
+    def _canonical(self, points: np.ndarray) -> np.ndarray:
+        """Canonical coordinates of bind-world points (n, 3)."""
         to_bind = self.scene.character.canonical_to_bind
-        return (self._body.shaped(shape) - to_bind[:3, 3]) @ to_bind[:3, :3]
+        return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
         """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a
@@ -153,9 +159,7 @@ class RolloutMaker:
         while len(chosen) < min(self.scene.strands, len(usable)):
             seed = usable[rng.integers(len(usable))]
             lock = usable[groom.lock[usable] == groom.lock[seed]]
-            near = np.argsort(
-                np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable"
-            )[:8]
+            near = np.argsort(np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable")[:8]
             chosen.extend(int(i) for i in lock[near] if i not in chosen)
         return np.array(sorted(chosen[: self.scene.strands]))
 
@@ -179,22 +183,17 @@ class RolloutMaker:
             clip = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1)))
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 
-    def _scalp_vertices(self, groom: StrandSet) -> np.ndarray | None:
-        """For each strand the body vertex whose blend shape offset its root follows."""
-        body = self.scene.character.body
-        if body is None or not body.shapes:
-            return None
-        to_bind = self.scene.character.canonical_to_bind
-        return cKDTree(body.points).query(groom.rest[:, 0] @ to_bind[:3, :3].T + to_bind[:3, 3])[1]
+    def _fitted(self, rest: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Rest strands (n, 24, 3) on a body of another shape, as an artist would fit them.
 
-    def _scalp_offset(self, which: int, chosen: np.ndarray, shape: np.ndarray) -> np.ndarray:
-        """(n, 3) canonical: a head of another shape takes its hair with it."""
-        if self._carried[which] is None:
-            return np.zeros((len(chosen), 3))
-        body = self.scene.character.body
-        vertices = self._carried[which][chosen]
-        offset = sum(w * offsets[vertices] for w, offsets in zip(shape, body.shapes.values()))
-        return np.asarray(offset) @ self.scene.character.facing.T
+        Roots follow the scalp; what lies on the body follows it, what hangs free follows its root.
+        """
+        if self._surface is None or not shape.any():
+            return rest
+        body, facing = self.scene.character.body, self.scene.character.facing
+        distance, nearest = self._surface.query(rest)
+        offset = sum(w * offsets[nearest] for w, offsets in zip(shape, body.shapes.values())) @ facing.T
+        return rest + offset[:, :1] + np.exp(-distance / FOLLOW)[..., None] * (offset - offset[:, :1])
 
 
 def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
