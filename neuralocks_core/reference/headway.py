@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The head's rigid motion between frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from neuralocks_core.errors import NeuralocksError
+
+
+@dataclass(frozen=True)
+class Headway:
+    """Poses at all substeps, T frames with n substeps: N = (T - 1) n + 1."""
+
+    turn: np.ndarray
+    """(N, 4) quaternions, xyzw."""
+    origin: np.ndarray
+    """(N, 3) [m]."""
+
+
+def headway(head: np.ndarray, substeps: int) -> Headway:
+    """Smooth the head's motion over substeps: rotations by a C2 spline, positions without overshoot.
+
+    Args:
+        head: (T, 4, 4) canonical -> world, rigid.
+        substeps: at least 1.
+
+    Raises:
+        NeuralocksError: wrong shape, not finite, or not rigid.
+    """
+    head = np.asarray(head, np.float64)
+    if head.ndim != 3 or head.shape[1:] != (4, 4) or len(head) == 0:
+        raise NeuralocksError(f"head: shape {head.shape}; give (frames, 4, 4)")
+    if not np.isfinite(head).all():
+        raise NeuralocksError("head: holds values that are not finite; check the animation")
+    volume = np.linalg.det(head[:, :3, :3])
+    if np.abs(volume - 1.0).max() > 0.02:
+        frame = int(np.argmax(np.abs(volume - 1.0)))
+        raise NeuralocksError(f"head: frame {frame} scales or mirrors (determinant {volume[frame]:.3g}); remove the scale")
+    turns, origin = Rotation.from_matrix(head[:, :3, :3]), head[:, :3, 3]
+    frames = len(head)
+    if substeps == 1 or frames == 1:
+        return Headway(turns.as_quat(), origin.copy())
+    at = np.arange((frames - 1) * substeps + 1) / substeps
+    knots = np.arange(frames)
+    return Headway(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))

@@ -1,0 +1,367 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Newton's method on one inextensible strand per thread: warp kernels for CPU and CUDA from one source.
+
+Unknowns are the vertices behind the clamp and, so that the band stays narrow, the twist of each edge's parallel
+transported frame: a change of an early edge turns all later frames (holonomy), which would make the Hessian dense.
+With the twist as a fourth unknown, tied to the edges by a stiff row, the system is block-banded: 4x4 blocks, two to
+each side, solved by a block LDL^T. Edges never change length: a step turns them.
+
+All arrays are (K, S), vertex first, so that GPU threads read neighbouring memory. Scratch has one column per thread on
+a GPU and a single one on a CPU, where threads run one after the other and the column stays in the cache.
+"""
+
+import warp as wp
+
+FOLD = wp.constant(wp.float64(1e-6))
+"""Smallest 1 + cos of the angle between two edges: keeps a folded strand finite."""
+STRETCH = wp.constant(wp.float64(1e6))
+"""Stiffness against stretch inside a Newton step [m^2/s^2]; what is left of it becomes the tension."""
+TWIST_TIE = wp.constant(wp.float64(1e4))
+"""Stiffness of the row that ties the frames' twist to the edges, in units of the bend stiffness."""
+MARGIN_LINEAR = wp.constant(wp.float64(0.02))
+"""Penetration [m] from which the collision force stops growing."""
+
+array_vec = wp.array2d(dtype=wp.vec3d)
+array_real = wp.array2d(dtype=wp.float64)
+
+
+@wp.struct
+class Rods:
+    """Constants: see `rest.RestRods`; bend is 2B / Voronoi length [m^3/s^2] per interior vertex."""
+
+    length: array_real
+    mass: array_real
+    curl: array_vec
+    bend: array_real
+
+
+@wp.struct
+class Scratch:
+    """Work space of one strand."""
+
+    now: array_vec
+    trial: array_vec
+    frame: array_vec
+    step: wp.array2d(dtype=wp.vec4d)
+    right: wp.array2d(dtype=wp.vec4d)
+    diagonal: wp.array2d(dtype=wp.mat44d)
+    lower1: wp.array2d(dtype=wp.mat44d)
+    lower2: wp.array2d(dtype=wp.mat44d)
+
+
+@wp.func
+def collision_energy(depth: wp.float64, stiffness: wp.float64):
+    """Cubic, linear beyond MARGIN_LINEAR; per unit mass."""
+    p = wp.clamp(depth, wp.float64(0.0), MARGIN_LINEAR)
+    rest = wp.max(depth - MARGIN_LINEAR, wp.float64(0.0))
+    return stiffness * (p * p * p + wp.float64(3.0) * MARGIN_LINEAR * MARGIN_LINEAR * rest)
+
+
+@wp.func
+def energy(
+    rods: Rods,
+    x: array_vec,
+    c: int,
+    s: int,
+    turn: wp.quatd,
+    target: array_vec,
+    pull: array_real,
+    plane: wp.array2d(dtype=wp.vec4d),
+    margin: array_real,
+    collision: wp.float64,
+    frame: array_vec,
+):
+    """Energy of the strand in column c of x; writes the transported rest bend vectors to `frame`."""
+    half = wp.float64(0.5)
+    one = wp.float64(1.0)
+    vertices = x.shape[0]
+    q = turn
+    total = wp.float64(0.0)
+    e = wp.normalize(x[1, c] - x[0, c])
+    for i in range(1, vertices):
+        p = x[i, c]
+        if i > 1:
+            gap = p - target[i, s]
+            total += half * pull[i, s] * wp.dot(gap, gap)
+            wall = plane[i, s]
+            depth = margin[i, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
+            if depth > wp.float64(0.0):
+                total += rods.mass[i, s] * collision_energy(depth, collision)
+        if i < vertices - 1:
+            after = (x[i + 1, c] - p) / rods.length[i + 1, s]
+            sum = wp.max(one + wp.dot(e, after), FOLD)
+            bend = wp.cross(e, after) / wp.sqrt(wp.float64(2.0) * sum)
+            rest = wp.quat_rotate(q, rods.curl[i, s])
+            frame[i, c] = rest
+            total += rods.bend[i, s] * wp.dot(bend - rest, bend - rest)
+            q = wp.normalize(wp.quatd(bend[0], bend[1], bend[2], wp.sqrt(half * sum)) * q)
+            e = after
+    return total
+
+
+@wp.func
+def add_row(
+    scratch: Scratch, c: int, i: int, before: wp.vec3d, after: wp.vec3d, twist: wp.float64, next: wp.float64, w: wp.float64
+):
+    """Add w times the outer square of a row over (edge i, edge i+1, twist i, twist i+1) to the Hessian."""
+    zero = wp.float64(0.0)
+    a = wp.vec4d(-before[0], -before[1], -before[2], zero)
+    m = before - after
+    b = wp.vec4d(m[0], m[1], m[2], twist)
+    d = wp.vec4d(after[0], after[1], after[2], next)
+    scratch.diagonal[i + 1, c] = scratch.diagonal[i + 1, c] + wp.outer(w * d, d)
+    if i > 1:
+        scratch.diagonal[i, c] = scratch.diagonal[i, c] + wp.outer(w * b, b)
+        scratch.lower1[i + 1, c] = scratch.lower1[i + 1, c] + wp.outer(w * d, b)
+    if i > 2:
+        scratch.diagonal[i - 1, c] = scratch.diagonal[i - 1, c] + wp.outer(w * a, a)
+        scratch.lower1[i, c] = scratch.lower1[i, c] + wp.outer(w * b, a)
+        scratch.lower2[i + 1, c] = scratch.lower2[i + 1, c] + wp.outer(w * d, a)
+
+
+@wp.func
+def put(v: wp.vec3d):
+    return wp.vec4d(v[0], v[1], v[2], wp.float64(0.0))
+
+
+@wp.func
+def take(v: wp.vec4d):
+    return wp.vec3d(v[0], v[1], v[2])
+
+
+@wp.func
+def assemble(
+    rods: Rods,
+    scratch: Scratch,
+    c: int,
+    s: int,
+    target: array_vec,
+    pull: array_real,
+    plane: wp.array2d(dtype=wp.vec4d),
+    margin: array_real,
+    collision: wp.float64,
+):
+    """Exact negative gradient (holonomy included) in `right`, Gauss-Newton Hessian without tension in the blocks."""
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    two = wp.float64(2.0)
+    vertices = scratch.now.shape[0]
+    for k in range(2, vertices):
+        p = scratch.now[k, c]
+        weight = pull[k, s]
+        g = weight * (p - target[k, s])
+        h = weight
+        block = wp.mat44d()
+        wall = plane[k, s]
+        depth = margin[k, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
+        if depth > zero:
+            n = wp.vec3d(wall[0], wall[1], wall[2])
+            capped = wp.min(depth, MARGIN_LINEAR)
+            stiff = wp.float64(3.0) * collision * rods.mass[k, s]
+            g = g - stiff * capped * capped * n
+            n4 = put(n)
+            block = wp.outer(two * stiff * capped * n4, n4)
+        block[0, 0] = block[0, 0] + h
+        block[1, 1] = block[1, 1] + h
+        block[2, 2] = block[2, 2] + h
+        block[3, 3] = block[3, 3] + wp.float64(1e-12)
+        scratch.diagonal[k, c] = block
+        scratch.lower1[k, c] = wp.mat44d()
+        scratch.lower2[k, c] = wp.mat44d()
+        scratch.right[k, c] = -put(g)
+    moment = zero
+    j = vertices - 2
+    while j >= 1:
+        back = rods.length[j, s]
+        ahead = rods.length[j + 1, s]
+        e = (scratch.now[j, c] - scratch.now[j - 1, c]) / back
+        f = (scratch.now[j + 1, c] - scratch.now[j, c]) / ahead
+        sum = wp.max(one + wp.dot(e, f), FOLD)
+        cross = wp.cross(e, f)
+        scale = one / wp.sqrt(two * sum)
+        slope = -scale * scale * scale
+        bend = scale * cross
+        rest = scratch.frame[j, c]
+        a = rods.bend[j, s]
+        force = two * a * (bend - rest)
+        along = slope * wp.dot(force, cross)
+        hol = cross / sum
+        ge = scale * wp.cross(f, force) + along * f + moment * hol
+        gf = scale * wp.cross(force, e) + along * e + moment * hol
+        ge = (ge - wp.dot(ge, e) * e) / back
+        gf = (gf - wp.dot(gf, f) * f) / ahead
+        moment += -two * a * wp.dot(bend, wp.cross(e, rest))
+        scratch.right[j + 1, c] = scratch.right[j + 1, c] - put(gf)
+        if j > 1:
+            scratch.right[j, c] = scratch.right[j, c] - put(ge - gf)
+        if j > 2:
+            scratch.right[j - 1, c] = scratch.right[j - 1, c] + put(ge)
+
+        u = wp.cross(e, wp.vec3d(one, zero, zero))
+        if wp.abs(e[0]) > wp.float64(0.7):
+            u = wp.cross(e, wp.vec3d(zero, one, zero))
+        u = wp.normalize(u)
+        for turn in range(2):
+            lean = slope * wp.dot(u, cross)
+            ru = scale * wp.cross(f, u) + lean * f
+            rv = scale * wp.cross(u, e) + lean * e
+            ru = (ru - wp.dot(ru, e) * e) / back
+            rv = (rv - wp.dot(rv, f) * f) / ahead
+            add_row(scratch, c, j, ru, rv, -wp.dot(u, wp.cross(e, rest)), zero, two * a)
+            u = wp.cross(e, u)
+        hu = (hol - wp.dot(hol, e) * e) / back
+        hv = (hol - wp.dot(hol, f) * f) / ahead
+        add_row(scratch, c, j, -hu, -hv, -one, one, TWIST_TIE * a)
+        j -= 1
+
+
+@wp.func
+def add_tension(rods: Rods, scratch: Scratch, tension: array_real, c: int, s: int):
+    """Stretch stiffness, pull of the tension and its geometric stiffness; returns the squared force residual / mass."""
+    zero = wp.float64(0.0)
+    vertices = scratch.now.shape[0]
+    for k in range(2, vertices):
+        length = rods.length[k, s]
+        e = (scratch.now[k, c] - scratch.now[k - 1, c]) / length
+        t = tension[k, s]
+        e4 = put(e)
+        across = wp.max(t, zero) / length
+        block = wp.outer((STRETCH / length - across) * e4, e4)
+        block[0, 0] = block[0, 0] + across
+        block[1, 1] = block[1, 1] + across
+        block[2, 2] = block[2, 2] + across
+        scratch.diagonal[k, c] = scratch.diagonal[k, c] + block
+        scratch.right[k, c] = scratch.right[k, c] - t * e4
+        if k > 2:
+            scratch.diagonal[k - 1, c] = scratch.diagonal[k - 1, c] + block
+            scratch.lower1[k, c] = scratch.lower1[k, c] - block
+            scratch.right[k - 1, c] = scratch.right[k - 1, c] + t * e4
+    total = zero
+    for k in range(2, vertices):
+        r = take(scratch.right[k, c]) / rods.mass[k, s]
+        total += wp.dot(r, r)
+    return total / wp.float64(vertices - 2)
+
+
+@wp.func
+def factor_and_solve(scratch: Scratch, c: int):
+    """Block LDL^T of the banded system; the step ends in `step`."""
+    vertices = scratch.now.shape[0]
+    # diagonal becomes its inverse; lower1, lower2 become the factors
+    for k in range(2, vertices):
+        d = scratch.diagonal[k, c]
+        y = scratch.right[k, c]
+        c1 = scratch.lower1[k, c]
+        if k > 3:
+            a2 = scratch.lower2[k, c]
+            l2 = a2 * scratch.diagonal[k - 2, c]
+            c1 = c1 - a2 * wp.transpose(scratch.lower1[k - 1, c])
+            d = d - l2 * wp.transpose(a2)
+            y = y - l2 * scratch.right[k - 2, c]
+            scratch.lower2[k, c] = l2
+        if k > 2:
+            l1 = c1 * scratch.diagonal[k - 1, c]
+            d = d - l1 * wp.transpose(c1)
+            y = y - l1 * scratch.right[k - 1, c]
+            scratch.lower1[k, c] = l1
+        scratch.diagonal[k, c] = wp.inverse(d)
+        scratch.right[k, c] = y
+    k = vertices - 1
+    while k >= 2:
+        z = scratch.diagonal[k, c] * scratch.right[k, c]
+        if k + 1 < vertices:
+            z = z - wp.transpose(scratch.lower1[k + 1, c]) * scratch.step[k + 1, c]
+        if k + 2 < vertices:
+            z = z - wp.transpose(scratch.lower2[k + 2, c]) * scratch.step[k + 2, c]
+        scratch.step[k, c] = z
+        k -= 1
+
+
+@wp.func
+def turn_edges(rods: Rods, scratch: Scratch, c: int, s: int, size: wp.float64):
+    """Walk from the clamp along edges turned by `size` times the step; lengths stay exact."""
+    vertices = scratch.now.shape[0]
+    scratch.trial[0, c] = scratch.now[0, c]
+    scratch.trial[1, c] = scratch.now[1, c]
+    here = scratch.now[1, c]
+    for k in range(2, vertices):
+        length = rods.length[k, s]
+        e = (scratch.now[k, c] - scratch.now[k - 1, c]) / length
+        d = take(scratch.step[k, c]) / length
+        if k > 2:
+            d = d - take(scratch.step[k - 1, c]) / length
+        d = d - wp.dot(d, e) * e
+        here = here + length * wp.normalize(e + size * d)
+        scratch.trial[k, c] = here
+
+
+@wp.kernel(enable_backward=False)
+def newton(
+    rods: Rods,
+    scratch: Scratch,
+    stride: int,
+    x: array_vec,
+    tension: array_real,
+    turn: wp.quatd,
+    target: array_vec,
+    pull: array_real,
+    plane: wp.array2d(dtype=wp.vec4d),
+    margin: array_real,
+    collision: wp.float64,
+    iterations: int,
+    tolerance: wp.float64,
+    residual: wp.array(dtype=wp.float64),
+    used: wp.array(dtype=wp.int32),
+):
+    """Improve each strand by at most `iterations` Newton steps with a backtracking line search on the true energy.
+
+    residual: rms over the free vertices of the net force per mass [m/s^2], tension solved for; a strand stops where
+    it is below `tolerance`.
+    """
+    s = wp.tid()
+    c = s * stride
+    vertices = x.shape[0]
+    for k in range(vertices):
+        scratch.now[k, c] = x[k, s]
+    best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+    left = wp.float64(0.0)
+    go = bool(True)
+    n = int(0)
+    while go:
+        assemble(rods, scratch, c, s, target, pull, plane, margin, collision)
+        left = wp.sqrt(add_tension(rods, scratch, tension, c, s))
+        if n >= iterations or left < tolerance:
+            go = False
+        else:
+            factor_and_solve(scratch, c)
+            size = wp.float64(1.0)
+            search = bool(True)
+            while search:
+                turn_edges(rods, scratch, c, s, size)
+                value = energy(rods, scratch.trial, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+                # rounding decides below 1e-13: a converged strand still wants its tension, so equal counts as better
+                if value <= best + wp.float64(1e-13) * wp.abs(best):
+                    best = value
+                    search = False
+                else:
+                    size = size * wp.float64(0.5)
+                    if size < wp.float64(0.003):
+                        search = False
+                        size = wp.float64(0.0)
+                        go = False
+            for k in range(2, vertices):
+                e = (scratch.now[k, c] - scratch.now[k - 1, c]) / rods.length[k, s]
+                d = take(scratch.step[k, c])
+                if k > 2:
+                    d = d - take(scratch.step[k - 1, c])
+                # a failed step still improves the tension, which is what the residual is measured with
+                gain = wp.max(size, wp.float64(0.5)) * STRETCH * wp.dot(d, e) / rods.length[k, s]
+                tension[k, s] = tension[k, s] + gain
+            if size > wp.float64(0.0):
+                for k in range(2, vertices):
+                    scratch.now[k, c] = scratch.trial[k, c]
+            n += 1
+    for k in range(2, vertices):
+        x[k, s] = scratch.now[k, c]
+    residual[s] = left
+    used[s] = used[s] + n

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The trusted simulator: implicit, inextensible rods on the network's own energies."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.reference.headway import headway
+from neuralocks_core.reference.rest import GRAVITY, rest_rods
+
+Progress = Callable[[int, int, str], None]
+MATERIAL = {"bend": 1e-3, "weight": 1.0, "damping": 10.0, "clumping": 60.0}
+"""Used where no material is given: bend [m^4/s^2], weight [g], damping [1/s], clumping [1/s^2]."""
+SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
+"""[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What T frames of S strands became; canonical space, so the head's own motion is out of it."""
+
+    points: np.ndarray
+    """(T, S, K, 3) float32 [m]."""
+    planes: np.ndarray
+    """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; (0, 0, 0, -1e3) if
+    it is farther than 2 cm."""
+    residual: np.ndarray
+    """(T,) rms over strands and vertices of the net force left, relative to gravity."""
+    iterations: np.ndarray
+    """(T,) mean Newton steps a strand took for the frame."""
+
+
+def simulate(
+    rest: np.ndarray,
+    head: np.ndarray,
+    body: Sequence[np.ndarray] | np.ndarray | None = None,
+    triangles: np.ndarray | None = None,
+    material: Any = None,
+    *,
+    dt: float = 1 / 30,
+    substeps: int = 1,
+    iterations: int = 10,
+    tolerance: float = 1e-3,
+    rest_support: bool = True,
+    neighbours: np.ndarray | None = None,
+    start: np.ndarray | None = None,
+    bind_body: np.ndarray | None = None,
+    margin: float = 0.004,
+    collision: float = 1e6,
+    gravity: float = GRAVITY,
+    device: str = "cpu",
+    progress: Progress | None = None,
+) -> Rollout:
+    """Simulate strands on a moving head and body by implicit Euler (docs/architecture.md, Physics).
+
+    Before the first frame the head moves at constant velocity without rotating and the hair is at rest in it. Any
+    motion is stable: lengths are exact by construction and every step lowers an energy.
+
+    Args:
+        rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.
+        head: (T, 4, 4) canonical -> world, rigid, one per frame.
+        body: (T, V, 3) world points [m] of the body, or None for no contact.
+        triangles: (F, 3) of the body, outward (counter-clockwise), closed where hair may touch it.
+        material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `MATERIAL`.
+        dt: time between frames [s].
+        substeps: steps a frame.
+        iterations: most Newton steps a step.
+        tolerance: a strand is solved when the rms net force is below this fraction of its weight.
+        rest_support: bind pose is an equilibrium.
+        neighbours: (S, N) int strands whose same vertices hold on to this one's (clumping), -1 for none.
+        start: (S, K, 3) canonical points at the first frame; None: the equilibrium of the first pose, looked for from
+            the rest shape.
+        bind_body: (V, 3) canonical body in bind pose, for the distance at rest; None: taken from the first frame.
+        margin: distance kept from the body [m], or a vertex's own distance at rest where that is less.
+        collision: stiffness of the contact [1/(m s^2)].
+        gravity: [m/s^2].
+        device: "cpu", "cuda" or "cuda:N".
+        progress: called with frames done, all frames, message.
+
+    Raises:
+        NeuralocksError: shapes, values or device unfit; the message names the argument.
+    """
+    rods = rest_rods(rest, rest_support=rest_support)
+    strands, vertices = rods.mass.shape
+    if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
+        raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
+    way = headway(head, substeps)
+    frames = len(head)
+    material = _material(material, strands)
+    points = np.zeros((frames, strands, vertices, 3), np.float32)
+    planes = np.zeros((frames, strands, vertices, 4), np.float32)
+    planes[..., 3] = -1e3
+    residual, used = np.zeros(frames), np.zeros(frames)
+    if strands == 0:
+        return Rollout(points, planes, residual, used)
+    if start is not None and np.shape(start) != rods.points.shape:
+        raise NeuralocksError(f"start: shape {np.shape(start)}; give {rods.points.shape}, as rest")
+    from neuralocks_core.reference.stepper import Stepper
+
+    stepper = Stepper(
+        rods, material, check_neighbours(neighbours, strands), margin, collision, gravity, tolerance * gravity, device
+    )
+    if body is not None:
+        first, faces = check_body(body, triangles, frames)
+        if bind_body is None:
+            bind_body = (first - way.origin[0]) @ np.asarray(head[0], np.float64)[:3, :3]
+        stepper.attach_body(np.asarray(bind_body), faces)
+        stepper.move_body(first)
+    stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
+    if start is None:
+        for step in SETTLE_DT:
+            stepper.settle(step, iterations)
+    before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
+    stepper.start_moving(before)
+    for frame in range(frames):
+        steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
+        for step in steps:
+            if body is not None:
+                stepper.move_body(_between(body, step, substeps))
+            stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
+        residual[frame], used[frame] = stepper.read(points[frame], planes[frame])
+        if progress:
+            progress(frame + 1, frames, "simulating")
+    return Rollout(points, planes, residual, used)
+
+
+def _material(material: Any, strands: int) -> dict[str, np.ndarray]:
+    """Four (S,) arrays of finite, not negative numbers."""
+    found = {}
+    for name, default in MATERIAL.items():
+        if material is None:
+            value = default
+        elif isinstance(material, dict):
+            value = material.get(name, default)
+        else:
+            value = getattr(material, name, default)
+        value = np.asarray(value, np.float64)
+        if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
+            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
+        found[name] = np.broadcast_to(value, (strands,)).copy()
+    return found
+
+
+def check_neighbours(neighbours: np.ndarray | None, strands: int) -> np.ndarray:
+    """(S, N) int32, N may be 0.
+
+    Raises:
+        NeuralocksError: wrong shape or a strand that does not exist.
+    """
+    if neighbours is None:
+        return np.zeros((strands, 0), np.int32)
+    neighbours = np.asarray(neighbours)
+    if neighbours.ndim != 2 or len(neighbours) != strands or neighbours.dtype.kind not in "iu":
+        raise NeuralocksError(f"neighbours: shape {neighbours.shape}; give integers ({strands}, N)")
+    if neighbours.size and (neighbours.max() >= strands or neighbours.min() < -1):
+        raise NeuralocksError(f"neighbours: name strands outside 0..{strands - 1}; use -1 for none")
+    return neighbours.astype(np.int32)
+
+
+def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """First frame's points (V, 3) and the faces (F, 3).
+
+    Raises:
+        NeuralocksError: too few frames, wrong shapes, faces out of range.
+    """
+    if len(body) != frames:
+        raise NeuralocksError(f"body: {len(body)} frames for {frames} of the head; give one for each")
+    first, faces = np.asarray(body[0]), np.asarray(triangles)
+    if first.ndim != 2 or first.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+        raise NeuralocksError("body: give points (T, V, 3) and triangles (F, 3)")
+    if faces.min() < 0 or faces.max() >= len(first):
+        raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
+    return first, faces
+
+
+def _between(body: Any, step: int, substeps: int) -> np.ndarray:
+    """Body points at a substep: straight between frames."""
+    frame, part = divmod(step, substeps)
+    if part == 0:
+        return np.asarray(body[frame])
+    blend = part / substeps
+    return (1 - blend) * np.asarray(body[frame]) + blend * np.asarray(body[frame + 1])

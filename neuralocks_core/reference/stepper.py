@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One time step after the other on a device: what `rods.simulate` is made of."""
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.reference.device import start_warp
+from neuralocks_core.reference.rest import RestRods
+
+REACH = 0.1
+"""[m] how far a vertex looks for the body; also how deep a vertex may sink and still be brought back."""
+NEAR = 0.02
+"""[m] planes farther away are not reported."""
+CHUNKS = (3, 3, 100)
+"""Newton steps between two looks at the body and at the neighbours."""
+
+
+class Stepper:
+    """State of all strands in world space. Private to the reference; arguments are checked by `simulate`."""
+
+    def __init__(
+        self,
+        rods: RestRods,
+        material: dict[str, np.ndarray],
+        neighbours: np.ndarray,
+        margin: float,
+        collision: float,
+        gravity: float,
+        tolerance: float,
+        device: str,
+    ):
+        self.wp = wp = start_warp(device)
+        from neuralocks_core.reference import rod_kernels, step_kernels
+
+        self.rod_kernels, self.kernels = rod_kernels, step_kernels
+        self.device = wp.get_device(device)
+        self.strands, self.vertices = rods.mass.shape
+        self.collision, self.widest, self.tolerance = collision, margin, tolerance
+        self.gravity = wp.vec3d(0.0, -gravity, 0.0)
+        self.rest = self._vectors(rods.points)
+        self.support = self._vectors(rods.support * (gravity / 9.81))
+        self.constants = rod_kernels.Rods()
+        self.constants.length = self._reals(rods.length)
+        self.constants.mass = self._reals(rods.mass)
+        self.constants.curl = self._vectors(rods.curl)
+        # 2 B / l: energy B/2 l |2/l (b - b0)|^2 per interior vertex, l half its adjacent edges, which is its mass
+        self.constants.bend = self._reals(2.0 * material["bend"][:, None] / rods.mass)
+        self.weight = wp.array(material["weight"], dtype=wp.float64, device=device)
+        self.damping = wp.array(material["damping"], dtype=wp.float64, device=device)
+        self.clumping = wp.array(material["clumping"], dtype=wp.float64, device=device)
+        self.clumped = neighbours.shape[1] > 0
+        self.neighbours = wp.array(np.ascontiguousarray(neighbours.T), dtype=wp.int32, device=device)
+        if not self.clumped:
+            self.neighbours = wp.empty((0, self.strands), dtype=wp.int32, device=device)
+        shape = (self.vertices, self.strands)
+        self.x, self.last, self.before, self.target = (self._empty(wp.vec3d, shape) for _ in range(4))
+        self.pull, self.tension = (self._empty(wp.float64, shape) for _ in range(2))
+        self.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
+        self.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
+        self.residual = self._empty(wp.float64, (self.strands,))
+        self.used = self._empty(wp.int32, (self.strands,))
+        self.points = self._empty(wp.vec3, shape[::-1])
+        self.planes = self._empty(wp.vec4, shape[::-1])
+        # a CPU runs its threads one after the other: one scratch column stays in the cache
+        self.stride = 0 if self.device.is_cpu else 1
+        column = (self.vertices, self.strands if self.stride else 1)
+        self.scratch = rod_kernels.Scratch()
+        for name in ("now", "trial", "frame"):
+            setattr(self.scratch, name, self._empty(wp.vec3d, column))
+        for name in ("step", "right"):
+            setattr(self.scratch, name, self._empty(wp.vec4d, column))
+        for name in ("diagonal", "lower1", "lower2"):
+            setattr(self.scratch, name, self._empty(wp.mat44d, column))
+        self.mesh = None
+
+    def attach_body(self, bind: np.ndarray, triangles: np.ndarray) -> None:
+        """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
+        wp = self.wp
+        self.body = wp.array(self._body_points(bind), dtype=wp.vec3, device=self.device)
+        faces = wp.array(np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device)
+        self.mesh = wp.Mesh(points=self.body, indices=faces)
+        self._look(self.rest)
+        self._run(self.kernels.rest_margin, (self.rest, self.plane, self.widest, self.margin))
+
+    def move_body(self, points: np.ndarray) -> None:
+        """Set the body's world points (V, 3)."""
+        staged = self.wp.array(self._body_points(points), dtype=self.wp.vec3, device="cpu", copy=False)
+        self.wp.copy(self.body, staged)
+        self.mesh.refit()
+
+    def begin(self, turn: np.ndarray, origin: np.ndarray, points: np.ndarray) -> None:
+        """Set the first pose and (S, K, 3) canonical points."""
+        self._pose(turn, origin)
+        matrix = np.array(self.wp.quat_to_matrix(self.turn), np.float64).reshape(3, 3)
+        self.x.assign(np.ascontiguousarray(np.swapaxes(points @ matrix.T + origin, 0, 1)))
+        self.carry, self.carry_origin = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
+
+    def settle(self, dt: float, iterations: int) -> None:
+        """One step of a gradient flow towards the equilibrium of the pose."""
+        self.wp.copy(self.last, self.x)
+        self._solve(dt, iterations, settling=1)
+
+    def start_moving(self, before: np.ndarray) -> None:
+        """Give every vertex the velocity that the head has when it came from `before` one step ago."""
+        shift = before - np.array(self.origin)
+        self.before.assign(self.x.numpy() + shift)
+        self._moving = False
+
+    def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
+        """Advance to a new pose of the head; the body has been moved."""
+        wp = self.wp
+        old_turn, old_origin = self.turn, self.origin
+        self._pose(turn, origin)
+        self.carry = self.turn * wp.quat_inverse(old_turn)
+        self.carry_origin = self.origin - wp.quat_rotate(self.carry, old_origin)
+        if self._moving:
+            self.before, self.last, self.x = self.last, self.x, self.before
+        else:
+            self.last, self.x = self.x, self.last
+            self._moving = True
+        args = (self.turn, self.origin, self.rest, self.constants.length, self.last, self.before, self.x)
+        wp.launch(self.kernels.predict, dim=self.strands, inputs=list(args), device=self.device)
+        self.used.zero_()
+        self._solve(dt, iterations, settling=0)
+
+    def read(self, points: np.ndarray, planes: np.ndarray) -> tuple[float, float]:
+        """Write (S, K, 3) and (S, K, 4) canonical; return rms residual relative to gravity, and mean Newton steps."""
+        args = (self.turn, self.origin, NEAR, self.x, self.plane, self.points, self.planes)
+        self._run(self.kernels.to_canonical, args)
+        points[:] = self.points.numpy()
+        planes[:] = self.planes.numpy()
+        residual = np.sqrt(np.mean(self.residual.numpy() ** 2)) / 9.81
+        return float(residual), float(self.used.numpy().mean())
+
+    def _solve(self, dt: float, iterations: int, settling: int) -> None:
+        spent = 0
+        for chunk in CHUNKS:
+            take = min(chunk, iterations - spent)
+            if take <= 0:
+                break
+            if self.mesh is None and not self.clumped:
+                take = iterations
+            if self.mesh is not None:
+                self._look(self.x)
+            if spent == 0 or self.clumped:
+                self._gather(1.0 / dt, settling)
+            self._newton(take)
+            spent += take
+
+    def _gather(self, inverse_dt: float, settling: int) -> None:
+        args = (
+            self.constants.mass, self.rest, self.support, self.weight, self.damping, self.clumping, self.neighbours,
+            self.turn, self.gravity, self.carry, self.carry_origin, inverse_dt, settling,
+            self.x, self.last, self.before, self.target, self.pull,
+        )  # fmt: skip
+        self._run(self.kernels.forces, args)
+
+    def _newton(self, iterations: int) -> None:
+        args = [
+            self.constants, self.scratch, self.stride, self.x, self.tension, self.turn, self.target, self.pull, self.plane,
+            self.margin, self.collision, iterations, self.tolerance, self.residual, self.used,
+        ]  # fmt: skip
+        self.wp.launch(self.rod_kernels.newton, dim=self.strands, inputs=args, device=self.device)
+
+    def _look(self, x: object) -> None:
+        self._run(self.kernels.body_planes, (self.mesh.id, REACH, x, self.plane))
+
+    def _pose(self, turn: np.ndarray, origin: np.ndarray) -> None:
+        self.turn = self.wp.quatd(*(float(v) for v in turn))
+        self.origin = self.wp.vec3d(*(float(v) for v in origin))
+
+    def _run(self, kernel: object, args: tuple) -> None:
+        self.wp.launch(kernel, dim=(self.vertices, self.strands), inputs=list(args), device=self.device)
+
+    def _body_points(self, points: np.ndarray) -> np.ndarray:
+        points = np.ascontiguousarray(points, np.float32)
+        if self.mesh is not None and points.shape != self.body.shape + (3,):
+            raise NeuralocksError(f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}")
+        if not np.isfinite(points).all():
+            raise NeuralocksError("body: holds values that are not finite; check its skinning")
+        return points
+
+    def _empty(self, dtype: object, shape: tuple) -> object:
+        return self.wp.zeros(shape, dtype=dtype, device=self.device)
+
+    def _vectors(self, values: np.ndarray) -> object:
+        return self.wp.array(np.ascontiguousarray(np.swapaxes(values, 0, 1)), dtype=self.wp.vec3d, device=self.device)
+
+    def _reals(self, values: np.ndarray) -> object:
+        return self.wp.array(np.ascontiguousarray(values.T), dtype=self.wp.float64, device=self.device)
