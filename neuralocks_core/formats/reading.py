@@ -58,10 +58,8 @@ def read_with_notes(
     if scale is None:
         scale = _likely_unit(raw, points)
         name = next(n for n, value in UNITS.items() if value == scale)
-        notes.append(
-            f"{path}: does not state its unit; took 1 {name}, which suits a human scalp; --unit says
-            otherwise"
-        )
+        fact = f"does not state its unit; took 1 {name}, which suits a human scalp"
+        notes.append(f"{path}: {fact}; --unit says otherwise")
     axis = str(up or raw.up).upper()
     with np.errstate(over="ignore"):  # Groom refuses what overflows
         points = points * np.float32(scale)
@@ -141,10 +139,10 @@ def _check_finite(points: np.ndarray, path: Path) -> None:
 
 
 def _likely_unit(raw: RawGroom, points: np.ndarray) -> float:
-    """The one of m, cm and mm that makes the roots' extent nearest to a scalp's 20 cm, in ratio."""
+    """The one of m, cm and mm that makes the roots' extent nearest to a narrow scalp's 16 cm, in ratio."""
     starts = np.cumsum(raw.counts, dtype=np.int64) - raw.counts
     roots = points[starts[raw.counts > 0]].astype(np.float64)
     extent = float(np.ptp(np.percentile(roots, [2, 98], axis=0), axis=0).max()) if len(roots) else 0.0
     if extent <= 0.0:  # one strand, or all from one point
         extent = float(np.ptp(points.astype(np.float64), axis=0).max(initial=0.0)) / 2
-    return min((1.0, 0.01, 0.001), key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / 0.20)))
+    return min((1.0, 0.01, 0.001), key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / 0.16)))
