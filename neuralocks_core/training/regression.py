@@ -18,8 +18,9 @@ import torch
 from torch import Tensor
 
 from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform
-from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene, load
+from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
 
 MARGIN = 0.004
 """[m] Distance to the body that the solver keeps, and below which the collision term acts."""

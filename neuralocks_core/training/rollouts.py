@@ -8,10 +8,7 @@ process can make any of them, and a run that was killed goes on where it stopped
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -91,6 +88,19 @@ class Rollout:
     residual: float
 
 
+@dataclass(frozen=True)
+class _Draw:
+    """What chance decides of a rollout."""
+
+    groom: int
+    strands: np.ndarray
+    material: Material
+    shape: np.ndarray
+    clip: Clip
+    times: np.ndarray
+    first: int
+
+
 class RolloutMaker:
     """Makes the rollouts of a scene; what all share is computed once."""
 
@@ -107,43 +117,58 @@ class RolloutMaker:
         """Rollout number `index`."""
         from neuralocks_core.reference import simulate
 
-        scene, rng = self.scene, np.random.default_rng([self.scene.seed, self.scene.held_out, index])
-        which = int(rng.integers(len(scene.grooms)))
-        groom = scene.grooms[which]
-        chosen = self._locks(which, rng)
-        material = Material.random(rng)
-        shape = self._shape(rng)
-        clip, times, first = self._motion(rng, shape)
-        sampler = BoundarySampler(scene.spec, scene.character, clip)
-        joints = clip.at(times)
-        rest = self._fitted(groom.rest[chosen].astype(np.float64), shape)
+        scene = self.scene
+        draw = self._draw(index)
+        joints = draw.clip.at(draw.times)
+        groom = scene.grooms[draw.groom]
+        rest = self._fitted(groom.rest[draw.strands].astype(np.float64), draw.shape)
+        shape = draw.shape
         result = simulate(
             rest,
             scene.character.canonical_to_world(joints),
             None if self._body is None else posed_over_time(self._body, joints @ scene.character.inverse_bind, shape),
             None if self._body is None else self._body.triangles,
-            material,
+            draw.material,
             dt=scene.spec.dt,
             substeps=scene.substeps,
             rest_support=scene.rest_support,
-            neighbours=lock_mates(rest, groom.lock[chosen]),
+            neighbours=lock_mates(rest, groom.lock[draw.strands]),
             bind_body=None if self._body is None else self._canonical(self._body.shaped(shape)),
         )
         moved = result.points - rest[None].astype(np.float32)
         planes = result.planes.copy()
         planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
-        log = material.log_ratios()
+        vectors, bind = self._vectors(draw, scene.spec)
         return Rollout(
-            which,
-            chosen,
+            draw.groom,
+            draw.strands,
             rest.astype(np.float32),
-            first,
-            sampler.vectors(times, log),
-            sampler.held_bind(log, shape),
+            draw.first,
+            vectors,
+            bind,
             np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
             np.clip(planes, -1000, 1000).astype(np.float16),
             float(np.median(result.residual)),
         )
+
+    def reread(self, index: int, rollout: Rollout, spec: BoundarySpec) -> Rollout:
+        """The same rollout as a network with another boundary history reads it; nothing is simulated again."""
+        vectors, bind = self._vectors(self._draw(index), spec)
+        return replace(rollout, vectors=vectors, bind=bind)
+
+    def _draw(self, index: int) -> _Draw:
+        """All chance of a rollout, in one place and order."""
+        rng = np.random.default_rng([self.scene.seed, self.scene.held_out, index])
+        which = int(rng.integers(len(self.scene.grooms)))
+        strands = self._locks(which, rng)
+        material = Material.random(rng)
+        shape = self._shape(rng)
+        return _Draw(which, strands, material, shape, *self._motion(rng, shape))
+
+    def _vectors(self, draw: _Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
+        sampler = BoundarySampler(spec, self.scene.character, draw.clip)
+        log = draw.material.log_ratios()
+        return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
 
     def _canonical(self, points: np.ndarray) -> np.ndarray:
         """Canonical coordinates of bind-world points (n, 3)."""
@@ -203,86 +228,3 @@ def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
     kept_back = (groom.lock % 8 == 7) == held_out
     usable = np.flatnonzero(groom.valid & kept_back)
     return usable if len(usable) else np.flatnonzero(groom.valid)
-
-
-def save(path: Path, rollout: Rollout) -> None:
-    """Write a rollout at once under its final name."""
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    with open(temporary, "wb") as file:
-        np.savez(file, **vars(rollout))
-    os.replace(temporary, path)
-
-
-def load(path: Path) -> Rollout:
-    """Read what `save` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        values = {name: arrays[name] for name in arrays.files}
-    return Rollout(
-        **{
-            **values,
-            "groom": int(values["groom"]),
-            "first": int(values["first"]),
-            "residual": float(values["residual"]),
-        }
-    )
-
-
-class RolloutFarm:
-    """Processes that fill a folder with rollouts while training goes on; a context manager.
-
-    Args:
-        scene: what to draw from.
-        folder: where the files go, one per rollout, numbered.
-        count: how many to make.
-        processes: how many at a time.
-    """
-
-    def __init__(self, scene: TrainingScene, folder: Path, count: int, processes: int = 1):
-        self.folder = Path(folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        context = multiprocessing.get_context("spawn")
-        self._processes = [
-            context.Process(target=_work, args=(scene, self.folder, range(i, count, processes)), daemon=True)
-            for i in range(processes)
-        ]
-
-    def __enter__(self) -> RolloutFarm:
-        # One thread each: the trainer has the other cores.
-        kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
-        os.environ.update({name: "1" for name in kept})
-        for process in self._processes:
-            process.start()
-        for name, value in kept.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
-        return self
-
-    def __exit__(self, *_) -> None:
-        for process in self._processes:
-            process.terminate()
-            process.join()
-        for leftover in self.folder.glob("*.tmp"):
-            leftover.unlink(missing_ok=True)
-
-    def files(self) -> list[Path]:
-        """The rollouts that are there by now, in order."""
-        return sorted(self.folder.glob("*.npz"))
-
-    @property
-    def alive(self) -> bool:
-        """Whether any process still works."""
-        return any(process.is_alive() for process in self._processes)
-
-    def failed(self) -> bool:
-        """Whether a process ended by an error."""
-        return any(process.exitcode not in (None, 0) for process in self._processes)
-
-
-def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
-    parent = multiprocessing.parent_process()
-    maker = RolloutMaker(scene)
-    for index in indices:
-        path = folder / f"{index:06d}.npz"
-        if not path.exists():
-            save(path, maker.make(index))
-        if parent is not None and not parent.is_alive():
-            return

@@ -18,10 +18,11 @@ from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
+from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
-from neuralocks_core.training.rollouts import RolloutFarm, TrainingScene
+from neuralocks_core.training.rollouts import TrainingScene
 
 FIRST = 24
 """Rollouts to wait for before the network starts: enough to normalise its inputs by."""

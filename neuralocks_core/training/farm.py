@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A folder that fills with rollouts while training goes on."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.training.rollouts import Rollout, RolloutMaker, TrainingScene
+
+
+class RolloutFarm:
+    """Processes that fill a folder with rollouts while training goes on; a context manager.
+
+    Args:
+        scene: what to draw from.
+        folder: where the files go, one per rollout, numbered.
+        count: how many to make.
+        processes: how many at a time.
+    """
+
+    def __init__(self, scene: TrainingScene, folder: Path, count: int, processes: int = 1):
+        self.folder = Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        context = multiprocessing.get_context("spawn")
+        self._processes = [
+            context.Process(target=_work, args=(scene, self.folder, range(i, count, processes)), daemon=True)
+            for i in range(processes)
+        ]
+
+    def __enter__(self) -> RolloutFarm:
+        # One thread each: the trainer has the other cores.
+        kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        os.environ.update({name: "1" for name in kept})
+        for process in self._processes:
+            process.start()
+        for name, value in kept.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+        return self
+
+    def __exit__(self, *_) -> None:
+        for process in self._processes:
+            process.terminate()
+            process.join()
+        for leftover in self.folder.glob("*.tmp"):
+            leftover.unlink(missing_ok=True)
+
+    def files(self) -> list[Path]:
+        """The rollouts that are there by now, in order."""
+        return sorted(self.folder.glob("*.npz"))
+
+    @property
+    def alive(self) -> bool:
+        """Whether any process still works."""
+        return any(process.is_alive() for process in self._processes)
+
+    def failed(self) -> bool:
+        """Whether a process ended by an error."""
+        return any(process.exitcode not in (None, 0) for process in self._processes)
+
+
+def save(path: Path, rollout: Rollout) -> None:
+    """Write a rollout at once under its final name."""
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    with open(temporary, "wb") as file:
+        np.savez(file, **vars(rollout))
+    os.replace(temporary, path)
+
+
+def load(path: Path) -> Rollout:
+    """Read what `save` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        values = {name: arrays[name] for name in arrays.files}
+    return Rollout(
+        **{
+            **values,
+            "groom": int(values["groom"]),
+            "first": int(values["first"]),
+            "residual": float(values["residual"]),
+        }
+    )
+
+
+def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
+    parent = multiprocessing.parent_process()
+    maker = RolloutMaker(scene)
+    for index in indices:
+        path = folder / f"{index:06d}.npz"
+        if not path.exists():
+            save(path, maker.make(index))
+        if parent is not None and not parent.is_alive():
+            return
