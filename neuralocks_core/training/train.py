@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
@@ -89,7 +90,7 @@ def train_strands(
         _wait(farm, min(FIRST, rollouts), report)
         bank.add(farm.files())
         net = StrandNet(scene.spec.size, bank.inputs[0].shape[1], motion=options.motion)
-        _normalise(net, bank, scene, options)
+        normalise(net, bank, scene.spec, options)
         meta = {"step": 0, "done": 0.0, "seconds": 0.0}
         modules = {"net": net}
         if resume:
@@ -190,10 +191,11 @@ def _wait(farm: RolloutFarm, count: int, report) -> None:
         time.sleep(0.2)
 
 
-def _normalise(net: StrandNet, bank: RolloutBank, scene: TrainingScene, options: RegressionOptions) -> None:
+def normalise(net: StrandNet, bank: RolloutBank, spec: BoundarySpec, options: RegressionOptions) -> None:
+    """Set the network's input normalisation from the rollouts and strands of a bank."""
     strands = np.concatenate([bank.inputs[r.groom][r.strands] for r in bank.rollouts])
     strands = np.concatenate([strands, *(inputs[:: max(1, len(inputs) // 500)] for inputs in bank.inputs)])
     frames = np.concatenate([r.vectors for r in bank.rollouts])
     net.set_normalisation(
-        torch.from_numpy(strands), torch.from_numpy(frames), scene.spec.slices["history"], static=options.static
+        torch.from_numpy(strands), torch.from_numpy(frames), spec.slices["history"], static=options.static
     )

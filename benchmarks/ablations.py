@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each choice is worth: one table row per variant, all trained on the same rollouts with the same budget.
+
+    python benchmarks/ablations.py OUT.neuralocks.training --character BODY.usd --groom GROOM.usd ... --minutes 3
+
+The folder is what `neuralocks train --keep-work` leaves behind. The measures are the gauge's, on held-out strands and motion.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.strands import scalp_local
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.farm import load
+from neuralocks_core.training.gauge import measure
+from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
+from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
+from neuralocks_core.training.train import normalise
+
+SPEC = BoundarySpec()
+ROWS = {
+    "shipped settings": {},
+    "static (no history)": {"options": {"static": True}},
+    "displacement output (paper)": {"options": {"output": "displacement"}},
+    "no lock codes": {"locks": False},
+    "deep motion encoder": {"options": {"motion": "encoder"}},
+    "N = 30 single steps (paper)": {"spec": BoundarySpec(bins=(1,) * 30, taper=0.0)},
+    "no taper": {"spec": replace(SPEC, taper=0.0)},
+    "half the history": {"spec": replace(SPEC, bins=(1,) * 12 + (2,) * 8)},
+    "head's velocity instead of effective gravity": {"spec": replace(SPEC, linear="velocity")},
+    "no head translation (paper)": {"spec": replace(SPEC, linear="none")},
+    "no velocity loss": {"options": {"velocity": 0.0}},
+    "no collision loss": {"options": {"collision": 0.0}},
+}
+"""Variant -> what differs from the shipped settings."""
+
+
+def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollouts: int) -> None:
+    """Train and measure each variant; prints a Markdown table as it goes."""
+    coder = StrandAutoencoder()
+    checkpoint.load(work / "codes.npz", {"coder": coder})
+    codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
+    scenes = {"rollouts": scene, "held_out": replace(scene, held_out=True)}
+    files = {name: sorted((work / name).glob("*.npz"))[:rollouts] for name in scenes}
+    print(f"{len(files['rollouts'])} rollouts, {minutes:g} min each, seed {scene.seed}\n")
+    names = "position rigid motion motion_static motion_ratio velocity droop penetration".split()
+    print("| variant | steps | " + " | ".join(names) + " |")
+    print("| --- |" + " ---: |" * (len(names) + 1))
+    for row in rows:
+        change = ROWS[row]
+        options = RegressionOptions(minutes=minutes, **change.get("options", {}))
+        spec = change.get("spec", scene.spec)
+        banks = {}
+        for name, which in scenes.items():
+            bank = banks[name] = RolloutBank(which, codes)
+            bank.rollouts = [load(path) for path in files[name]]
+            if spec != scene.spec:
+                maker = RolloutMaker(which)
+                bank.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files[name], bank.rollouts)]
+            if not change.get("locks", True):
+                for inputs in bank.inputs:
+                    inputs[:, 34:66] = 0
+        torch.manual_seed(options.seed)
+        net = StrandNet(spec.size, motion=options.motion)
+        normalise(net, banks["rollouts"], spec, options)
+        state = {}
+        for state in regress(banks["rollouts"], net, options, list):
+            pass
+        card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
+        print(f"| {row} | {state['step']} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
+
+
+def main() -> None:
+    """Command line."""
+    from usd.training import training_scene
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--character", required=True)
+    parser.add_argument("--groom", action="append", required=True)
+    parser.add_argument("--motion", action="append", default=[])
+    parser.add_argument("--minutes", type=float, default=3.0)
+    parser.add_argument("--rollouts", type=int, default=10**6)
+    parser.add_argument("--row", action="append", choices=list(ROWS))
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
+    start = time.monotonic()
+    run(scene, arguments.work, arguments.row or list(ROWS), arguments.minutes, arguments.rollouts)
+    print(
+        f"\n{(time.monotonic() - start) / 60:.0f} min in all, {np.__name__} {np.__version__}, torch {torch.__version__}"
+    )
+
+
+if __name__ == "__main__":
+    main()
