@@ -19,7 +19,7 @@ def start_warp(device: str) -> ModuleType:
         import warp as wp
     except ImportError as missing:
         raise NeuralocksError("reference: needs warp; pip install 'neuralocks[compare]'") from missing
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_ERROR
     wp.config.enable_backward = False
     wp.init()
     try:

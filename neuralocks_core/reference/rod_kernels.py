@@ -185,7 +185,7 @@ def assemble(
         a = rods.bend[j, s]
         force = two * a * (bend - rest)
         along = slope * wp.dot(force, cross)
-        hol = cross / sum
+        hol = -cross / sum
         ge = scale * wp.cross(f, force) + along * f + moment * hol
         gf = scale * wp.cross(force, e) + along * e + moment * hol
         ge = (ge - wp.dot(ge, e) * e) / back
