@@ -3,7 +3,8 @@
 
     python benchmarks/ablations.py OUT.neuralocks.training --character BODY.usd --groom GROOM.usd ... --minutes 3
 
-The folder is what `neuralocks train --keep-work` leaves behind. The measures are the gauge's, on held-out strands and motion.
+The folder is what `neuralocks train --keep-work` leaves behind. The measures are the gauge's, on held-out strands
+and motion.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from neuralocks_core.boundary import BoundarySpec
@@ -73,9 +73,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollo
         torch.manual_seed(options.seed)
         net = StrandNet(spec.size, motion=options.motion)
         normalise(net, banks["rollouts"], spec, options)
-        state = {}
-        for state in regress(banks["rollouts"], net, options, list):
-            pass
+        *_, state = regress(banks["rollouts"], net, options, list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
         print(f"| {row} | {state['step']} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
 
