@@ -22,13 +22,21 @@ SHAPES = {
     "tall": ("height", 0.8),
     "ideal": ("proportions", 1.0),
 }
-"""Blend shape -> the phenotype parameter it moves and the value at weight 1. Useful weights are 0..1 for `male`, -0.5..1 for the others."""
+"""Blend shape -> the phenotype parameter that it moves and its value at weight 1.
+
+Useful weights are 0..1 for `male`, -0.5..1 for the others.
+"""
 
 _TO_Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # anny is Z up and faces -Y
 
 _HAIRLINE = np.array(
-    # (forward, up) from the head joint in units of its distance to the crown: nape, behind the ear, over it, sideburn, temple, forehead
-    [(-0.4, -0.2), (-0.24, -0.17), (-0.12, 0.05), (-0.09, 0.36), (0.1, 0.37), (0.13, 0.26), (0.24, 0.28), (0.32, 0.5), (0.43, 0.65), (0.55, 0.7)]
+    # (forward, up) from the head joint in units of its distance to the crown.
+    [
+        *[(-0.4, -0.2), (-0.24, -0.17)],  # nape
+        *[(-0.12, 0.05), (-0.09, 0.36), (0.1, 0.37)],  # behind the ear and over it
+        *[(0.13, 0.26), (0.24, 0.28)],  # sideburn
+        *[(0.32, 0.5), (0.43, 0.65), (0.55, 0.7)],  # temple, forehead
+    ]
 )
 
 
@@ -71,7 +79,8 @@ def statistical_body(phenotype: dict[str, float] | None = None) -> StatisticalBo
     bind = rest.bones.copy()
     bind[:, :3, 3] -= floor
     weights = np.zeros((len(keep), len(bind)))
-    np.add.at(weights, (np.arange(len(keep))[:, None], model.vertex_bone_indices.numpy()[keep]), model.vertex_bone_weights.numpy()[keep])
+    bones, shares = model.vertex_bone_indices.numpy()[keep], model.vertex_bone_weights.numpy()[keep]
+    np.add.at(weights, (np.arange(len(keep))[:, None], bones), shares)
     shapes = {}
     for shape, (name, value) in SHAPES.items():
         other = _Rest(model, {**wanted, name: value})
@@ -91,15 +100,15 @@ def statistical_body(phenotype: dict[str, float] | None = None) -> StatisticalBo
         shapes=shapes,
     )
     character = Character(Skeleton(names, parents, bind), body)
-    main = np.array(labels)[np.take_along_axis(indices, weights.argmax(1)[:, None], 1)[:, 0]]
-    return StatisticalBody(character, faces, _scalp(character, faces), _colors(body.points, faces, main))
+    return StatisticalBody(character, faces, _scalp(character, faces), _colors(body, faces, labels))
 
 
 def _load_anny():
     try:
         from anny import Anny
     except ImportError:
-        raise NeuralocksError("anny: the statistical body is not installed; run: pip install 'neuralocks[body]'") from None
+        remedy = "run: pip install 'neuralocks[body]'"
+        raise NeuralocksError(f"anny: the statistical body is not installed; {remedy}") from None
     return Anny(rig="game_engine", topology="anny-quads", pose_parameterization="local-ref")
 
 
@@ -116,14 +125,18 @@ class _Rest:
         self.bones[:, :3, 3] = self.heads
 
 
-def _without_tongue(points, faces):
-    """Vertex indices kept and quads renumbered: everything but the mouth's loose inside, which hair never sees."""
+def _parts(count, faces):
+    """Connected part of each of `count` points, (V,) int."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 3]]])
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    _, part = connected_components(graph, directed=False)
+    return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count)), directed=False)[1]
+
+
+def _without_tongue(points, faces):
+    """Vertex indices kept and quads renumbered: all but the mouth's loose inside, which hair never sees."""
+    part = _parts(len(points), faces)
     sizes = np.bincount(part)
     # The skin is the largest part; eyes lie off the middle plane, the tongue on it.
     centre = np.bincount(part, weights=points[:, 0]) / sizes
@@ -137,8 +150,8 @@ def _without_tongue(points, faces):
 def _on_same_skeleton(shape, default, parents, weights, keep):
     """Points (V, 3) of a shape carried onto the default's joints, so that it can be a plain blend shape.
 
-    Blend shapes do not move joints. Each bone's piece of skin is shifted to the default joint and scaled along the bone to the default
-    length, so limbs keep their length and girth, head and trunk change.
+    Blend shapes do not move joints. Each bone's piece of skin is shifted to the default joint and scaled along the
+    bone to the default length: limbs keep their length, while girth, head and trunk change.
     """
     points = np.zeros((len(keep), 3))
     for joint in range(len(default.heads)):
@@ -146,18 +159,16 @@ def _on_same_skeleton(shape, default, parents, weights, keep):
         if not mine.any():
             continue
         local = shape.points[keep[mine]] - shape.heads[joint]
-        child = next((c for c in range(len(parents)) if parents[c] == joint and _continues(default.heads, parents, c)), None)
-        if child is not None:
-            old, new = (s.heads[child] - s.heads[joint] for s in (shape, default))
-            old_length, new_length = np.linalg.norm(old), np.linalg.norm(new)
-            along = local @ old / old_length
-            local = local + along[:, None] * (new / old_length - old / old_length)
+        for child in np.flatnonzero(np.array(parents) == joint):
+            if _continues(default.heads, parents, child):
+                old, new = (s.heads[child] - s.heads[joint] for s in (shape, default))
+                local = local + np.outer(local @ old / (old @ old), new - old)
         points[mine] += weights[mine, joint, None] * (local + default.heads[joint])
     return points
 
 
 def _continues(heads, parents, child):
-    """Whether the bone to `child` is the trunk's or a limb's own direction and not a branch to a shoulder, thigh or finger."""
+    """Whether the bone to `child` is its parent's own direction and no branch to a shoulder, thigh or finger."""
     siblings = [c for c in range(len(parents)) if parents[c] == parents[child]]
     middle = [c for c in siblings if abs(heads[c, 0]) < 1e-3]
     return len(siblings) == 1 or (len(middle) == 1 and middle[0] == child)
@@ -165,7 +176,7 @@ def _continues(heads, parents, child):
 
 def _merge_fingers(weights, labels, parents, bind):
     """Fingers follow the hand: 30 joints fewer in every clip, and hair does not reach them."""
-    finger = np.array([label.split("_")[0] in ("thumb", "index", "middle", "ring", "pinky") for label in labels])
+    finger = np.array([label.startswith(("thumb", "index", "middle", "ring", "pinky")) for label in labels])
     for joint in range(len(labels) - 1, -1, -1):
         if finger[joint]:
             weights[:, parents[joint]] += weights[:, joint]
@@ -189,12 +200,20 @@ def _scalp(character, faces):
     unit = points[:, 1].max() - joint[1]
     centre = (points[faces].mean(axis=1) - joint) / unit
     line = np.interp(centre[:, 2], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
-    return np.flatnonzero((centre[:, 1] > line) & (np.abs(centre[:, 0]) < 0.6) & (np.linalg.norm(centre, axis=1) < 1.3))
+    above = (centre[:, 1] > line) & (np.abs(centre[:, 0]) < 0.6)
+    return np.flatnonzero(above & (np.linalg.norm(centre, axis=1) < 1.3))
 
 
-def _colors(points, faces, main):
-    """Skin where a suit would end, a dark suit elsewhere, dark eyes."""
-    colors = np.tile([0.09, 0.1, 0.12], (len(points), 1))
-    bare = np.isin(main, ["head", "neck_01", "hand_l", "hand_r"])
-    colors[bare] = [0.58, 0.38, 0.29]
+def _colors(body, faces, labels):
+    """Skin where a suit would end, a dark suit elsewhere, brown eyes; linear RGB (V, 3)."""
+    bare = np.isin(labels, ["head", "neck_01", "hand_l", "hand_r"])
+    share = np.sum(body.joint_weights * bare[body.joint_indices], axis=1)
+    share = np.clip((share - 0.4) / 0.2, 0, 1)[:, None]
+    colors = share * [0.58, 0.38, 0.29] + (1 - share) * [0.09, 0.1, 0.12]
+    part = _parts(len(body.points), faces)
+    for eye in np.flatnonzero(np.bincount(part) < len(part) / 2):
+        mine = np.flatnonzero(part == eye)
+        pole = body.points[mine[body.points[mine, 2].argmax()]]
+        iris = np.linalg.norm(body.points[mine] - pole, axis=1) < 0.0065
+        colors[mine] = np.where(iris[:, None], [0.05, 0.03, 0.02], [0.75, 0.74, 0.72])
     return colors

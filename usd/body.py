@@ -42,7 +42,8 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
             del stage
             os.replace(part, path)
     except OSError as error:
-        raise NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose a folder you can write to") from None
+        fact = f"cannot be written ({error.strerror})"
+        raise NeuralocksError(f"{path}: {fact}; choose a folder you can write to") from None
     return path
 
 
@@ -58,8 +59,9 @@ def _author(stage, body: StatisticalBody) -> None:
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
     skin, influences = body.character.body, body.character.body.joint_indices.shape[1]
-    binding.CreateJointIndicesPrimvar(False, influences).Set(Vt.IntArray.FromNumpy(np.int32(skin.joint_indices).ravel()))
-    binding.CreateJointWeightsPrimvar(False, influences).Set(Vt.FloatArray.FromNumpy(np.float32(skin.joint_weights).ravel()))
+    indices, weights = np.int32(skin.joint_indices).ravel(), np.float32(skin.joint_weights).ravel()
+    binding.CreateJointIndicesPrimvar(False, influences).Set(Vt.IntArray.FromNumpy(indices))
+    binding.CreateJointWeightsPrimvar(False, influences).Set(Vt.FloatArray.FromNumpy(weights))
     _blend_shapes(stage, binding, skin.shapes)
     # A skinned mesh moves beyond its own points: the root's extent is the answer that usdview and the validators read.
     low, high = skin.points.min(axis=0), skin.points.max(axis=0)
@@ -93,7 +95,8 @@ def _mesh(stage, body):
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.catmullClark)
     color = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
     color.Set(Vt.Vec3fArray.FromNumpy(np.float32(body.colors)))
-    UsdGeom.Subset.CreateGeomSubset(mesh, "scalp", UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(np.int32(body.scalp)), "hair")
+    scalp = Vt.IntArray.FromNumpy(np.int32(body.scalp))
+    UsdGeom.Subset.CreateGeomSubset(mesh, "scalp", UsdGeom.Tokens.face, scalp, "hair")
     return mesh
 
 
