@@ -95,9 +95,7 @@ def main() -> None:
     scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
     start = time.monotonic()
     run(scene, arguments.work, arguments.row or list(ROWS), arguments.minutes, arguments.rollouts)
-    print(
-        f"\n{(time.monotonic() - start) / 60:.0f} min in all, {np.__name__} {np.__version__}, torch {torch.__version__}"
-    )
+    print(f"\n{(time.monotonic() - start) / 60:.0f} min in all, torch {torch.__version__}")
 
 
 if __name__ == "__main__":
