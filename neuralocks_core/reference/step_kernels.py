@@ -7,6 +7,9 @@ from neuralocks_core.reference.rod_kernels import array_real, array_vec
 
 NO_PLANE = wp.constant(wp.vec4d(0.0, 0.0, 0.0, -1.0e3))
 """n.x - d of this is 1 km wherever x is: no body near."""
+STILL = wp.constant(wp.float64(5e-4))
+FAR = wp.constant(wp.float64(0.02))
+"""[m] A vertex that moved less than STILL, or stays farther from the body than FAR, keeps its plane in a step."""
 
 
 @wp.kernel(enable_backward=False)
@@ -89,24 +92,55 @@ def forces(
 
 
 @wp.kernel(enable_backward=False)
-def body_planes(mesh: wp.uint64, reach: wp.float32, x: array_vec, plane: wp.array2d(dtype=wp.vec4d)):
-    """Nearest body element as a plane through its closest point; inside is negative."""
+def body_planes(
+    mesh: wp.uint64,
+    reach: wp.float32,
+    moved: int,
+    x: array_vec,
+    seen: array_vec,
+    face: wp.array2d(dtype=wp.int32),
+    corner: wp.array2d(dtype=wp.vec2),
+    plane: wp.array2d(dtype=wp.vec4d),
+):
+    """Nearest body element as a plane through its closest point; inside is negative.
+
+    The element found last, where it is now, bounds the search; a vertex that hardly moved on a body that stands still
+    (`moved` 0) keeps its plane.
+    """
     k, s = wp.tid()
+    if k < 2:
+        return
     p = x[k, s]
+    wall = plane[k, s]
+    if moved == 0:
+        shift = wp.length(p - seen[k, s])
+        distance = wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3]
+        if shift < STILL or distance - wp.float64(2.0) * shift > FAR:
+            return
     q = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
-    hit = wp.mesh_query_point_sign_normal(mesh, q, reach, 1.0e-3)
+    bound = reach
+    last = face[k, s]
+    if last >= 0:
+        uv = corner[k, s]
+        bound = wp.min(reach, wp.length(wp.mesh_eval_position(mesh, last, uv[0], uv[1]) - q) + 1.0e-5)
+    hit = wp.mesh_query_point_sign_normal(mesh, q, bound, 1.0e-3)
     found = NO_PLANE
+    element = int(-1)
     if hit.result:
+        element = hit.face
+        corner[k, s] = wp.vec2(hit.u, hit.v)
         near = wp.mesh_eval_position(mesh, hit.face, hit.u, hit.v)
         away = (q - near) * hit.sign
-        distance = wp.length(away)
+        gap = wp.length(away)
         # on the surface itself the difference has no direction: take the face's
         n = wp.mesh_eval_face_normal(mesh, hit.face)
-        if distance > 1.0e-4:
-            n = away / distance
+        if gap > 1.0e-4:
+            n = away / gap
         normal = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
         at = wp.vec3d(wp.float64(near[0]), wp.float64(near[1]), wp.float64(near[2]))
         found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at))
+    face[k, s] = element
+    seen[k, s] = p
     plane[k, s] = found
 
 

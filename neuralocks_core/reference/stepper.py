@@ -56,6 +56,8 @@ class Stepper:
         self.x, self.last, self.before, self.target = (self._empty(wp.vec3d, shape) for _ in range(4))
         self.pull, self.tension = (self._empty(wp.float64, shape) for _ in range(2))
         self.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
+        self.seen, self.corner = self._empty(wp.vec3d, shape), self._empty(wp.vec2, shape)
+        self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=device)
         self.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
         self.residual = self._empty(wp.float64, (self.strands,))
         self.used = self._empty(wp.int32, (self.strands,))
@@ -79,7 +81,7 @@ class Stepper:
         self.body = wp.array(self._body_points(bind), dtype=wp.vec3, device=self.device)
         faces = wp.array(np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device)
         self.mesh = wp.Mesh(points=self.body, indices=faces)
-        self._look(self.rest)
+        self._look(self.rest, 1)
         self._run(self.kernels.rest_margin, (self.rest, self.plane, self.widest, self.margin))
 
     def move_body(self, points: np.ndarray) -> None:
@@ -141,7 +143,7 @@ class Stepper:
             if self.mesh is None and not self.clumped:
                 take = iterations
             if self.mesh is not None:
-                self._look(self.x)
+                self._look(self.x, int(spent == 0))
             if spent == 0 or self.clumped:
                 self._gather(1.0 / dt, settling)
             self._newton(take)
@@ -162,8 +164,9 @@ class Stepper:
         ]  # fmt: skip
         self.wp.launch(self.rod_kernels.newton, dim=self.strands, inputs=args, device=self.device)
 
-    def _look(self, x: object) -> None:
-        self._run(self.kernels.body_planes, (self.mesh.id, REACH, x, self.plane))
+    def _look(self, x: object, moved: int) -> None:
+        args = (self.mesh.id, REACH, moved, x, self.seen, self.face, self.corner, self.plane)
+        self._run(self.kernels.body_planes, args)
 
     def _pose(self, turn: np.ndarray, origin: np.ndarray) -> None:
         self.turn = self.wp.quatd(*(float(v) for v in turn))
