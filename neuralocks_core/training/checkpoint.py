@@ -46,7 +46,7 @@ def load(path: Path, modules: dict[str, torch.nn.Module], optimiser: torch.optim
         NeuralocksError: it is damaged, or belongs to other settings.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(arrays["meta"].tobytes())
         for name, module in modules.items():

@@ -1,0 +1,123 @@
+"""Training on rollouts: repeatable material, hair that learns to move, runs that survive a kill."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core import model
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.random_motion import scripted_clip
+from neuralocks_core.strands import strand_set
+from tests.core.rigs import HEAD, bind, person
+
+torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+from neuralocks_core.boundary import BoundarySpec  # noqa: E402
+from neuralocks_core.runtime import StrandModel  # noqa: E402
+from neuralocks_core.training import checkpoint  # noqa: E402
+from neuralocks_core.training.farm import load, save  # noqa: E402
+from neuralocks_core.training.regression import RegressionOptions  # noqa: E402
+from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split  # noqa: E402
+from neuralocks_core.training.train import train_strands  # noqa: E402
+
+
+def straight_hair(count=200, seed=0):
+    """Strands that leave the upper half of a head and hang."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(count, 3))
+    normal[:, 1] = np.abs(normal[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    s = np.linspace(0, 1, 24)
+    points = normal[:, None] * (0.09 + 0.05 * s[:, None]) + (s**1.3)[:, None] * [0, -0.2, 0]
+    points += bind()[HEAD, :3, 3]
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(count, 24), np.full(1, 1e-4, np.float32))
+    return strand_set(groom, bind()[HEAD, :3, 3], np.zeros(3))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
+
+
+def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
+    one, two = RolloutMaker(scene).make(3), RolloutMaker(scene).make(3)
+    save(tmp_path / "r.npz", two)
+    two = load(tmp_path / "r.npz")
+    for name, value in vars(one).items():
+        assert np.array_equal(value, getattr(two, name)), name
+    assert not np.array_equal(one.vectors, RolloutMaker(scene).make(4).vectors)
+
+
+def test_rollouts_start_at_rest_and_move(scene):
+    rollout = RolloutMaker(scene).make(5)
+    moved = rollout.moved * STEP
+    assert np.abs(moved[3] - moved[0]).max() < 1e-3
+    assert np.abs(rollout.vectors[0, scene.spec.slices["history"]]).max() < 1e-6
+    assert np.abs(moved - moved[0]).max() > 1e-2
+
+
+def test_another_history_reads_the_same_simulation(scene):
+    maker = RolloutMaker(scene)
+    rollout = maker.make(6)
+    assert np.array_equal(maker.reread(6, rollout, scene.spec).vectors, rollout.vectors)
+    spec = BoundarySpec(bins=(1,) * 30)
+    assert maker.reread(6, rollout, spec).vectors.shape == (60, spec.size)
+
+
+def test_held_out_strands_are_never_trained_on(scene):
+    groom = scene.grooms[0]
+    assert not set(held_out_split(groom, True)) & set(held_out_split(groom, False))
+    assert len(held_out_split(groom, True)) > 0
+
+
+def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
+    """On motion and strands that it never saw, the network halves the error of hair carried rigidly."""
+    messages = []
+    options = RegressionOptions(steps=500, clips=16, strands=6)
+    path = train_strands(
+        scene, tmp_path / "hair.neuralocks", options, rollouts=60, progress=lambda *a: messages.append(a)
+    )
+    report = model.read(path).meta["report"]["held out"]
+    assert report["motion"] < 0.7
+    assert 0.5 < report["motion_ratio"] < 1.3
+    assert report["position"] < 0.6 * report["rigid"]
+    assert not (tmp_path / "hair.neuralocks.training").exists()
+    assert messages[-1][0] == 1000
+    assert "motion error" in messages[-1][2]
+    sampler = StrandModel.load(path).sampler(person(), scripted_clip(person(), "shake"))
+    session = StrandModel.load(path).prepare(scene.grooms[0])
+    session.anchor(sampler.held_bind())
+    tips = [session.displacement(v)[:, -1] for v in sampler.vectors([0.0, 1.2])]
+    assert np.abs(tips[1] - tips[0]).max() > 0.01
+
+
+def test_a_killed_run_goes_on(scene, tmp_path):
+    out = tmp_path / "hair.neuralocks"
+    short = RegressionOptions(steps=40, clips=8, strands=4)
+
+    def kill(done, total, message):
+        if "motion error" in message:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_strands(scene, out, short, rollouts=30, progress=kill)
+    assert not out.exists()
+    assert (tmp_path / "hair.neuralocks.training" / "checkpoint.npz").exists()
+    train_strands(scene, out, short, rollouts=30, resume=True)
+    assert model.read(out).meta["training"]["steps"] >= 40
+
+
+def test_what_cannot_be_resumed_says_why(scene, tmp_path):
+    with pytest.raises(NeuralocksError, match="no checkpoint"):
+        train_strands(scene, tmp_path / "x.neuralocks", resume=True)
+    with pytest.raises(NeuralocksError, match="ends in .neuralocks"):
+        train_strands(scene, tmp_path / "x.zip")
+    path = tmp_path / "c.npz"
+    checkpoint.save(path, {"step": 1}, {"net": torch.nn.Linear(2, 2)})
+    assert checkpoint.load(path, {"net": torch.nn.Linear(2, 2)}) == {"step": 1}
+    for broken in (torch.nn.Linear(3, 2), torch.nn.Identity()):
+        with pytest.raises(NeuralocksError, match="does not fit"):
+            checkpoint.load(path, {"net": broken})
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(NeuralocksError, match="does not fit"):
+        checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
