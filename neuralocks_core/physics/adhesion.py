@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Neighbouring strands hold on to each other (paper section 3.4.4, equation 8)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from neuralocks_core.physics.rods import Rods
+
+STIFFNESS = 60.0
+"""[1/s^2]."""
+
+
+def adhesion(
+    x: Tensor,
+    rods: Rods,
+    neighbours: Tensor,
+    stiffness: float | Tensor = STIFFNESS,
+    *,
+    rest_distance: bool = True,
+    lagged: bool = False,
+) -> Tensor:
+    """Energy `k sum m mean_n |(x - x_n) - (x0 - x0_n)|^2` over the neighbours at rest.
+
+    The paper's `|x - x_n|^2` pulls neighbours into one point; it is taken with `rest_distance=False`. Both are
+    means over the neighbours that there are, weighted by vertex mass.
+
+    Args:
+        x: (..., S, K, 3) points in canonical space [m].
+        rods: the strands at rest.
+        neighbours: (S, K, N) indices into the S K vertices, -1 for none (`locks.neighbours`).
+        stiffness: [1/s^2], a number or (..., S, 1).
+        rest_distance: measure from the offset at rest.
+        lagged: no gradient into the neighbours. Each pair counts in both its vertices, so with it the force is
+            the reference solver's; without it, twice as much.
+
+    Returns:
+        (..., S) energy per unit line density [m^3/s^2].
+    """
+    present = neighbours >= 0
+    index = neighbours.clamp_min(0).long()
+    from_rest = x - rods.rest if rest_distance else x
+    others = (from_rest.detach() if lagged else from_rest).flatten(-3, -2)[..., index.flatten(), :]
+    others = others.reshape(*x.shape[:-3], *index.shape, 3)
+    gap = (from_rest[..., None, :] - others).square().sum(-1) * present
+    mean = gap.sum(-1) / present.sum(-1).clamp_min(1)
+    return torch.sum(stiffness * rods.mass * mean, -1)

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair stays out of the body (paper section 3.4.2, equation 4)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from neuralocks_core.physics.rods import Rods
+
+STIFFNESS = 1e6
+"""[1/(m s^2)]."""
+MARGIN = 0.004
+"""D [m]."""
+LINEAR = 0.02
+"""Depth [m] from which the force stops growing: deep vertices of an untrained network must not drown the rest."""
+
+
+def body_collision(
+    x: Tensor, rods: Rods, planes: Tensor, stiffness: float | Tensor = STIFFNESS, margin: float | Tensor = MARGIN
+) -> Tensor:
+    """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`.
+
+    Weighted by vertex mass, which the paper's sum is not. The clamped vertices 0 and 1 count nothing: they lie
+    on the scalp.
+
+    Args:
+        x: (..., S, K, 3) points [m].
+        rods: the strands at rest.
+        planes: (..., S, K, 4) outward normal n and offset o of the nearest body element in the same space,
+            `d = n . x - o`; found once for the state that is penalised.
+        stiffness: k [1/(m s^2)], a number or (..., S, 1).
+        margin: D [m], a number or (..., S, K): never more than a vertex has at rest.
+
+    Returns:
+        (..., S) energy per unit line density [m^3/s^2].
+    """
+    depth = margin - ((planes[..., :3] * x).sum(-1) - planes[..., 3])
+    cubic = depth.clamp(0.0, LINEAR)
+    energy = cubic**3 + 3.0 * LINEAR**2 * torch.relu(depth - LINEAR)
+    return (stiffness * rods.mass * energy)[..., 2:].sum(-1)

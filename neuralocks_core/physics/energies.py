@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sum of all potentials, each by name (paper section 3.4, equation 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from neuralocks_core.physics.adhesion import adhesion
+from neuralocks_core.physics.bend_twist import Cosserat, bend_twist
+from neuralocks_core.physics.body_collision import body_collision
+from neuralocks_core.physics.gravity import gravity
+from neuralocks_core.physics.hair_style import hair_style
+from neuralocks_core.physics.inertia import damping, inertia
+from neuralocks_core.physics.rods import Rods
+from neuralocks_core.physics.self_collision import self_collision
+from neuralocks_core.physics.stretch import stretch
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What acts on the strands at one moment; whatever is None switches its potential off.
+
+    Attributes:
+        gravity: (..., 3) in head axes [m/s^2].
+        planes: (..., S, K, 4) nearest body plane, see `body_collision`.
+        margin: (S, K) or a number [m].
+        distance: (..., S, K) to the body, for the style [m].
+        neighbours: (S, K, N), see `adhesion`.
+        rest_density: (S, K), see `self_collision`.
+        share: of the groom's strands that are here.
+        before: (..., S, K, 3) points one step ago, in the head's frame of now [m].
+        before2: (..., S, K, 3) points two steps ago, in the head's frame of now [m].
+        moved_before: (..., S, K, 3) points one step ago, in the head's frame of then [m].
+        dt: step [s].
+    """
+
+    gravity: Tensor | None = None
+    planes: Tensor | None = None
+    margin: Tensor | float = 0.004
+    distance: Tensor | None = None
+    neighbours: Tensor | None = None
+    rest_density: Tensor | None = None
+    share: float = 1.0
+    before: Tensor | None = None
+    before2: Tensor | None = None
+    moved_before: Tensor | None = None
+    dt: float = 1 / 30
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Constants, per unit line density; numbers or tensors (..., S, 1). See the module of each for the unit."""
+
+    stretch: float | Tensor = 1000.0
+    bend: float | Tensor = 1e-3
+    weight: float | Tensor = 1.0
+    damping: float | Tensor = 10.0
+    clumping: float | Tensor = 60.0
+    collision: float | Tensor = 1e6
+    volume: float | Tensor = 0.3
+    style: float | Tensor = 0.0
+    inertia: float = 1.0
+
+
+def energies(
+    x: Tensor,
+    rods: Rods,
+    around: Surroundings,
+    stiffness: Stiffness = Stiffness(),
+    *,
+    form: Cosserat = Cosserat.EXACT,
+    paper_adhesion: bool = False,
+) -> dict[str, Tensor]:
+    """Every potential of the strands.
+
+    Args:
+        x: (..., S, K, 3) points in canonical space [m].
+        rods: the strands at rest.
+        around: gravity, body, neighbours and the past.
+        stiffness: constants.
+        form: of the bend-twist potential.
+        paper_adhesion: without rest distance.
+
+    Returns:
+        Energy per unit line density of each strand, (..., S) [m^3/s^2], by name. Divided by the strand's length
+        they are energies per unit mass [m^2/s^2].
+    """
+    terms = {
+        "stretch": stretch(x, rods, stiffness.stretch),
+        "bend_twist": bend_twist(x, rods, stiffness.bend, form),
+    }
+    if around.gravity is not None:
+        terms["gravity"] = gravity(x, rods, around.gravity, stiffness.weight)
+    if around.before is not None and around.before2 is not None:
+        terms["inertia"] = stiffness.inertia * inertia(x, around.before, around.before2, rods, around.dt)
+    if around.moved_before is not None:
+        terms["damping"] = stiffness.inertia * damping(x, around.moved_before, rods, around.dt, stiffness.damping)
+    if around.planes is not None:
+        terms["body_collision"] = body_collision(x, rods, around.planes, stiffness.collision, around.margin)
+    if around.rest_density is not None:
+        terms["self_collision"] = self_collision(x, rods, around.rest_density, stiffness.volume, share=around.share)
+    if around.distance is not None:
+        terms["hair_style"] = hair_style(x, rods, around.distance, stiffness.style)
+    if around.neighbours is not None:
+        terms["adhesion"] = adhesion(
+            x, rods, around.neighbours, stiffness.clumping, rest_distance=not paper_adhesion, lagged=not paper_adhesion
+        )
+    return terms

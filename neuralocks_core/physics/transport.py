@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames along a strand: quaternions that turn its root edge into each edge (paper section 3.4.1)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+FOLD = 1e-6
+"""Smallest 1 + cos of a turn: keeps opposite edges finite in value and gradient."""
+
+
+def turn(a: Tensor, b: Tensor, fold: float = FOLD) -> Tensor:
+    """The smallest rotation that takes unit vectors a to b, (..., 3) each -> quaternion wxyz (..., 4)."""
+    bottom = (1.0 + (a * b).sum(-1, keepdim=True)).clamp_min(fold)
+    vector = torch.linalg.cross(a, b) / (2.0 * bottom).sqrt()
+    return torch.cat([(0.5 * bottom).sqrt(), vector], dim=-1)
+
+
+def product(p: Tensor, q: Tensor) -> Tensor:
+    """Quaternion product p q of wxyz quaternions (..., 4)."""
+    pw, pv, qw, qv = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
+    scalar = pw * qw - (pv * qv).sum(-1, keepdim=True)
+    return torch.cat([scalar, pw * qv + qw * pv + torch.linalg.cross(pv, qv)], dim=-1)
+
+
+def conjugate(q: Tensor) -> Tensor:
+    """Inverse of unit quaternions wxyz (..., 4)."""
+    return torch.cat([q[..., :1], -q[..., 1:]], dim=-1)
+
+
+def direct_frames(edges: Tensor, fold: float = 1e-3) -> Tensor:
+    """The paper's fast transport: straight from the root edge to each edge.
+
+    Singular where an edge points against the root edge; `fold` bounds its gradient there.
+
+    Args:
+        edges: (..., E, 3) unit edges.
+        fold: smallest 1 + cos.
+
+    Returns:
+        (..., E, 4) quaternions wxyz.
+    """
+    return turn(edges[..., :1, :].expand_as(edges), edges, fold)
+
+
+def loop_frames(edges: Tensor) -> Tensor:
+    """Exact parallel transport along every edge, one after the other: (..., E, 3) -> (..., E, 4)."""
+    steps = turn(edges[..., :-1, :], edges[..., 1:, :])
+    frames = [torch.zeros_like(steps[..., 0, :])]
+    frames[0][..., 0] = 1.0
+    for i in range(steps.shape[-2]):
+        frames.append(product(steps[..., i, :], frames[-1]))
+    return torch.stack(frames, dim=-2)
+
+
+def scan_frames(edges: Tensor) -> Tensor:
+    """Exact parallel transport as an inclusive scan of log2(E) batched products: (..., E, 3) -> (..., E, 4).
+
+    The same as `loop_frames`; fewer, larger operations, which suits a GPU.
+    """
+    first = torch.zeros_like(edges[..., :1, :1])
+    identity = torch.cat([first + 1.0, first, first, first], dim=-1)
+    frames = torch.cat([identity, turn(edges[..., :-1, :], edges[..., 1:, :])], dim=-2)
+    hop = 1
+    while hop < frames.shape[-2]:
+        frames = torch.cat([frames[..., :hop, :], product(frames[..., hop:, :], frames[..., :-hop, :])], dim=-2)
+        hop *= 2
+    return frames
