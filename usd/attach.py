@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which skeleton and joint carries a groom, and where the groom lies in that rig's bind pose.
+
+In this order: the groom's own skel binding, the binding of the mesh it sits on, the joint named by the user, a joint
+named like a head.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import Usd, UsdGeom
+from scipy.spatial import cKDTree
+
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import find_humanoid
+
+from .border import transformed
+from .curves import rest_points
+from .placement import Placement
+from .rig_source import StageRig
+from .surface import SkinnedMesh, bound_skeleton, geom_bind, joint_influences, rest_value
+
+NEAR = 0.03
+"""Roots this far from a mesh, in the median, still sit on it [m]."""
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """How one groom follows one rig.
+
+    Attributes:
+        rig: the skeleton that carries it.
+        character: the rig's character with the carrying joint as its head.
+        to_bind: the prim's own space to bind world [m], (4, 4).
+        how: the carrying joint and how it was found, in words.
+        skinned: whether UsdSkel would deform the prim itself.
+    """
+
+    rig: StageRig
+    character: Character
+    to_bind: np.ndarray
+    how: str
+    skinned: bool
+
+
+def attach(
+    prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None, notes: list[str]
+) -> Attachment:
+    """Find what carries the groom.
+
+    Args:
+        prim: a BasisCurves.
+        rigs: candidates; not empty.
+        placement: where the prim stands.
+        head: the user's `--head`, used where no binding says otherwise.
+        notes: what a user should know is added here.
+
+    Raises:
+        NeuralocksError: nothing, or no single one, can carry it.
+    """
+    path = str(prim.GetPath())
+    bound = bound_skeleton(prim)
+    rig = next((r for r in rigs if r.path == bound), None)
+    if rig is not None:
+        points = rest_points(prim)
+        indices, weights = joint_influences(prim, len(points), rig.source)
+        joint, why = _carrier(rig, _shares(rig, indices, weights), exact=True)
+        found = Attachment(
+            rig, _with_head(rig, joint), rig.to_bind @ geom_bind(prim), f"{why} (its own skel binding)", True
+        )
+    else:
+        found = _on_mesh(prim, rigs, placement) or _by_name(prim, rigs, placement, head)
+    name = rig_joint(found)
+    if head and name.split("/")[-1] != head.split("/")[-1]:
+        notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
+    return found
+
+
+def rig_joint(found: Attachment) -> str:
+    """Path of the carrying joint."""
+    return found.rig.source.names[found.character.head]
+
+
+def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement) -> Attachment | None:
+    """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
+    roots = _some_roots(prim)
+    best = None
+    for rig in rigs:
+        for mesh in rig.meshes:
+            tree = cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind))
+            for to_bind in _ways(rig, mesh, placement):
+                distance, nearest = tree.query(transformed(roots, to_bind))
+                middle = float(np.median(distance))
+                if best is None or middle < best[0] - 1e-4:
+                    best = middle, rig, mesh, to_bind, nearest
+    if best is None or best[0] > NEAR:
+        return None
+    _, rig, mesh, to_bind, nearest = best
+    joint, why = _carrier(rig, _shares(rig, mesh.indices[nearest], mesh.weights[nearest]))
+    return Attachment(
+        rig, _with_head(rig, joint), to_bind, f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)", False
+    )
+
+
+def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
+    path = str(prim.GetPath())
+    able = [r for r in rigs if "head" in r.character.humanoid]
+    if not able:
+        raise NeuralocksError(
+            f"{path}: no joint of {rigs[0].path} is named like a head; name the joint that carries it with --head JOINT"
+        )
+    if len(able) > 1:
+        # The one whose head is nearest to the roots, if that is clear.
+        roots = _some_roots(prim)
+        far = [
+            min(
+                np.median(np.linalg.norm(transformed(roots, w) - r.character.canonical_to_bind[:3, 3], axis=1))
+                for w in _ways(r, None, placement)
+            )
+            for r in able
+        ]
+        order = np.argsort(far)
+        if far[order[0]] > 0.5 * far[order[1]]:
+            names = ", ".join(r.path for r in able[:5])
+            raise NeuralocksError(
+                f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
+            )
+        able = [able[order[0]]]
+    rig = able[0]
+    target = rig.character.canonical_to_bind[:3, 3]
+    roots = _some_roots(prim)
+    ways = _ways(rig, None, placement)
+    to_bind = min(
+        ways, key=lambda w: round(float(np.median(np.linalg.norm(transformed(roots, w) - target, axis=1))), 3)
+    )
+    why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
+    return Attachment(rig, rig.character, to_bind, f"joint '{rig.source.names[rig.character.head]}' ({why})", False)
+
+
+def _ways(rig: StageRig, mesh: SkinnedMesh | None, placement: Placement) -> list[np.ndarray]:
+    """Candidates for the way from the groom's own space to bind world, the likeliest first."""
+    ways = []
+    if placement.samples and rig.source.animated:
+        # A prim that is moved along by its parents: where it stood against the head when that motion began.
+        when = placement.samples[0]
+        carried = rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
+        ways.append(np.linalg.inv(carried) @ rig.border.to_core @ placement.at(when))
+    groom = placement.reference
+    if mesh is not None:
+        ways.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
+    ways.append(rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom)
+    ways.append(rig.to_bind @ groom)
+    return ways
+
+
+def _some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
+    """Up to `most` finite roots (n, 3) in the prim's own space."""
+
+
+    points = rest_points(prim)
+    counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
+    starts = np.cumsum(counts) - counts
+    starts = starts[(counts > 0) & (starts >= 0) & (starts < len(points))]
+    roots = points[starts[:: max(1, len(starts) // most)]] if len(starts) else points[:1]
+    roots = roots[np.isfinite(roots).all(axis=1)]
+    if not len(roots):
+        raise NeuralocksError(f"{prim.GetPath()}: its points hold NaN or infinity; repair the groom")
+    return roots
+
+
+def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Share (J,) of each joint in these influences."""
+    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
+    return shares / max(shares.sum(), 1e-12)
+
+
+def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
+    """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
+    names, parents = rig.source.names, rig.source.parents
+    best = int(shares.argmax())
+    head = rig.character.humanoid.get("head")
+    if head is not None and best != head:
+        below = np.zeros(len(names), bool)
+        for joint in range(len(names)):
+            below[joint] = joint == head or (parents[joint] >= 0 and below[parents[joint]])
+        single = shares[best] > (0.95 if exact else 0.8)
+        if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
+            return head, f"joint '{names[head]}'"
+    return best, f"joint '{names[best]}'"
+
+
+def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
+    """Whether a joint below the head never moves against it."""
+    joints = rig.clip.joints
+    relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
+    return bool(np.abs(relative - relative[0]).max() < 1e-4)
+
+
+def _with_head(rig: StageRig, joint: int) -> Character:
+    if rig.character.humanoid.get("head") == joint:
+        return rig.character
+    skeleton = rig.character.skeleton
+    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], {"head": skeleton.names[joint]})
+    return replace(rig.character, humanoid=humanoid)

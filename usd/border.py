@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a stage's unit, up axis and rate are converted to metres, Y up and seconds: once, here."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Tf, Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+
+
+@dataclass(frozen=True)
+class Border:
+    """Unit, up axis and rate of one stage.
+
+    Attributes:
+        metres_per_unit: length of one stage unit [m].
+        up_axis: "Y" or "Z".
+        rate: time codes per second.
+    """
+
+    metres_per_unit: float
+    up_axis: str
+    rate: float
+
+    @property
+    def to_core(self) -> np.ndarray:
+        """Transform (4, 4) from stage world space to metres, Y up.
+
+        A Z-up character looks along -Y by convention; that becomes +Z.
+        """
+        turn = np.eye(4)
+        if self.up_axis == "Z":
+            turn[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+        turn[:3] *= self.metres_per_unit
+        return turn
+
+    @property
+    def from_core(self) -> np.ndarray:
+        """Transform (4, 4) from metres, Y up, to stage world space."""
+        return np.linalg.inv(self.to_core)
+
+    def seconds(self, time_codes) -> np.ndarray:
+        """Times [s] of time codes."""
+        return np.asarray(time_codes, float) / self.rate
+
+    @classmethod
+    def of(cls, stage: Usd.Stage) -> "Border":
+        """Read and check the stage's metadata.
+
+        Raises:
+            NeuralocksError: the unit, axis or rate cannot be meant.
+        """
+        name = stage.GetRootLayer().GetDisplayName()
+        unit = float(UsdGeom.GetStageMetersPerUnit(stage))
+        if not (math.isfinite(unit) and 1e-7 < unit < 1e7):
+            raise NeuralocksError(
+                f"{name}: metersPerUnit is {unit:g}; set it to the length of a unit in metres (0.01 for cm)"
+            )
+        up = str(UsdGeom.GetStageUpAxis(stage)).upper()
+        if up not in ("Y", "Z"):
+            raise NeuralocksError(f"{name}: upAxis is '{up}'; set it to Y or Z")
+        rate = float(stage.GetTimeCodesPerSecond())
+        if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
+            raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, 24 say")
+        return cls(unit, up, rate)
+
+
+def open_stage(path) -> Usd.Stage:
+    """Open a USD file.
+
+    Raises:
+        NeuralocksError: it is missing, or no readable USD file.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise NeuralocksError(f"{path}: no such file; check the path")
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise NeuralocksError(f"{path}: not a readable USD file ({first_line(error)}); export it again") from None
+    if stage is None:
+        raise NeuralocksError(f"{path}: not a readable USD file; export it again")
+    return stage
+
+
+def first_line(error: Exception) -> str:
+    """The message of a USD error without USD's own source positions."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    text = next(
+        (line for line in lines if ":" in line and not line.startswith("Error in")),
+        lines[-1] if lines else "unknown error",
+    )
+    if " -- " in text:
+        text = text.split(" -- ", 1)[1]
+    return text.split("' at line")[0].strip().rstrip(".")[:200]
+
+
+def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:
+    """A USD matrix (row vectors) as (4, 4) for column vectors."""
+    return np.array(matrix, float).T
+
+
+def row_matrix(matrix: np.ndarray) -> Gf.Matrix4d:
+    """A (4, 4) transform for column vectors as a USD matrix."""
+    return Gf.Matrix4d(np.asarray(matrix, float).T.tolist())
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Points (..., 3) through an affine transform (4, 4)."""
+    return np.asarray(points, float) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""BasisCurves as a groom: rest points, counts, widths and root attributes."""
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+
+from .border import transformed
+from .surface import rest_value
+
+
+def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
+    """BasisCurves prims in stage order; only those `wanted` (paths; a parent stands for all below it).
+
+    Raises:
+        NeuralocksError: a wanted path is no groom.
+    """
+    every = [
+        p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.BasisCurves)
+    ]
+    if not wanted:
+        return every
+    chosen = []
+    for path in wanted:
+        text = str(path)
+        if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
+            raise NeuralocksError(f"{text}: no prim path; give an absolute one such as {_examples(every)}")
+        below = [p for p in every if p.GetPath().HasPrefix(text)]
+        if not below:
+            prim = stage.GetPrimAtPath(text)
+            fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
+            raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
+        chosen += [p for p in below if p not in chosen]
+    return chosen
+
+
+def rest_points(prim: Usd.Prim) -> np.ndarray:
+    """(P, 3) float32 points at rest in the prim's own space and units.
+
+    Raises:
+        NeuralocksError: there are none.
+    """
+    points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
+    if points is None or not len(points):
+        raise NeuralocksError(
+            f"{prim.GetPath()}: the groom has no points; give it its rest shape as default-time points"
+        )
+    return np.asarray(points, np.float32)
+
+
+def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
+    """The groom at rest in bind-world metres.
+
+    Args:
+        prim: a BasisCurves.
+        to_bind: the prim's own space to bind world [m], (4, 4).
+        notes: what a user should know is added here.
+
+    Raises:
+        NeuralocksError: arrays do not fit each other, or are empty or not finite.
+    """
+    curves, path = UsdGeom.BasisCurves(prim), str(prim.GetPath())
+    points = rest_points(prim)
+    counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
+    scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
+    uv = _uniform(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), len(counts), 2)
+    guides = _uniform(prim, ("groom_guide",), len(counts), 1)
+    group = _uniform(prim, ("groom_group_id",), len(counts), 1)
+    with np.errstate(invalid="ignore", over="ignore"):  # Groom says where a value is not finite
+        placed = transformed(points, to_bind).astype(np.float32)
+    return Groom(
+        name=path,
+        points=placed,
+        counts=counts,
+        widths=_widths(curves, len(points), len(counts), scale, notes),
+        root_uv=None if uv is None else uv.astype(np.float32),
+        guides=None if guides is None else guides.astype(bool),
+        group=None if group is None else group.astype(np.int32),
+    )
+
+
+def _widths(
+    curves: UsdGeom.BasisCurves, points: int, strands: int, scale: float, notes: list[str]
+) -> np.ndarray | None:
+    values = rest_value(curves.GetWidthsAttr())
+    if values is None or not len(values):
+        return None
+    values = np.asarray(values, np.float32) * np.float32(scale)
+    if len(values) in (1, strands, points) and np.isfinite(values).all() and (values >= 0).all():
+        return values
+    notes.append(
+        f"{curves.GetPath()}: {len(values)} widths do not fit {strands} strands or are not finite; "
+        "they are left as they are"
+    )
+    return None
+
+
+def _uniform(prim: Usd.Prim, names, count: int, width: int) -> np.ndarray | None:
+    """A per-strand primvar (count, width), or (count,) for width 1: the first of `names` that fits."""
+    api = UsdGeom.PrimvarsAPI(prim)
+    for name in names:
+        primvar = api.GetPrimvar(name)
+        if not primvar or not primvar.HasValue():
+            continue
+        try:
+            values = np.asarray(primvar.ComputeFlattened())
+        except (TypeError, ValueError):
+            continue
+        values = (
+            np.repeat(values[None], count, axis=0)
+            if values.shape == () or values.size == width == 1 and count > 1
+            else values
+        )
+        if values.dtype.kind in "biuf" and values.size == count * width and np.isfinite(values).all():
+            return values.reshape(count, width) if width > 1 else values.reshape(count)
+    return None
+
+
+def _examples(prims) -> str:
+    paths = [str(p.GetPath()) for p in prims]
+    return (
+        ", ".join(paths[:5]) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
+        if paths
+        else "none (no BasisCurves)"
+    )

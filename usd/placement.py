@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a prim stands: its local-to-world transform at any time, and at which times that is authored."""
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+
+from .border import column_matrix
+
+
+class Placement:
+    """Local-to-world transforms of one prim in stage space; evaluated once where nothing above it moves."""
+
+    def __init__(self, prim: Usd.Prim):
+        self.prim = prim
+        self.samples: list[float] = []
+        walk = prim
+        while walk and not walk.IsPseudoRoot():
+            xformable = UsdGeom.Xformable(walk)
+            if xformable:
+                if xformable.TransformMightBeTimeVarying():
+                    self.samples.extend(xformable.GetTimeSamples())
+                if xformable.GetResetXformStack():
+                    break
+            walk = walk.GetParent()
+        self.samples = sorted(set(self.samples))
+        self._still = None if self.samples else self._evaluate(Usd.TimeCode.Default())
+
+    def at(self, time_code: float) -> np.ndarray:
+        """Transform (4, 4) at a time code.
+
+        Raises:
+            NeuralocksError: it is not finite or flattens space.
+        """
+        return self._still if self._still is not None else self._evaluate(Usd.TimeCode(time_code))
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample.
+
+        An animated transform often has no default value, so the default time would drop its scale.
+        """
+        return self._still if self._still is not None else self.at(self.samples[0])
+
+    def _evaluate(self, time: Usd.TimeCode) -> np.ndarray:
+        matrix = column_matrix(UsdGeom.XformCache(time).GetLocalToWorldTransform(self.prim))
+        when = "" if time.IsDefault() else f" at time code {time.GetValue():g}"
+        if not np.isfinite(matrix).all():
+            raise NeuralocksError(
+                f"{self.prim.GetPath()}: its transform{when} holds NaN or infinity; repair it or a parent's"
+            )
+        if abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
+            raise NeuralocksError(
+                f"{self.prim.GetPath()}: its transform{when} has zero scale; give it and its parents a scale above zero"
+            )
+        return matrix

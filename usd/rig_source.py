@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A skeleton of the stage as a Character and a Clip: metres, Y up, world space."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from pxr import Usd
+
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import find_humanoid
+from neuralocks_core.motion import Clip
+
+from .border import Border
+from .joints import JointSource
+from .surface import SkinnedMesh, bound_meshes, merged_body
+
+LARGEST_CLIP = 4_000_000
+"""Joint samples held of one animation: 512 MB. More than that is a stray key frame, not a shot."""
+
+
+@dataclass(frozen=True)
+class StageRig:
+    """One skeleton with its body and motion.
+
+    Attributes:
+        path: the Skeleton prim.
+        source: the skeleton as authored.
+        meshes: what it skins.
+        to_bind: authored bind space to bind world [m], (4, 4).
+        character: in core axes and metres.
+        clip: world joint transforms at the time codes `time_codes`.
+        time_codes: (T,).
+        notes: what a user should know about it.
+    """
+
+    path: str
+    source: JointSource = field(repr=False)
+    border: Border
+    meshes: list[SkinnedMesh] = field(repr=False)
+    to_bind: np.ndarray = field(repr=False)
+    character: Character = field(repr=False)
+    clip: Clip = field(repr=False)
+    time_codes: np.ndarray = field(repr=False)
+    notes: list[str] = field(repr=False)
+
+    def joints_at(self, time_code: float) -> np.ndarray:
+        """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
+        return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+
+    @cached_property
+    def _to_world(self) -> np.ndarray:
+        return self.border.to_core
+
+    @cached_property
+    def _trim(self) -> np.ndarray:
+        return joint_trim(self.source, self.to_bind)
+
+
+def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:
+    """Per joint, the scale (J, 4, 4) that makes its bind transform a plain rotation and translation.
+
+    Applied to bind and posed transforms alike it cancels; it keeps stage units, and the mirrored joint orients of some
+    rigs, out of the core.
+    """
+    determinant = np.linalg.det((to_bind @ source.bind)[:, :3, :3])
+    trim = np.zeros((len(determinant), 4, 4))
+    size = 1 / np.cbrt(np.abs(determinant))
+    trim[:, 0, 0] = size * np.sign(determinant)
+    trim[:, 1, 1] = trim[:, 2, 2] = size
+    trim[:, 3, 3] = 1
+    return trim
+
+
+def read_rig(
+    stage: Usd.Stage, prim: Usd.Prim, border: Border, head: str | None = None, *, all_shapes: bool = False
+) -> StageRig:
+    """Read a skeleton, its meshes and its motion.
+
+    Args:
+        stage: the shot.
+        prim: the Skeleton.
+        border: the stage's units.
+        head: joint that is the head; found by name and hierarchy if left out.
+        all_shapes: keep blend shapes that the animation does not use.
+
+    Raises:
+        NeuralocksError: something in it cannot be used; the message names the prim.
+    """
+    source = JointSource(prim)
+    notes = source.notes
+    time_codes = _time_codes(source)
+    posed = source.posed(time_codes)
+    meshes = bound_meshes(stage, source, notes)
+    by_hand = {"head": head} if head else None
+    to_bind = _to_bind(source, border, posed, by_hand)
+    trim = joint_trim(source, to_bind)
+    skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
+    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
+    names = list(dict.fromkeys(name for mesh in meshes for name in mesh.shapes))
+    weights = source.shape(names, time_codes)
+    used = set(names) if all_shapes else {name for name, column in zip(names, weights.T) if column.any()}
+    body = merged_body(meshes, to_bind, used)
+    character = Character(skeleton, body, humanoid)
+    clip = Clip(
+        border.seconds(time_codes),
+        border.to_core @ posed @ trim,
+        weights[:, [names.index(n) for n in names if n in used]],
+    )
+    return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes)
+
+
+def _time_codes(source: JointSource) -> np.ndarray:
+    """Every whole time code between the first and the last authored sample, and the authored ones between."""
+    samples = source.samples
+    if not samples:
+        return np.zeros(1)
+    first, last = samples[0], samples[-1]
+    count = last - first + len(samples)
+    if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
+        raise NeuralocksError(
+            f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
+            "remove stray keys"
+        )
+    return np.unique(np.concatenate([np.arange(np.ceil(first), np.floor(last) + 1), samples]))
+
+
+def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) -> np.ndarray:
+    """Authored bind space to bind world [m], (4, 4).
+
+    Bind transforms are meant in world space, yet skinning takes them as the skeleton's own space, and files of both
+    kinds exist. They differ where the skeleton's parents scale or turn. The size is taken from what skinning makes of
+    the head, so that the head carries the groom without scaling; the axes are those in which the character
+    stands upright.
+    """
+    placed = source.placement.reference[:3, :3]
+    if np.linalg.det(placed) < 0:
+        raise NeuralocksError(
+            f"{source.path}: its root is mirrored (negative scale); apply or remove the negative scale"
+        )
+    humanoid = find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
+    head = humanoid.get("head", 0)
+    few = posed[np.unique(np.linspace(0, len(posed) - 1, 16).astype(int)), head]
+    shown = np.linalg.det((few @ np.linalg.inv(source.bind[head]))[:, :3, :3])
+    if (shown < 0).any():
+        raise NeuralocksError(
+            f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
+            "apply or remove the negative scale"
+        )
+    wanted, own = np.cbrt(np.median(shown)), np.cbrt(np.linalg.det(placed))
+    ratio = wanted / own
+    if abs(ratio - 1) < 1e-4:
+        ratio = 1.0
+    result = np.eye(4)
+    result[:3, :3] = placed * ratio
+    below = humanoid.get("hips", 0)
+    up = border.to_core[:3, :3] @ result[:3, :3] @ (source.bind[head, :3, 3] - source.bind[below, :3, 3])
+    if below != head and up[1] < 0.5 * np.linalg.norm(up):
+        plain = border.to_core[:3, :3] @ (source.bind[head, :3, 3] - source.bind[below, :3, 3])
+        if plain[1] > 0.7 * np.linalg.norm(plain):
+            result[:3, :3] = np.eye(3) * wanted
+    return border.to_core @ result

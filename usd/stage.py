@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A shot: any stage with animated skeletons and BasisCurves grooms, read into core types."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+
+from .attach import Attachment, attach, rig_joint
+from .border import Border, open_stage
+from .curves import find_curves, read_groom
+from .placement import Placement
+from .rig_source import StageRig, read_rig
+
+HEAD_WIDTHS = (0.08, 0.6)
+"""Between these a head's width is believed [m]; others hint at a wrong metersPerUnit."""
+
+
+@dataclass(frozen=True)
+class StageGroom:
+    """One groom of a shot.
+
+    Attributes:
+        path: the BasisCurves prim.
+        prim: the same, of the opened stage.
+        groom: at rest, bind-world metres.
+        attachment: what carries it, and where it lies in the bind pose.
+        placement: where the prim stands.
+    """
+
+    path: str
+    prim: Usd.Prim = field(repr=False)
+    groom: Groom = field(repr=False)
+    attachment: Attachment = field(repr=False)
+    placement: Placement = field(repr=False)
+
+    @property
+    def joint(self) -> str:
+        """Path of the joint that carries it."""
+        return rig_joint(self.attachment)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A stage read for a bake.
+
+    Attributes:
+        path: the file.
+        stage: kept open: poses are sampled from it at the exact time codes of a bake.
+        border: its units.
+        rigs: skeletons, those that carry a groom at least.
+        grooms: what is to be deformed.
+        first, last: frame range in time codes.
+        notes: what a user should know, one line each.
+    """
+
+    path: Path
+    stage: Usd.Stage = field(repr=False)
+    border: Border
+    rigs: tuple[StageRig, ...]
+    grooms: tuple[StageGroom, ...]
+    first: float
+    last: float
+    notes: tuple[str, ...]
+
+
+def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None) -> Shot:
+    """Read a shot for a bake.
+
+    Args:
+        path: a USD file.
+        grooms: prim paths of the grooms wanted; all if left out.
+        skeleton: prim path of the skeleton that carries them; found if left out.
+        head: joint (path, or its last part) that carries grooms for which no binding says so.
+
+    Raises:
+        NeuralocksError: what stops a bake, with the prim and the remedy.
+    """
+    path = Path(path)
+    stage = open_stage(path)
+    border = Border.of(stage)
+    notes = [f"{path.name}: {_composition(error)}" for error in stage.GetCompositionErrors()]
+    curves = find_curves(stage, grooms)
+    if not curves:
+        raise NeuralocksError(
+            f"{path}: holds no groom (no BasisCurves prim); add one, or import a hair file with 'neuralocks import'"
+        )
+    rigs = _rigs(stage, border, skeleton, head, path)
+    _check_animated(rigs, path)
+    found = []
+    for prim in curves:
+        placement = Placement(prim)
+        attachment = attach(prim, rigs, placement, head, notes)
+        groom = read_groom(prim, attachment.to_bind, notes)
+        found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
+        notes += _groom_notes(found[-1])
+    carrying = {id(g.attachment.rig) for g in found}
+    used = tuple(rig for rig in rigs if id(rig) in carrying)
+    for rig in used:
+        _check_animated([rig], path)
+        notes += rig.notes + _rig_notes(rig)
+    first, last = frame_range(stage, used)
+    return Shot(path, stage, border, used, tuple(found), first, last, tuple(dict.fromkeys(notes)))
+
+
+def read_rigs(
+    path, skeleton: str | None = None, head: str | None = None, *, all_shapes: bool = True
+) -> tuple[StageRig, ...]:
+    """The characters and motion of a file, without grooms and whether animated or not.
+
+    Args:
+        path: a USD file.
+        skeleton: prim path of the one wanted; all if left out.
+        head: joint that is the head, where its name does not tell.
+        all_shapes: keep blend shapes that no animation uses.
+    """
+    stage = open_stage(path)
+    return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=all_shapes))
+
+
+def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
+    """First and last time code: the stage's own, else the animation's."""
+    if stage.HasAuthoredTimeCodeRange() and stage.GetEndTimeCode() >= stage.GetStartTimeCode():
+        return float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
+    return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
+
+
+def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Skeleton prims in stage order."""
+    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+
+
+def _rigs(stage, border, skeleton, head, path, *, all_shapes=False) -> list[StageRig]:
+    prims = find_skeletons(stage)
+    names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
+    if skeleton is not None:
+        prims = [p for p in prims if str(p.GetPath()) == skeleton]
+        if not prims:
+            raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
+    if not prims:
+        raise NeuralocksError(f"{path}: holds no UsdSkel skeleton; export the character with its armature")
+    rigs, errors = [], []
+    for prim in prims:
+        try:
+            rigs.append(read_rig(stage, prim, border, head, all_shapes=all_shapes))
+        except NeuralocksError as error:
+            errors.append(error)
+    if errors and (not rigs or skeleton):
+        raise errors[0]
+    for error in errors:
+        rigs[0].notes.append(f"{error} (this skeleton is left out)")
+    return rigs
+
+
+def _check_animated(rigs: list[StageRig], path: Path) -> None:
+    if not any(rig.source.animated for rig in rigs):
+        raise NeuralocksError(
+            f"{rigs[0].path}: the skeleton has no animation{_why(rigs[0])}; "
+            "bind a SkelAnimation to it (skel:animationSource)"
+        )
+
+
+def _why(rig: StageRig) -> str:
+    return (
+        f" ({rig.source.notes[-1].split(': ', 1)[1].split(';')[0]})"
+        if rig.source.notes and not rig.source.animated
+        else ""
+    )
+
+
+def _rig_notes(rig: StageRig) -> list[str]:
+    notes = []
+    if len(rig.time_codes) == 1:
+        notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
+    width = head_width(rig)
+    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+        notes.append(
+            f"{rig.path}: the head is {width:.3g} m wide; "
+            f"check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
+        )
+    return notes
+
+
+def head_width(rig: StageRig) -> float | None:
+    """Width of the head's skin in bind pose [m], if the rig has a head and skin on it."""
+    if "head" not in rig.character.humanoid or (mask := rig.character.head_mask()) is None or mask.sum() < 20:
+        return None
+    points = rig.character.body.points[mask] @ rig.character.facing.T
+    return float(np.ptp(points[:, 0]))
+
+
+def _groom_notes(item: StageGroom) -> list[str]:
+    groom, notes = item.groom, []
+    filled = np.flatnonzero(groom.counts > 0)
+    spread = np.zeros(groom.strand_count, np.float32)
+    low = np.minimum.reduceat(groom.points, groom.starts[filled])
+    high = np.maximum.reduceat(groom.points, groom.starts[filled])
+    spread[filled] = (high - low).max(axis=1)
+    still = int((spread <= 1e-7).sum())
+    if still:
+        notes.append(
+            f"{item.path}: {still} of {groom.strand_count} strands have no two distinct points; "
+            "they follow the head rigidly"
+        )
+    longest = float(spread.max())
+    if longest > 2.5 or longest < 0.002:
+        notes.append(f"{item.path}: the longest strand reaches {longest:.3g} m; check the stage's metersPerUnit")
+    return notes
+
+
+def _composition(error) -> str:
+    return " ".join(str(error).split())[:200]

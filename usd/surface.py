@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Skinned meshes as arrays: points in authored bind space, triangles, influences, blend shapes."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdSkel
+
+from neuralocks_core.character import Body
+from neuralocks_core.errors import NeuralocksError
+
+from .border import column_matrix, transformed
+from .joints import JointSource
+from .placement import Placement
+
+
+@dataclass(frozen=True)
+class SkinnedMesh:
+    """One mesh that follows a skeleton.
+
+    Attributes:
+        prim: the Mesh.
+        geom_bind: mesh space to authored bind space, (4, 4).
+        points: (V, 3), mesh space at rest.
+        triangles: (F, 3) int, outward.
+        indices, weights: (V, I), joints of the skeleton and their shares; rows sum to one.
+        shapes: blend shape name -> offsets (V, 3), mesh space.
+        placement: where the prim itself stands.
+    """
+
+    prim: Usd.Prim
+    geom_bind: np.ndarray
+    points: np.ndarray
+    triangles: np.ndarray
+    indices: np.ndarray
+    weights: np.ndarray
+    shapes: dict[str, np.ndarray] = field(repr=False)
+    placement: Placement = field(repr=False)
+
+
+def bound_meshes(stage: Usd.Stage, source: JointSource, notes: list[str]) -> list[SkinnedMesh]:
+    """Visible meshes that the skeleton skins, in stage order.
+
+    Raises:
+        NeuralocksError: a mesh's arrays do not fit each other or are not finite.
+    """
+    found = []
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.Mesh) and bound_skeleton(prim) == source.path and _drawn(prim):
+            mesh = _read(prim, source, notes)
+            if mesh is not None:
+                found.append(mesh)
+    return found
+
+
+def bound_skeleton(prim: Usd.Prim) -> str | None:
+    """Path of the skeleton that skins this prim by its own or an inherited binding."""
+    if influences(prim)[0] is None:
+        return None
+    skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
+    return str(skeleton.GetPath()) if skeleton else None
+
+
+def influences(prim: Usd.Prim) -> tuple[UsdGeom.Primvar | None, UsdGeom.Primvar | None]:
+    """The primvars of joint indices and weights in effect on a prim; inherited ones too, as UsdSkel has it."""
+    api = UsdGeom.PrimvarsAPI(prim)
+    pair = [api.FindPrimvarWithInheritance(f"skel:joint{part}") for part in ("Indices", "Weights")]
+    return tuple(pair) if all(p and p.HasValue() for p in pair) else (None, None)
+
+
+def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into the skeleton and weights, each (count, I), of a skinned prim with `count` points.
+
+    Raises:
+        NeuralocksError: they do not fit the points or the skeleton.
+    """
+    path = prim.GetPath()
+    primvars = influences(prim)
+    size = max(int(primvars[0].GetElementSize()), 1)
+    indices, weights = (np.asarray(p.ComputeFlattened(), kind) for p, kind in zip(primvars, (int, float)))
+    rows = 1 if primvars[0].GetInterpolation() == "constant" else count
+    if len(indices) != rows * size or len(weights) != rows * size:
+        raise NeuralocksError(
+            f"{path}: {len(indices)} joint indices and {len(weights)} weights for {rows} points of {size}; "
+            "export the skin again"
+        )
+    order = [str(name) for name in UsdSkel.BindingAPI(prim).GetJointsAttr().Get() or ()] or list(source.names)
+    unknown = [name for name in order if name not in source.names]
+    if unknown:
+        raise NeuralocksError(
+            f"{path}: skel:joints names '{unknown[0]}', which {source.path} does not have; bind it again"
+        )
+    if indices.size and not 0 <= indices.min() <= indices.max() < len(order):
+        raise NeuralocksError(f"{path}: a joint index lies outside 0..{len(order) - 1}; bind it again")
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise NeuralocksError(f"{path}: joint weights hold NaN, infinity or a negative value; bind it again")
+    place = {name: i for i, name in enumerate(source.names)}
+    indices = np.array([place[name] for name in order])[indices].reshape(rows, size)
+    weights = weights.reshape(rows, size)
+    total = weights.sum(axis=1, keepdims=True)
+    weights = np.where(total > 1e-9, weights / np.maximum(total, 1e-9), np.eye(1, size))
+    return np.broadcast_to(indices, (count, size)), np.broadcast_to(weights, (count, size))
+
+
+def geom_bind(prim: Usd.Prim) -> np.ndarray:
+    """Transform (4, 4) from the prim's points to authored bind space."""
+    value = UsdSkel.BindingAPI(prim).GetGeomBindTransformAttr().Get()
+    matrix = np.eye(4) if value is None else column_matrix(value)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
+        raise NeuralocksError(f"{prim.GetPath()}: its geomBindTransform is not finite or flat; bind it again")
+    return matrix
+
+
+def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
+    """All meshes as one Body.
+
+    Args:
+        meshes: what one skeleton skins.
+        to_bind: authored bind space to bind world [m], (4, 4).
+        keep: blend shapes wanted; all if None.
+    """
+    if not meshes:
+        return None
+    width = max(m.indices.shape[1] for m in meshes)
+    ends = np.cumsum([0] + [len(m.points) for m in meshes])
+    points = np.concatenate([transformed(m.points, to_bind @ m.geom_bind) for m in meshes])
+    flip = [np.linalg.det((to_bind @ m.geom_bind)[:3, :3]) < 0 for m in meshes]
+    triangles = np.concatenate(
+        [(m.triangles[:, ::-1] if f else m.triangles) + start for m, f, start in zip(meshes, flip, ends)]
+    )
+    pad = [((0, 0), (0, width - m.indices.shape[1])) for m in meshes]
+    names = [name for name in dict.fromkeys(n for m in meshes for n in m.shapes) if keep is None or name in keep]
+    shapes = {name: np.zeros((len(points), 3)) for name in names}
+    for mesh, start, end in zip(meshes, ends, ends[1:]):
+        for name, offsets in mesh.shapes.items():
+            if name in shapes:
+                shapes[name][start:end] = offsets @ (to_bind @ mesh.geom_bind)[:3, :3].T
+    return Body(
+        points,
+        triangles,
+        np.concatenate([np.pad(m.indices, p) for m, p in zip(meshes, pad)]),
+        np.concatenate([np.pad(m.weights, p) for m, p in zip(meshes, pad)]),
+        shapes,
+    )
+
+
+def _drawn(prim: Usd.Prim) -> bool:
+    imageable = UsdGeom.Imageable(prim)
+    hidden = imageable.ComputeVisibility(Usd.TimeCode.EarliestTime()) == UsdGeom.Tokens.invisible
+    return not hidden and imageable.ComputePurpose() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+
+def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh | None:
+    mesh, path = UsdGeom.Mesh(prim), prim.GetPath()
+    points = rest_value(mesh.GetPointsAttr())
+    if points is None or not len(points):
+        notes.append(f"{path}: the mesh has no points; left out of the body")
+        return None
+    points = np.asarray(points, float)
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
+    triangles = _triangles(mesh, path, len(points))
+    indices, weights = joint_influences(prim, len(points), source)
+    shapes = _shapes(prim, len(points), notes)
+    return SkinnedMesh(prim, geom_bind(prim), points, triangles, indices, weights, shapes, Placement(prim))
+
+
+def rest_value(attribute: Usd.Attribute):
+    """The default-time value, else the earliest sample."""
+    value = attribute.Get(Usd.TimeCode.Default())
+    return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _triangles(mesh: UsdGeom.Mesh, path, count: int) -> np.ndarray:
+    faces = np.asarray(rest_value(mesh.GetFaceVertexCountsAttr()) or [], np.int64)
+    corners = np.asarray(rest_value(mesh.GetFaceVertexIndicesAttr()) or [], np.int64)
+    if faces.size and faces.min() < 0 or faces.sum() != len(corners):
+        raise NeuralocksError(f"{path}: face counts sum to {faces.sum()} for {len(corners)} corners; repair the mesh")
+    if corners.size and not 0 <= corners.min() <= corners.max() < count:
+        raise NeuralocksError(f"{path}: a face names a point outside 0..{count - 1}; repair the mesh")
+    starts = np.cumsum(faces) - faces
+    fans = np.maximum(faces - 2, 0)
+    first = np.repeat(starts, fans)
+    step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+    triangles = np.stack([corners[first], corners[first + step + 1], corners[first + step + 2]], axis=1)
+    return triangles[:, ::-1] if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else triangles
+
+
+def _shapes(prim: Usd.Prim, count: int, notes: list[str]) -> dict[str, np.ndarray]:
+    binding = UsdSkel.BindingAPI(prim)
+    names = [str(name) for name in binding.GetBlendShapesAttr().Get() or ()]
+    targets = binding.GetBlendShapeTargetsRel().GetTargets() if names else []
+    if len(names) != len(targets):
+        notes.append(
+            f"{prim.GetPath()}: {len(names)} blend shape names for {len(targets)} targets; blend shapes left out"
+        )
+        return {}
+    shapes = {}
+    for name, target in zip(names, targets):
+        shape = UsdSkel.BlendShape(prim.GetStage().GetPrimAtPath(target))
+        offsets = np.asarray(shape.GetOffsetsAttr().Get() or [], float).reshape(-1, 3) if shape else np.zeros((0, 3))
+        chosen = np.asarray(shape.GetPointIndicesAttr().Get() or [], np.int64) if shape else np.zeros(0, np.int64)
+        if not shape or not len(offsets):
+            notes.append(f"{prim.GetPath()}: blend shape '{name}' ({target}) is missing or empty; left out")
+            continue
+        dense = np.zeros((count, 3))
+        if len(chosen):
+            if len(chosen) != len(offsets) or not 0 <= chosen.min() <= chosen.max() < count:
+                raise NeuralocksError(
+                    f"{target}: {len(offsets)} offsets and {len(chosen)} point indices do not fit {count} points"
+                )
+            dense[chosen] = offsets
+        elif len(offsets) == count:
+            dense[:] = offsets
+        else:
+            raise NeuralocksError(f"{target}: {len(offsets)} offsets for {count} points; export the blend shape again")
+        if not np.isfinite(dense).all():
+            raise NeuralocksError(f"{target}: blend shape offsets hold NaN or infinity; repair it")
+        shapes[name] = dense
+    return shapes
