@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `neuralocks train` learns from: a character, grooms and motion, out of files."""
+
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands import StrandSet, strand_set
+from neuralocks_core.training.rollouts import TrainingScene
+
+from .attach import attach
+from .border import open_stage
+from .curves import find_curves, read_groom
+from .placement import Placement
+from .stage import StageRig, read_rigs
+
+LIBRARY = "library"
+"""A groom of this name stands for every style of the procedural library, grown on the character."""
+MOST_STRANDS = 3000
+"""Strands of a groom that are learned from, as in the paper; the network deforms all of them afterwards."""
+
+
+def training_scene(
+    character: str | Path,
+    grooms: list[str] | tuple[str, ...] = (),
+    motion: list[str] | tuple[str, ...] = (),
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    seed: int = 0,
+    **settings,
+) -> TrainingScene:
+    """Read a character, its grooms and motion for training.
+
+    Args:
+        character: a USD file with a skeleton and skinned meshes.
+        grooms: USD files with BasisCurves that lie on the character's bind pose, or "library"; the character's own if
+            none.
+        motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
+        skeleton: prim path of the skeleton wanted, where there are several.
+        head: joint that is the head, where its name does not tell.
+        seed: of everything random.
+        **settings: further fields of TrainingScene.
+
+    Raises:
+        NeuralocksError: a file cannot be used, or there is no hair.
+    """
+    rig = read_rigs(character, skeleton, head)[0]
+    if "head" not in rig.character.humanoid:
+        raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
+    found: list[StrandSet] = []
+    for source in grooms or [str(character)]:
+        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, seed)
+    clips = tuple(_clip(path, rig.character) for path in motion)
+    return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
+
+
+def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[StrandSet]:
+    stage = open_stage(Path(source))
+    prims = find_curves(stage)
+    if not prims:
+        raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
+    sets = []
+    for prim in prims:
+        notes: list[str] = []
+        attachment = attach(prim, [rig], Placement(prim), head, notes)
+        sets.append(_strands(read_groom(prim, attachment.to_bind, notes), attachment.character, seed))
+    return sets
+
+
+def _library(character: Character, seed: int) -> list[StrandSet]:
+    from neuralocks_core.hairstyles import STYLES, grow
+    from neuralocks_core.hairstyles.scalp import of_character
+
+    scalp = of_character(character)
+    return [
+        _strands(grow(style, scalp, MOST_STRANDS, seed + i, character.body), character, seed)
+        for i, style in enumerate(STYLES)
+    ]
+
+
+def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
+    strands = strand_set(groom, character.canonical_to_bind[:3, 3], character.head_centre, character.facing)
+    if len(strands.rest) <= MOST_STRANDS:
+        return strands
+    # Whole locks, so that neighbours stay neighbours.
+    order = np.random.default_rng(seed).permutation(strands.lock.max() + 1)
+    size = np.bincount(strands.lock)[order]
+    kept = order[: max(1, np.searchsorted(np.cumsum(size), MOST_STRANDS))]
+    return strands.subset(np.isin(strands.lock, kept))
+
+
+def _clip(path: str, character: Character) -> Clip:
+    if Path(path).suffix.lower() == ".bvh":
+        from neuralocks_core.formats.bvh import read_bvh
+        from neuralocks_core.retarget import retarget
+
+        return retarget(read_bvh(path), character)
+    rig = read_rigs(path)[0]
+    if len(rig.clip.times) < 2:
+        raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
+    if rig.character.skeleton.names != character.skeleton.names:
+        raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
+    return rig.clip
