@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of the report card: plain functions of arrays, each with its definition.
+
+Hair comes as points (T, S, K, 3) [m] in canonical space, where hair that is carried rigidly stands still, so that
+whatever moves here is motion of the hair itself. `reference` is a trusted simulation of the same strands at the same
+times.
+"""
+
+import numpy as np
+
+DYNAMIC_SHARE = 0.35
+"""A frame counts as dynamic where hair moves with at least this share of the reference's speed (Neuroll, table 1)."""
+STILL = 0.01
+"""Mean speed [m/s] under which the reference itself counts as standing still."""
+DEEP = 0.003
+"""Depth [m] at which a vertex inside the body begins to show."""
+
+
+def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Length [m] of each strand, (..., S), of points (..., P, 3) in strands of `counts` (S,) vertices."""
+    points = np.asarray(points, float)
+    edges = np.linalg.norm(np.diff(points, axis=-2), axis=-1)
+    ends = np.cumsum(counts)
+    edges[..., ends[:-1][(ends[:-1] > 0) & (ends[:-1] < points.shape[-2])] - 1] = 0.0
+    total = np.concatenate([np.zeros((*edges.shape[:-1], 1)), np.cumsum(edges, axis=-1)], axis=-1)
+    last = np.clip(ends - 1, 0, None)
+    return np.where(np.asarray(counts) > 1, total[..., last] - total[..., np.clip(ends - counts, 0, last)], 0.0)
+
+
+def stretch(lengths: np.ndarray, rest: np.ndarray) -> dict[str, float]:
+    """How far strands are from their rest length.
+
+    Args:
+        lengths: (T, S) [m].
+        rest: (S,) [m]; strands without length are left out.
+
+    Returns:
+        `stretch_cm`, the mean of |L - L0| in cm (Neuroll's stretch violation); `stretch_percent` and
+        `stretch_percent_max`, mean and largest |L - L0| / L0.
+    """
+    real = rest > 1e-6
+    off = np.abs(np.asarray(lengths, float)[..., real] - rest[real])
+    return {
+        "stretch_cm": _mean(100 * off),
+        "stretch_percent": _mean(100 * off / rest[real]),
+        "stretch_percent_max": float(np.max(100 * off / rest[real], initial=0.0)),
+    }
+
+
+def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, float]:
+    """Vertices inside the body.
+
+    A vertex that rests inside the body is its author's choice: it is counted only if it lies deeper than at rest.
+
+    Args:
+        distance: signed distance to the posed body (T, N) [m], negative inside; clamped root vertices left out.
+        rest_distance: the same at rest (N,) [m].
+
+    Returns:
+        `penetration_percent`, `penetration_3mm_percent`: share of vertices inside, and deeper than 3 mm;
+        `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside.
+    """
+    depth = np.maximum(np.minimum(rest_distance, 0) - distance, 0.0)
+    # Half the float32 resolution of a metre-sized stage is no penetration.
+    return {
+        "penetration_percent": 100 * _mean(depth > 2e-6),
+        "penetration_3mm_percent": 100 * _mean(depth > DEEP),
+        "penetration_worst_mm": 1000 * float(np.max(depth, initial=0.0)),
+        "inside_at_rest_percent": 100 * _mean(np.asarray(rest_distance) < 0),
+    }
+
+
+def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]."""
+    return np.linalg.norm(np.diff(points, axis=0), axis=-1) / np.diff(times)[:, None, None]
+
+
+def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
+    """Mean length of the velocity's error over the mean length of the reference's velocity; rigid hair has 1."""
+    return speed(np.asarray(points, float) - reference, times).mean() / max(speed(reference, times).mean(), 1e-12)
+
+
+def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
+    """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference."""
+    return speed(points, times).mean() / max(speed(reference, times).mean(), 1e-12)
+
+
+def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> int:
+    """Longest run of consecutive frames in which hair moves at 35 % of the reference's mean speed or more.
+
+    Frames in which the reference stands still do not break a run.
+    """
+    own, true = speed(points, times).mean(axis=(1, 2)), speed(reference, times).mean(axis=(1, 2))
+    alive = (own >= DYNAMIC_SHARE * true) | (true < STILL)
+    best = run = 0
+    for frame in alive:
+        run = run + 1 if frame else 0
+        best = max(best, run)
+    return best
+
+
+def position_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> float:
+    """Mean distance of a vertex from the reference's, in percent of its strand's length (S,) [m]."""
+    off = np.linalg.norm(np.asarray(points, float) - reference, axis=-1)
+    return 100 * _mean(off / np.maximum(length, 1e-6)[:, None])
+
+
+def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> dict[str, float]:
+    """Error of each strand's motion relative to that of hair carried rigidly (= 1).
+
+    The motion of a vertex is its place about its mean over the clip, so that a wrong droop alone is no error of motion.
+    Per strand: rms over time and vertices of the motion's error, over the rms of the reference's motion. Strands that
+    move less than 0.5 % of their length (rms) have no motion to be wrong about and are left out.
+
+    Returns:
+        `median` over strands; `rms`: the same ratio over all strands together, where a few that came to rest
+        elsewhere weigh most. NaN if nothing moves.
+    """
+    error = _swing(np.asarray(points, float) - reference)
+    true = _swing(np.asarray(reference, float))
+    lively = true > 0.005 * np.asarray(length)
+    if not lively.any():
+        return {"median": float("nan"), "rms": float("nan")}
+    return {
+        "median": float(np.median(error[lively] / true[lively])),
+        "rms": float(np.sqrt(np.square(error[lively]).sum() / np.square(true[lively]).sum())),
+    }
+
+
+def settling_time(points: np.ndarray, times: np.ndarray, stop: float, share: float = 0.1) -> float:
+    """Time [s] after `stop` until the mean tip speed stays below `share` of the largest it has after the stop.
+
+    Tips that never exceed the standing-still speed have settled at once; those that never settle give the time left.
+    """
+    tips = speed(points[:, :, -1:], times).mean(axis=(1, 2))
+    middle = (times[1:] + times[:-1]) / 2
+    after = middle >= stop
+    if not after.any() or tips[after].max() < STILL:
+        return 0.0
+    loud = np.flatnonzero(after & (tips > max(share * tips[after].max(), STILL)))
+    return float(times[loud[-1] + 1] - stop) if len(loud) else 0.0
+
+
+def jitter(points: np.ndarray) -> float:
+    """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 where nothing moves."""
+    return 1000 * float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max(initial=0.0))
+
+
+def droop(displacement: np.ndarray, down: np.ndarray) -> float:
+    """How far tips hang below where the rigid groom has them, mean over strands and frames [cm].
+
+    Args:
+        displacement: (T, S, K, 3) [m] canonical.
+        down: unit vectors of gravity in canonical axes, (T, 3).
+    """
+    return 100 * _mean(np.einsum("tsi,ti->ts", np.asarray(displacement, float)[:, :, -1], down))
+
+
+def tip_curves(displacement: np.ndarray) -> np.ndarray:
+    """Mean displacement of the tips (T, 3) [m] in canonical space: the curve that a person compares."""
+    return np.asarray(displacement, float)[:, :, -1].mean(axis=1)
+
+
+def held(joints_relative: np.ndarray, tolerance: float = 1e-5) -> np.ndarray:
+    """Which frames (T,) have the pose of the frame before: none of the given transforms (T, n, 4, 4) changes."""
+    same = np.abs(np.diff(joints_relative, axis=0)).max(axis=(1, 2, 3)) < tolerance
+    return np.concatenate([[False], same])
+
+
+def _swing(points: np.ndarray) -> np.ndarray:
+    """(S,) rms over time and vertices of points (T, S, K, 3) about their mean in time [m]."""
+    return np.sqrt(np.square(points - points.mean(axis=0)).sum(axis=-1).mean(axis=(0, 2)))
+
+
+def _mean(values) -> float:
+    values = np.asarray(values, float)
+    return float(values.mean()) if values.size else 0.0

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every metric on motion whose answer is known."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core import metrics
+from neuralocks_core.energy import curvature, energies
+from neuralocks_core.materials import Material
+
+TIMES = np.arange(0, 4, 1 / 50)
+LENGTH = np.array([0.3, 0.5])
+
+
+def swinging(amplitude=0.05, frequency=1.0, decay=0.0, phase=0.0):
+    """Two straight strands along -Y whose vertices swing along X in proportion to their place."""
+    place = np.linspace(0, 1, 24)
+    rest = np.zeros((2, 24, 3))
+    rest[:, :, 1] = -place * LENGTH[:, None]
+    swing = amplitude * np.exp(-decay * TIMES) * np.sin(2 * np.pi * frequency * TIMES + phase)
+    points = np.repeat(rest[None], len(TIMES), axis=0)
+    points[..., 0] += swing[:, None, None] * place
+    return points, rest
+
+
+def test_reference_scores_itself_perfectly_and_rigid_hair_scores_one():
+    reference, rest = swinging()
+    rigid = np.broadcast_to(rest, reference.shape)
+    assert metrics.velocity_error(reference, reference, TIMES) == 0
+    assert metrics.motion_ratio(reference, reference, TIMES) == 1
+    assert metrics.motion_error(reference, reference, LENGTH) == {"median": 0, "rms": 0}
+    assert metrics.dynamic_frames(reference, reference, TIMES) == len(TIMES) - 1
+    assert metrics.velocity_error(rigid, reference, TIMES) == pytest.approx(1)
+    assert metrics.motion_ratio(rigid, reference, TIMES) == 0
+    assert metrics.motion_error(rigid, reference, LENGTH) == pytest.approx({"median": 1, "rms": 1})
+
+
+def test_half_the_amplitude_is_half_the_motion():
+    reference, _ = swinging()
+    half, _ = swinging(amplitude=0.025)
+    assert metrics.motion_ratio(half, reference, TIMES) == pytest.approx(0.5)
+    assert metrics.motion_error(half, reference, LENGTH)["median"] == pytest.approx(0.5)
+    assert metrics.velocity_error(half, reference, TIMES) == pytest.approx(0.5)
+
+
+def test_a_constant_droop_is_no_error_of_motion_but_one_of_position():
+    reference, _ = swinging()
+    lower = reference - [0, 0.02, 0]
+    assert metrics.motion_error(lower, reference, LENGTH)["rms"] == pytest.approx(0, abs=1e-12)
+    assert metrics.position_error(lower, reference, LENGTH) == pytest.approx(100 * (0.02 / LENGTH).mean())
+
+
+def test_opposite_motion_is_twice_as_wrong_as_rigid():
+    reference, _ = swinging()
+    against, _ = swinging(phase=np.pi)
+    assert metrics.motion_error(against, reference, LENGTH)["median"] == pytest.approx(2)
+
+
+def test_a_strand_that_rests_elsewhere_moves_the_rms_more_than_the_median():
+    reference, rest = swinging()
+    reference = np.concatenate([reference] * 5, axis=1)
+    points = reference * 0.9 + 0.1 * np.concatenate([rest] * 5)
+    points[:, 0] = 0
+    error = metrics.motion_error(points, reference, np.tile(LENGTH, 5))
+    assert error["median"] == pytest.approx(0.1) and error["rms"] > 2 * error["median"]
+
+
+def test_dynamic_frames_counts_the_longest_run():
+    reference, rest = swinging()
+    points = reference.copy()
+    points[100:120] = points[100]
+    run = metrics.dynamic_frames(points, reference, TIMES)
+    assert 95 <= run <= 105
+
+
+def test_settling_of_a_decaying_swing():
+    """A swing that decays as exp(-3 t) is at 10 % after ln(10) / 3 s, to within half a period."""
+    points, _ = swinging(amplitude=0.2, frequency=4, decay=3)
+    assert metrics.settling_time(points, TIMES, stop=0.0) == pytest.approx(np.log(10) / 3, abs=0.125)
+    still = np.broadcast_to(points[:1], points.shape)
+    assert metrics.settling_time(still, TIMES, stop=1.0) == 0
+    assert metrics.jitter(still) == 0
+
+
+def test_lengths_of_ragged_strands_and_stretch():
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [5, 5, 5], [0, 0, 0], [0, 0, 3.0]])
+    counts = np.array([3, 1, 2])
+    lengths = metrics.strand_lengths(points, counts)
+    np.testing.assert_allclose(lengths, [3, 0, 3])
+    result = metrics.stretch(np.array([[3.3, 0, 3.0]]), lengths)
+    assert result["stretch_cm"] == pytest.approx(15)
+    assert result["stretch_percent"] == pytest.approx(5)
+    assert result["stretch_percent_max"] == pytest.approx(10)
+
+
+def test_penetration_counts_only_what_is_deeper_than_at_rest():
+    rest = np.array([0.01, 0.01, -0.002, -0.002, 0.01])
+    now = np.array([[0.01, -0.001, -0.002, -0.007, -0.004]])
+    result = metrics.penetration(now, rest)
+    assert result["penetration_percent"] == pytest.approx(60)
+    assert result["penetration_3mm_percent"] == pytest.approx(40)
+    assert result["penetration_worst_mm"] == pytest.approx(5)
+    assert result["inside_at_rest_percent"] == pytest.approx(40)
+
+
+def test_droop_is_measured_along_gravity_in_the_heads_axes():
+    displacement = np.zeros((3, 2, 24, 3))
+    displacement[:, :, -1] = [0.0, 0.0, 0.03]
+    down = np.array([[0, 0, 1.0], [0, 0, 1.0], [0, -1.0, 0]])
+    assert metrics.droop(displacement, down) == pytest.approx(2)
+
+
+def arc(radius, plane=0.0, count=24, length=0.24):
+    """A strand bent to a circle, first along +Y; its plane turned about Y."""
+    angle = np.linspace(0, length / radius, count)
+    flat = np.stack([radius * (1 - np.cos(angle)), radius * np.sin(angle), 0 * angle], axis=1)
+    c, s = np.cos(plane), np.sin(plane)
+    return flat @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+
+
+def test_curvature_of_a_circle_is_one_over_its_radius():
+    points = arc(0.05)
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1).mean()
+    np.testing.assert_allclose(np.linalg.norm(curvature(points), axis=1) / step, 20, rtol=2e-3)
+    np.testing.assert_allclose(curvature(points)[1:], np.broadcast_to(curvature(points)[1], (21, 3)), atol=1e-9)
+
+
+def test_energies_of_known_shapes():
+    rest = np.zeros((1, 24, 3))
+    rest[0, :, 1] = np.linspace(0, 0.24, 24)
+    down = np.array([[0, -1.0, 0]])
+    zero = energies(rest[None], rest, down)
+    assert all(abs(value[0]) < 1e-12 for value in zero.values())
+    longer = energies(rest[None] * 1.1, rest, down)
+    assert longer["stretch"][0] == pytest.approx(0.5 * 1000 * 0.01)
+    assert longer["gravity"][0] == pytest.approx(9.81 * 0.012)
+    bent = energies(arc(0.1)[None, None], rest, down, Material(bend=2e-3))
+    assert bent["bend"][0] == pytest.approx(0.5 * 2e-3 * 10**2, rel=0.06)
