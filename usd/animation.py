@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write a clip as a UsdSkel animation."""
+
+import numpy as np
+from pxr import Gf, Usd, UsdSkel, Vt
+
+from neuralocks_core import rotation
+from neuralocks_core.character import Character
+from neuralocks_core.motion import Clip
+
+from .border import Border
+
+
+def write_animation(
+    stage: Usd.Stage, path: str, character: Character, clip: Clip, *, first: float = 1.0, shapes: tuple[str, ...] = ()
+) -> UsdSkel.Animation:
+    """Author a clip of a character on a stage as joint samples, one per clip time.
+
+    A joint's scale is left at one. The skeleton is taken to stand at the stage's origin.
+
+    Args:
+        stage: its unit, up axis and rate are honoured.
+        path: prim path of the animation.
+        character: whose joints they are; the skeleton prim must hold the same paths.
+        clip: what to write.
+        first: time code of the clip's time zero.
+        shapes: names of the clip's blend shapes, if it has any.
+    """
+    border = Border.of(stage)
+    world = border.from_core @ clip.joints
+    # A joint's own axes keep unit length in the stage's unit; only its place is scaled.
+    world[..., :3, :3] = rotation.rotation_part(world, path)
+    local = _local(world, character.skeleton.parents)
+    turns = rotation.to_quaternion(local[..., :3, :3])
+    # One continuous sign per joint, or a player that blends linearly between samples passes through zero.
+    flips = np.sum(turns[1:] * turns[:-1], axis=-1) < 0
+    turns[1:] *= np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    places = local[..., :3, 3]
+    animation = UsdSkel.Animation.Define(stage, path)
+    animation.CreateJointsAttr(list(character.skeleton.names))
+    animation.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1)] * len(character.skeleton.names)))
+    codes = first + clip.times * border.rate
+    _samples(animation.CreateRotationsAttr(), codes, turns, _quaternions)
+    _samples(animation.CreateTranslationsAttr(), codes, places, lambda p: Vt.Vec3fArray.FromNumpy(np.float32(p)))
+    if shapes:
+        animation.CreateBlendShapesAttr(list(shapes))
+        weights = animation.CreateBlendShapeWeightsAttr()
+        _samples(weights, codes, clip.shape, lambda w: Vt.FloatArray.FromNumpy(np.float32(w)))
+    return animation
+
+
+def _local(world, parents):
+    """Transforms relative to the parent joint, (T, J, 4, 4)."""
+    local = world.copy()
+    below = parents >= 0
+    local[:, below] = np.linalg.inv(world[:, parents[below]]) @ world[:, below]
+    return local
+
+
+def _samples(attribute, codes, values, pack):
+    if np.ptp(values, axis=0).max(initial=0) < 1e-7:
+        attribute.Set(pack(values[0]))
+        return
+    for code, value in zip(codes, values):
+        attribute.Set(pack(value), float(code))
+
+
+def _quaternions(wxyz):
+    return Vt.QuatfArray([Gf.Quatf(*map(float, q)) for q in wxyz])
