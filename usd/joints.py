@@ -191,7 +191,7 @@ class JointSource:
                 target[row] = _wxyz(values) if quaternions else np.asarray(values, float)
         self._check(time_codes, translation, turn, scale)
         result[:, joints, :3, :3] = from_quaternion(turn[:, columns]) * scale[:, columns, None, :]
-        result[:, joints, :3, 3] = translation[:, columns]
+        result[..., :3, 3][:, joints] = translation[:, columns]
         return result
 
     def _check(self, time_codes, translation, turn, scale) -> None:
