@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The potentials against hand-computed values, each other, symmetry and float64 finite differences."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from neuralocks_core.physics import self_collision as volume
+from neuralocks_core.physics.adhesion import adhesion
+from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
+from neuralocks_core.physics.body_collision import LINEAR, body_collision
+from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
+from neuralocks_core.physics.gravity import gravity
+from neuralocks_core.physics.hair_style import hair_style
+from neuralocks_core.physics.inertia import damping, inertia
+from neuralocks_core.physics.rods import rods
+from neuralocks_core.physics.stretch import stretch
+from neuralocks_core.physics.transport import loop_frames, scan_frames
+
+G = torch.tensor([0.0, -9.81, 0.0], dtype=torch.float64)
+
+
+@pytest.fixture
+def curls():
+    """Four curly strands of 12 vertices, float64."""
+    t = torch.linspace(0, 1, 12, dtype=torch.float64)
+    shift = torch.arange(4.0, dtype=torch.float64)[:, None]
+    helix = [0.02 * torch.cos(9 * t + shift), -0.2 * t + 0 * shift, 0.02 * torch.sin(9 * t + shift) + 0.004 * shift]
+    return torch.stack(helix, -1)
+
+
+def _rotation(angle=0.7):
+    c, s = math.cos(angle), math.sin(angle)
+    about_y = torch.tensor([[c, 0, s], [0, 1, 0], [-s, 0, c]], dtype=torch.float64)
+    about_x = torch.tensor([[1, 0, 0], [0, c, -s], [0, s, c]], dtype=torch.float64)
+    return about_x @ about_y
+
+
+def _straight(vertices=24, length=0.24, direction=(0.0, -1.0, 0.0)):
+    along = torch.linspace(0, length, vertices, dtype=torch.float64)
+    return (along[:, None] * torch.tensor(direction, dtype=torch.float64))[None]
+
+
+def _moved(curls, seed=1, amount=0.004):
+    generator = torch.Generator().manual_seed(seed)
+    return curls + amount * torch.randn(curls.shape, generator=generator, dtype=torch.float64)
+
+
+def _neighbours(strands=4, vertices=12):
+    index = torch.arange(strands * vertices).reshape(strands, vertices)
+    pairs = torch.stack([index.roll(1, 0), index.roll(-1, 0)], -1).to(torch.int32)
+    pairs[:, 5, 1] = -1
+    pairs[:, 0] = -1
+    return pairs
+
+
+def _potentials(rest):
+    """Every potential as a function of points, over the strands of `rest`."""
+    r = rods(rest)
+    planes = torch.tensor([0.0, 1.0, 0.0, -0.1], dtype=torch.float64).expand(*rest.shape[:-1], 4)
+    dense = volume.density(rest, r.mass) * 0.9
+    distance = torch.full(rest.shape[:-1], 0.01, dtype=torch.float64)
+    forms = {f"bend {form.value}": lambda x, form=form: bend_twist(x, r, form=form) for form in Cosserat}
+    return {
+        "stretch": lambda x: stretch(x, r),
+        "stretch of the paper": lambda x: stretch(x, r, 1e4, per_edge=True),
+        **forms,
+        "gravity": lambda x: gravity(x, r, G, 1.3),
+        "inertia": lambda x: inertia(x, rest, rest + 0.001, r, 1 / 30),
+        "damping": lambda x: damping(x, rest, r, 1 / 30, 10.0),
+        "body": lambda x: body_collision(x, r, planes),
+        "style": lambda x: hair_style(x, r, distance),
+        "adhesion": lambda x: adhesion(x, r, _neighbours()),
+        "adhesion of the paper": lambda x: adhesion(x, r, _neighbours(), rest_distance=False),
+        "volume": lambda x: volume.self_collision(x, r, dense),
+        "volume of the paper": lambda x: volume.self_collision(x, r, dense, relative=False),
+    }
+
+
+NAMES = tuple(_potentials(torch.zeros(4, 12, 3, dtype=torch.float64) + torch.arange(12)[:, None]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gradients_are_those_of_finite_differences(curls, name):
+    start = _moved(curls).requires_grad_()
+    energy = _potentials(curls)[name]
+    assert energy(start).abs().max() > 0, "an energy that is zero here tests nothing"
+    assert torch.autograd.gradcheck(energy, (start,), eps=1e-7, atol=1e-5, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_batch_of_frames_is_each_frame_alone(curls, name):
+    frames = torch.stack([_moved(curls, seed) for seed in range(3)])
+    energy = _potentials(curls)[name]
+    torch.testing.assert_close(energy(frames), torch.stack([energy(frame) for frame in frames]))
+
+
+def test_the_rest_shape_has_no_energy(curls):
+    for name in ("stretch", "gravity", "style", "adhesion", *(f"bend {form.value}" for form in Cosserat)):
+        assert _potentials(curls)[name](curls).abs().max() < 1e-20, name
+
+
+def test_moving_without_deforming_costs_nothing(curls):
+    away = curls + torch.tensor([0.3, -0.2, 0.5], dtype=torch.float64)
+    turned = curls @ _rotation().T
+    for name in ("stretch", *(f"bend {form.value}" for form in Cosserat), "adhesion", "adhesion of the paper"):
+        energy = _potentials(curls)[name]
+        torch.testing.assert_close(energy(away), energy(curls), atol=1e-12, rtol=1e-9)
+    # The whole space turned, rest shape and all, is the same strand.
+    x = _moved(curls)
+    for name in ("stretch", "adhesion", "volume", *(f"bend {form.value}" for form in Cosserat)):
+        here, there = _potentials(curls)[name](x), _potentials(turned)[name](x @ _rotation().T)
+        torch.testing.assert_close(there, here, atol=1e-12, rtol=1e-6)
+
+
+def test_an_arch_bent_from_straight_has_the_energy_of_its_curvature():
+    """k/2 integral of 1/R^2: per inner vertex 2 k / l (2 sin(l / 2R) / 2)^2, which tends to k l / 2 R^2."""
+    radius, count = 0.1, 200
+    angle = torch.linspace(0, 1.5, count, dtype=torch.float64)
+    arch = radius * torch.stack([1 - torch.cos(angle), -torch.sin(angle), 0 * angle], -1)[None]
+    chord = float((arch[0, 1] - arch[0, 0]).norm())
+    first = (arch[0, 1] - arch[0, 0]) / chord
+    straight = arch[:, :1] + torch.arange(count, dtype=torch.float64)[:, None] * chord * first
+    for form in (Cosserat.EXACT, Cosserat.LOOP, Cosserat.DIRECT):
+        energy = bend_twist(arch, rods(straight), 2.0, form)
+        expected = 0.5 * 2.0 / radius**2 * radius * 1.5 * (count - 2) / (count - 1)
+        assert energy.item() == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_two_exact_transports_agree_and_are_orthogonal_to_the_tangent(curls):
+    edges = torch.nn.functional.normalize(_moved(curls).diff(dim=-2), dim=-1)
+    torch.testing.assert_close(scan_frames(edges), loop_frames(edges), atol=1e-14, rtol=0)
+    strain = bend_difference(_moved(curls), curls, Cosserat.EXACT)
+    torch.testing.assert_close(strain, bend_difference(_moved(curls), curls, Cosserat.LOOP), atol=1e-13, rtol=0)
+
+
+def test_transported_frames_turn_the_root_edge_into_each_edge(curls):
+    from neuralocks_core.physics.transport import conjugate, direct_frames, product
+
+    edges = torch.nn.functional.normalize(curls.diff(dim=-2), dim=-1)
+    root = torch.nn.functional.pad(edges[..., :1, :].expand_as(edges), (1, 0))
+    for frames in (scan_frames(edges), direct_frames(edges)):
+        turned = product(product(frames, root), conjugate(frames))[..., 1:]
+        torch.testing.assert_close(turned, edges, atol=1e-12, rtol=0)
+
+
+def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
+    """The strain's part along the edge, in the edge's own frame, is twist; a curl that is drawn has none of it."""
+    t = torch.linspace(0, 1, 24, dtype=torch.float64)
+    curl = torch.stack([0.03 * torch.cos(19 * t), -0.2 * t, 0.03 * torch.sin(19 * t)], -1)[None]
+    straight = _straight()
+    root = torch.nn.functional.normalize(curl.diff(dim=-2), dim=-1)[:, :1]
+    along = [
+        (bend_difference(curl, straight, form) * root).sum(-1).abs().max().item()
+        for form in (Cosserat.EXACT, Cosserat.DIRECT)
+    ]
+    assert along[0] < 1e-9 and along[1] > 0.05
+
+
+def test_folding_back_is_finite_in_value_and_gradient():
+    back = torch.tensor([[0.0, 0, 0], [0, -1, 0], [0, -2, 0], [0, -1, 0], [0, 0, 0], [0, -1, 0]])[None] * 0.01
+    for form in Cosserat:
+        x = back.clone().requires_grad_()
+        bend_twist(x, rods(_straight(6, 0.05).float()), form=form).sum().backward()
+        assert x.grad.isfinite().all()
+
+
+def test_a_stretched_strand_by_hand():
+    r = rods(_straight(3, 0.2))
+    x = _straight(3, 0.22)
+    assert stretch(x, r, 50.0).item() == pytest.approx(2 * 25.0 * 0.1 * 0.1**2)
+    assert stretch(x, r, 50.0, per_edge=True).item() == pytest.approx(2 * 25.0 * 0.01**2)
+
+
+def test_gravity_pulls_down_and_a_standing_strand_is_held():
+    standing = _straight(direction=(0.0, 1.0, 0.0))
+    for supported in (False, True):
+        x = standing.clone().requires_grad_()
+        gravity(x, rods(standing, supported=supported), G).sum().backward()
+        force = -x.grad[0]
+        assert (force[1:].abs().max() < 1e-12) if supported else (force[1:, 1] < 0).all()
+    assert gravity(standing - 0.1, rods(standing, supported=False), G).item() < 0
+
+
+def test_hanging_hair_needs_no_support_and_the_bind_pose_is_an_equilibrium(curls):
+    assert rods(_straight()).support[:, 1:].abs().max() < 1e-15
+    # With the support the net load on every vertex is what tension along its own edges balances: for a strand whose
+    # edges may turn but not stretch, no direction change lowers the energy at rest.
+    r = rods(curls)
+    turn = torch.zeros(4, 11, 3, dtype=torch.float64, requires_grad=True)
+    edges = curls.diff(dim=-2)
+    turned = torch.nn.functional.normalize(edges / r.length[..., None] + turn, dim=-1)
+    x = torch.cat([curls[:, :1], curls[:, :1] + torch.cumsum(turned * r.length[..., None], -2)], -2)
+    gravity(x, r, G).sum().backward()
+    assert turn.grad.abs().max() < 1e-12
+
+
+def test_the_support_is_the_reference_solvers(curls):
+    rest_rods = pytest.importorskip("neuralocks_core.reference.rest").rest_rods
+    ours, theirs = rods(curls), rest_rods(curls.numpy())
+    np.testing.assert_allclose(ours.support.numpy(), theirs.support, atol=1e-15)
+    np.testing.assert_allclose(ours.mass.numpy(), theirs.mass, atol=1e-15)
+
+
+def test_free_fall_has_no_inertia_force_against_gravity():
+    """Minimising inertia + gravity over one step gives x_t = 2 x_{t-1} - x_{t-2} + dt^2 g."""
+    dt, rest = 1 / 30, _straight()
+    r = rods(rest, supported=False)
+    before2, before = rest, rest + dt * 0.2
+    x = (2 * before - before2 + dt * dt * G).requires_grad_()
+    (inertia(x, before, before2, r, dt) + gravity(x, r, G)).sum().backward()
+    assert x.grad.abs().max() < 1e-12
+
+
+def test_the_past_takes_gradient_only_when_asked():
+    rest = _straight()
+    before = rest.clone().requires_grad_()
+    assert not inertia(rest + 0.01, before, rest, rods(rest), 1 / 30).requires_grad
+    inertia(rest + 0.01, before, rest, rods(rest), 1 / 30, detach=False).sum().backward()
+    assert before.grad.abs().max() > 0
+
+
+def test_damping_takes_half_of_the_rates_power_over_a_step():
+    rest = _straight()
+    x = (rest + 0.003).requires_grad_()
+    r = rods(rest)
+    damping(x, rest, r, 0.1, 5.0).sum().backward()
+    torch.testing.assert_close(x.grad, 5.0 * r.mass[..., None] * torch.full_like(rest, 0.03))
+
+
+def test_the_body_pushes_outward_with_a_bounded_force_and_not_at_the_root():
+    rest = _straight(direction=(1.0, 0.0, 0.0))
+    planes = torch.tensor([0.0, 1.0, 0.0, 0.0], dtype=torch.float64).expand(1, 24, 4)
+    r = rods(rest)
+
+    def force(height):
+        x = (rest + torch.tensor([0.0, height, 0.0], dtype=torch.float64)).requires_grad_()
+        body_collision(x, r, planes, 1e6, 0.004).sum().backward()
+        return -x.grad[0, :, 1] / r.mass[0]
+
+    assert not force(0.0041).any()
+    assert not force(-0.01)[:2].any()
+    assert force(0.001)[2].item() == pytest.approx(3e6 * 0.003**2)
+    assert force(-0.3)[2].item() == pytest.approx(3e6 * LINEAR**2)
+
+
+def test_the_style_fades_with_the_distance_to_the_body():
+    rest = _straight()
+    x = rest + 0.01
+    far = torch.linspace(0, 0.06, 24, dtype=torch.float64)[None]
+    r = rods(rest)
+    expected = (r.mass[0] * (1 - (far[0] / 0.03).clamp_max(1)) * 7.0 * 3e-4).sum()
+    assert hair_style(x, r, far, 7.0, 0.03).item() == pytest.approx(expected.item())
+
+
+def test_adhesion_by_hand_and_lagged_force_is_half():
+    rest = torch.cat([_straight(), _straight() + torch.tensor([0.005, 0, 0])])
+    r, k = rods(rest), 60.0
+    pair = torch.arange(48).reshape(2, 24, 1).flip(0).to(torch.int32)
+    x = rest.clone()
+    x[1, :, 2] += 0.002
+    assert adhesion(x, r, pair, k)[0].item() == pytest.approx(k * 0.24 * 0.002**2)
+    assert adhesion(x, r, pair, k, rest_distance=False)[0].item() == pytest.approx(k * 0.24 * (0.002**2 + 0.005**2))
+    forces = []
+    for lagged in (False, True):
+        y = x.clone().requires_grad_()
+        adhesion(y, r, pair, k, lagged=lagged).sum().backward()
+        forces.append(y.grad)
+    torch.testing.assert_close(forces[0], 2 * forces[1])
+
+
+def test_the_kernel_is_normalised_and_ends_smoothly_at_twice_h():
+    radius = torch.linspace(0, 0.03, 20001, dtype=torch.float64)
+    shells = 4 * math.pi * radius**2 * volume.kernel(radius, 0.015)
+    assert torch.trapezoid(shells, radius).item() == pytest.approx(1.0, abs=1e-6)
+    assert volume.kernel(torch.tensor([0.03, 0.5]), 0.015).abs().max() < 1e-6
+    assert (volume.kernel(radius, 0.015).diff() <= 0).all()
+
+
+def test_a_subset_with_its_share_has_the_density_of_the_whole():
+    generator = torch.Generator().manual_seed(0)
+    many = torch.rand(2000, 1, 3, generator=generator, dtype=torch.float64) * 0.1
+    mass = torch.full((2000, 1), 0.01, dtype=torch.float64)
+    whole = volume.density(many, mass).mean()
+    part = volume.density(many[:500], mass[:500], share=0.25)
+    own = mass[0, 0] / 0.25 * volume.kernel(torch.tensor(0.0), volume.SMOOTHING)
+    alone = mass[0, 0] * volume.kernel(torch.tensor(0.0), volume.SMOOTHING)
+    assert (part - own).mean().item() == pytest.approx((whole - alone).item(), rel=0.1)
+
+
+def test_the_sum_names_only_what_acts(curls):
+    assert set(energies(curls, rods(curls), Surroundings())) == {"stretch", "bend_twist"}
+    around = Surroundings(
+        gravity=G,
+        planes=torch.zeros(4, 12, 4, dtype=torch.float64),
+        distance=torch.zeros(4, 12, dtype=torch.float64),
+        neighbours=_neighbours(),
+        rest_density=torch.ones(4, 12, dtype=torch.float64),
+        before=curls,
+        before2=curls,
+        moved_before=curls,
+    )
+    terms = energies(curls, rods(curls), around, Stiffness(style=10.0))
+    assert len(terms) == 9 and all(term.shape == (4,) for term in terms.values())
