@@ -29,7 +29,7 @@ def adhesion(
     Args:
         x: (..., S, K, 3) points in canonical space [m].
         rods: the strands at rest.
-        neighbours: (S, K, N) indices into the S K vertices, -1 for none (`locks.neighbours`).
+        neighbours: (..., S, K, N) indices into the S K vertices, -1 for none (`locks.neighbours`).
         stiffness: [1/s^2], a number or (..., S, 1).
         rest_distance: measure from the offset at rest.
         lagged: no gradient into the neighbours. Each pair counts in both its vertices, so with it the force is
@@ -39,10 +39,11 @@ def adhesion(
         (..., S) energy per unit line density [m^3/s^2].
     """
     present = neighbours >= 0
-    index = neighbours.clamp_min(0).long()
+    index = neighbours.clamp_min(0).long().flatten(-3)
     from_rest = x - rods.rest if rest_distance else x
-    others = (from_rest.detach() if lagged else from_rest).flatten(-3, -2)[..., index.flatten(), :]
-    others = others.reshape(*x.shape[:-3], *index.shape, 3)
+    flat = (from_rest.detach() if lagged else from_rest).flatten(-3, -2)
+    index = index.reshape(*(1,) * (flat.ndim - 1 - index.ndim), *index.shape, 1)
+    others = torch.take_along_dim(flat, index, -2).reshape(*x.shape[:-1], neighbours.shape[-1], 3)
     gap = (from_rest[..., None, :] - others).square().sum(-1) * present
     mean = gap.sum(-1) / present.sum(-1).clamp_min(1)
     return torch.sum(stiffness * rods.mass * mean, -1)

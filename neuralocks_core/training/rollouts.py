@@ -89,7 +89,7 @@ class Rollout:
 
 
 @dataclass(frozen=True)
-class _Draw:
+class Draw:
     """What chance decides of a rollout."""
 
     groom: int
@@ -107,38 +107,38 @@ class RolloutMaker:
     def __init__(self, scene: TrainingScene):
         self.scene = scene
         lowest = min(groom.rest[..., 1].min() for groom in scene.grooms)
-        self._body = hair_body(scene.character, reach=0.2 - float(lowest))
+        self.body = hair_body(scene.character, reach=0.2 - float(lowest))
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
-            self._surface = cKDTree(self._canonical(scene.character.body.points))
+            self._surface = cKDTree(self.canonical(scene.character.body.points))
 
     def make(self, index: int) -> Rollout:
         """Rollout number `index`."""
         from neuralocks_core.reference import simulate
 
         scene = self.scene
-        draw = self._draw(index)
+        draw = self.draw(index)
         joints = draw.clip.at(draw.times)
         groom = scene.grooms[draw.groom]
-        rest = self._fitted(groom.rest[draw.strands].astype(np.float64), draw.shape)
+        rest = self.fitted(groom.rest[draw.strands].astype(np.float64), draw.shape)
         shape = draw.shape
         result = simulate(
             rest,
             scene.character.canonical_to_world(joints),
-            None if self._body is None else posed_over_time(self._body, joints @ scene.character.inverse_bind, shape),
-            None if self._body is None else self._body.triangles,
+            None if self.body is None else posed_over_time(self.body, joints @ scene.character.inverse_bind, shape),
+            None if self.body is None else self.body.triangles,
             draw.material,
             dt=scene.spec.dt,
             substeps=scene.substeps,
             rest_support=scene.rest_support,
             neighbours=lock_mates(rest, groom.lock[draw.strands]),
-            bind_body=None if self._body is None else self._canonical(self._body.shaped(shape)),
+            bind_body=None if self.body is None else self.canonical(self.body.shaped(shape)),
         )
         moved = result.points - rest[None].astype(np.float32)
         planes = result.planes.copy()
         planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
-        vectors, bind = self._vectors(draw, scene.spec)
+        vectors, bind = self.vectors(draw, scene.spec)
         return Rollout(
             draw.groom,
             draw.strands,
@@ -153,24 +153,24 @@ class RolloutMaker:
 
     def reread(self, index: int, rollout: Rollout, spec: BoundarySpec) -> Rollout:
         """The same rollout as a network with another boundary history reads it; nothing is simulated again."""
-        vectors, bind = self._vectors(self._draw(index), spec)
+        vectors, bind = self.vectors(self.draw(index), spec)
         return replace(rollout, vectors=vectors, bind=bind)
 
-    def _draw(self, index: int) -> _Draw:
+    def draw(self, index: int) -> Draw:
         """All chance of a rollout, in one place and order."""
         rng = np.random.default_rng([self.scene.seed, self.scene.held_out, index])
         which = int(rng.integers(len(self.scene.grooms)))
         strands = self._locks(which, rng)
         material = Material.random(rng)
         shape = self._shape(rng)
-        return _Draw(which, strands, material, shape, *self._motion(rng, shape))
+        return Draw(which, strands, material, shape, *self._motion(rng, shape))
 
-    def _vectors(self, draw: _Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
+    def vectors(self, draw: Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
         sampler = BoundarySampler(spec, self.scene.character, draw.clip)
         log = draw.material.log_ratios()
         return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
 
-    def _canonical(self, points: np.ndarray) -> np.ndarray:
+    def canonical(self, points: np.ndarray) -> np.ndarray:
         """Canonical coordinates of bind-world points (n, 3)."""
         to_bind = self.scene.character.canonical_to_bind
         return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
@@ -208,7 +208,7 @@ class RolloutMaker:
             clip = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1)))
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 
-    def _fitted(self, rest: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    def fitted(self, rest: np.ndarray, shape: np.ndarray) -> np.ndarray:
         """Rest strands (n, 24, 3) on a body of another shape, as an artist would fit them.
 
         Roots follow the scalp; what lies on the body follows it, what hangs free follows its root.

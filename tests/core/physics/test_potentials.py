@@ -255,6 +255,13 @@ def test_the_style_fades_with_the_distance_to_the_body():
     assert hair_style(x, r, far, 7.0, 0.03).item() == pytest.approx(expected.item())
 
 
+def test_each_frame_of_a_batch_may_have_neighbours_of_its_own(curls):
+    r, x = rods(curls), torch.stack([_moved(curls, 1), _moved(curls, 2)])
+    both = torch.stack([_neighbours(), _neighbours().flip(-1)])
+    expected = torch.stack([adhesion(x[i], r, both[i]) for i in range(2)])
+    torch.testing.assert_close(adhesion(x, r, both), expected)
+
+
 def test_adhesion_by_hand_and_lagged_force_is_half():
     rest = torch.cat([_straight(), _straight() + torch.tensor([0.005, 0, 0])])
     r, k = rods(rest), 60.0
