@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work done behind the caller's back, in order, on one thread: writing while the next frame is computed."""
+
+import queue
+import threading
+
+
+class Behind:
+    """Runs calls one after another on a thread.
+
+    `put` waits while one call is running and another waits, so memory does not grow. The first error of a call is
+    raised from the next `put`, or at the end; later calls are then dropped.
+    """
+
+    def __init__(self, waiting: int = 1):
+        self._calls: queue.Queue = queue.Queue(waiting)
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name="write", daemon=True)
+
+    def put(self, function, *arguments) -> None:
+        """Queue a call."""
+        if self._error is not None:
+            raise self._error
+        self._calls.put((function, arguments))
+
+    def __enter__(self) -> "Behind":
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind, error, trace) -> None:
+        if kind is not None:
+            self._error = self._error or error  # what still waits is dropped
+        self._calls.put(None)
+        self._thread.join()
+        if kind is None and self._error is not None:
+            raise self._error
+
+    def _run(self) -> None:
+        while (call := self._calls.get()) is not None:
+            if self._error is None:
+                try:
+                    function, arguments = call
+                    function(*arguments)
+                except BaseException as error:
+                    self._error = error
+            call = arguments = None  # the arrays of a frame are freed before the next is waited for

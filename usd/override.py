@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, Vt
+
+from neuralocks_core.errors import NeuralocksError
+
+from .border import first_line
+from .stage import Shot, StageGroom
+
+SAVE_EVERY = 32 << 20
+"""Bytes of samples held before they are saved: memory does not grow with the number of frames."""
+
+
+class OverrideWriter:
+    """Writes samples, in the order they come, to a new crate file.
+
+    What the file holds depends on nothing but the shot and the samples: no date, no machine, no timing.
+
+    Args:
+        part: file to write now.
+        out: its final name, to which the shot's path is relative.
+        shot: what is overridden.
+        grooms: the grooms that get samples.
+        codes: all time codes of the bake.
+    """
+
+    def __init__(self, part: Path, out: Path, shot: Shot, codes: list[float]):
+        self._out = out
+        part.unlink(missing_ok=True)
+        with _named(out):
+            self._layer = Sdf.Layer.CreateNew(str(part), {"format": "usdc"})
+            self._metadata(shot, codes)
+        self._held = 0
+
+    def groom(self, item: StageGroom, velocities: bool) -> None:
+        """Open a groom: the overs, and what keeps it from being skinned a second time."""
+        layer, path = self._layer, item.prim.GetPath()
+        for above in path.GetPrefixes():
+            if item.prim.GetStage().GetPrimAtPath(above).IsInstance():
+                # What lies inside an instance cannot be overridden.
+                _over(layer, above).instanceable = False
+        over = _over(layer, path)
+        if item.attachment.skinned:
+            # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
+            if not item.prim.HasAPI("SkelBindingAPI"):
+                over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
+            relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
+            relation.targetPathList.ClearEditsAndMakeExplicit()
+        names = Sdf.ValueTypeNames
+        Sdf.AttributeSpec(over, "extent", names.Float3Array)
+        Sdf.AttributeSpec(over, "points", names.Point3fArray)
+        if velocities:
+            Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
+
+    def sample(self, item: StageGroom, time_code: float, points: np.ndarray, velocities: np.ndarray | None) -> None:
+        """Add one time sample."""
+        path = item.prim.GetPath()
+        pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
+        extent = np.stack([points.min(axis=0) - pad, points.max(axis=0) + pad])
+        values = {"extent": extent, "points": points, "velocities": velocities}
+        with _named(self._out):
+            for name, value in values.items():
+                if value is not None:
+                    # Flat arrays convert a fifth faster than rows of three.
+                    array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value).reshape(-1))
+                    self._layer.SetTimeSample(path.AppendProperty(name), float(time_code), array)
+                    self._held += value.nbytes
+            if self._held >= SAVE_EVERY:
+                self._save()
+
+    def close(self) -> None:
+        """Write what is held."""
+        with _named(self._out):
+            self._save()
+        self._layer = None
+
+    def _save(self) -> None:
+        self._layer.Save()
+        self._held = 0
+
+    def _metadata(self, shot: Shot, codes: list[float]) -> None:
+        layer, stage = self._layer, shot.stage
+        source = os.path.realpath(shot.path)
+        try:
+            relative = os.path.relpath(source, os.path.realpath(self._out.parent)).replace(os.sep, "/")
+        except ValueError:  # another drive
+            relative = source.replace(os.sep, "/")
+        if not relative.startswith((".", "/")) and ":" not in relative:
+            relative = f"./{relative}"
+        layer.subLayerPaths.append(relative)
+        root = layer.pseudoRoot
+        root.SetInfo("metersPerUnit", shot.border.metres_per_unit)
+        root.SetInfo("upAxis", shot.border.up_axis)
+        layer.timeCodesPerSecond = shot.border.rate
+        layer.framesPerSecond = stage.GetFramesPerSecond()
+        ranged = stage.HasAuthoredTimeCodeRange()
+        layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
+        layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
+        default = stage.GetDefaultPrim()
+        if not default:
+            default = next(iter(stage.GetPseudoRoot().GetChildren()))
+        layer.defaultPrim = default.GetName()
+
+
+def to_text(crate: Path, text: Path, out: Path) -> None:
+    """Convert an assembled crate file to .usda."""
+    with _named(out):
+        layer = Sdf.Layer.FindOrOpen(str(crate))
+        layer.Export(str(text))
+
+
+def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
+    return layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
+
+
+def _unit(item: StageGroom) -> float:
+    """Length of a unit of the prim's own space [m]."""
+    return float(np.cbrt(abs(np.linalg.det(item.attachment.to_bind[:3, :3]))))
+
+
+class _named:
+    """Turns USD's errors into one line that names the output."""
+
+    def __init__(self, out: Path):
+        self._out = out
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if kind is not None and issubclass(kind, Tf.ErrorException):
+            raise NeuralocksError(
+                f"{self._out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
+            ) from None
+        return False
+
+
+def used_files(stage: Usd.Stage) -> list[str]:
+    """Files that the stage is composed of."""
+    return sorted({layer.realPath for layer in stage.GetUsedLayers() if layer.realPath})

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Finished frames on disk beside the output, so that a killed bake goes on where it stopped."""
+
+import hashlib
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+try:
+    import fcntl
+except ImportError:  # Windows: two bakes of one output at a time are then not told apart
+    fcntl = None
+
+
+class Spool:
+    """A folder `.NAME.baking` next to the output, valid for one set of inputs.
+
+    Args:
+        out: the output file.
+        fingerprint: digest of everything the samples depend on; a spool of another one is thrown away.
+
+    Raises:
+        NeuralocksError: the folder cannot be written, or another bake is writing this output.
+    """
+
+    def __init__(self, out: Path, fingerprint: str):
+        self.out = out
+        self.folder = out.parent / f".{out.name}.baking"
+        try:
+            out.parent.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir(exist_ok=True)
+            self._lock = open(self.folder / "lock", "a+")
+            if fcntl is not None:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            raise NeuralocksError(
+                f"{out}: another bake is writing it; wait for that one or choose another name"
+            ) from None
+        except OSError as error:
+            raise cannot_write(out, error) from None
+        mark = self.folder / "inputs"
+        if not mark.is_file() or mark.read_text() != fingerprint:
+            for old in self.folder.glob("*.frame"):
+                old.unlink()
+            mark.write_text(fingerprint)
+        for stray in self.folder.glob("*.part*"):
+            stray.unlink()
+
+    @property
+    def layer_path(self) -> Path:
+        """Where the output is assembled."""
+        return self.folder / "assembled.part.usdc"
+
+    def read(self, groom: int, time_code: float, arrays: int, points: int) -> list[np.ndarray] | None:
+        """The arrays (points, 3) of a finished frame, or None."""
+        path = self._path(groom, time_code)
+        try:
+            if path.stat().st_size != arrays * points * 12:
+                return None
+            data = np.fromfile(path, np.float32).reshape(arrays, points, 3)
+        except OSError:
+            return None
+        return list(data)
+
+    def write(self, groom: int, time_code: float, arrays: list[np.ndarray]) -> None:
+        """Keep a finished frame."""
+        path = self._path(groom, time_code)
+        part = path.with_suffix(".part")
+        try:
+            with open(part, "wb") as file:
+                for array in arrays:
+                    file.write(np.ascontiguousarray(array, np.float32).data)
+            os.replace(part, path)
+        except OSError as error:
+            raise cannot_write(self.out, error) from None
+
+    def finish(self) -> None:
+        """Put the assembled layer under its final name and remove the rest."""
+        try:
+            os.replace(self.layer_path, self.out)
+        except OSError as error:
+            raise cannot_write(self.out, error) from None
+        self.discard()
+
+    def close(self) -> None:
+        """Leave the finished frames for a later bake to go on from."""
+        self._lock.close()
+
+    def discard(self) -> None:
+        """Remove the folder."""
+        self._lock.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _path(self, groom: int, time_code: float) -> Path:
+        return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+
+
+def fingerprint(files, values: dict) -> str:
+    """Digest of files (by name, size and time of change) and plain values."""
+    facts = []
+    for file in sorted(map(str, files)):
+        try:
+            stat = os.stat(file)
+            facts.append([file, stat.st_size, stat.st_mtime_ns])
+        except OSError:
+            facts.append([file, -1, -1])
+    return hashlib.sha256(json.dumps([facts, values], sort_keys=True).encode()).hexdigest()
+
+
+def cannot_write(path: Path, error: OSError) -> NeuralocksError:
+    """The one line for a file system that refuses."""
+    import errno
+
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return NeuralocksError(
+            f"{path}: no space left on the disk; free some, bake fewer frames or choose another folder"
+        )
+    return NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose a folder you can write to")
