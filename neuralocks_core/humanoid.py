@@ -194,7 +194,9 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
         for option in options:
             hits = [i for i in range(len(keys)) if sides[i] == side and keys[i] == option]
             if hits:
-                return min(hits, key=lambda i: (_depth(i, parents), i))
+                # `LHipJoint` over `LeftHip` is a mere socket at the pelvis: of several hips, the lowest is the thigh.
+                sign = -1 if option == "hip" else 1
+                return min(hits, key=lambda i: (sign * _depth(i, parents), i))
         return None
 
     found = {part: first(options) for part, options in PARTS.items()}

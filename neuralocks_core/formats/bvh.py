@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion capture in BVH files: skeleton and clip in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..character import Skeleton
+from ..errors import NeuralocksError
+from ..motion import Clip
+
+LARGEST_FILE = 256 * 2**20
+"""Bytes; an hour of motion at 120 frames a second is about that."""
+MOST_JOINTS = 2048
+LARGEST = 1e6
+"""No length in a file, in its own unit, is larger."""
+UNITS = (1.0, 0.01, 0.0254, 0.056444, 0.001)
+"""[m] Lengths that files come in; the fourth is the CMU library's (an inch over 0.45)."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a BVH file holds.
+
+    Attributes:
+        name: the file's stem.
+        skeleton: joints; the bind pose is the one with all rotations zero, its root where the file's offset says.
+        clip: world transforms of these joints.
+        unit: metres per unit of the file, as used.
+    """
+
+    name: str
+    skeleton: Skeleton
+    clip: Clip
+    unit: float
+
+
+def read_bvh(path: str | Path, unit: float | None = None, rate: float | None = None) -> Motion:
+    """Read a BVH file.
+
+    Args:
+        path: the file.
+        unit: metres per unit of the file; left out, the usual one that gives the skeleton a human height, or else
+            that which makes it 1.7 m high.
+        rate: frames a second, where the file's own is wrong.
+
+    Raises:
+        NeuralocksError: the file cannot be read, is truncated or malformed, or its values cannot be meant.
+    """
+    path = Path(path)
+    for name, value in (("unit", unit), ("rate", rate)):
+        if value is not None and not 1e-6 <= value <= 1e6:
+            raise NeuralocksError(f"{path}: a {name} of {value} cannot be meant; give a positive number")
+    words = _Words(path)
+    joints = _hierarchy(words)
+    frames, step = _motion_header(words, joints)
+    values = _values(words, frames, sum(len(joint.channels) for joint in joints))
+    step = step if rate is None else 1 / rate
+    unit = _likely_unit(joints) if unit is None else unit
+    skeleton, world = _forward(joints, values, unit)
+    first = _first_of_motion(world)
+    clip = Clip(np.arange(frames - first) * step, world[first:])
+    return Motion(path.stem, skeleton, clip, unit)
+
+
+@dataclass
+class _Joint:
+    name: str
+    parent: int
+    offset: np.ndarray
+    channels: tuple[str, ...] = ()
+    end: np.ndarray | None = None
+
+
+class _Words:
+    """The file's words one by one, with errors that name it."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        try:
+            if not path.is_file():
+                raise self.error("no such file", "check the path")
+            if path.stat().st_size > LARGEST_FILE:
+                raise self.error(f"larger than {LARGEST_FILE} bytes", "cut the take")
+            self.words = path.read_bytes().split()
+        except OSError as error:
+            raise self.error(f"cannot be read ({error.strerror})", "check its permissions") from None
+        self.place = 0
+
+    def error(self, fact: str, remedy: str = "export it again as BVH") -> NeuralocksError:
+        return NeuralocksError(f"{self.path}: {fact}; {remedy}")
+
+    def next(self) -> str:
+        if self.place >= len(self.words):
+            raise self.error("ends in the middle")
+        self.place += 1
+        return self.words[self.place - 1].decode("utf-8", "replace")
+
+    def expect(self, word: str) -> None:
+        found = self.next()
+        if found.lower() != word.lower():
+            raise self.error(f"'{found[:40]}' stands where '{word}' should")
+
+    def number(self) -> float:
+        word = self.next()
+        try:
+            value = float(word)
+        except ValueError:
+            raise self.error(f"'{word[:40]}' stands where a number should") from None
+        if not abs(value) <= LARGEST:
+            raise self.error(f"holds the number {word[:40]}")
+        return value
+
+    def count(self, highest: int, what: str) -> int:
+        value = self.number()
+        if value != int(value) or not 0 <= value <= highest:
+            raise self.error(f"says {value:g} {what}, where 0 to {highest} are possible")
+        return int(value)
+
+
+def _hierarchy(words: _Words) -> list[_Joint]:
+    words.expect("HIERARCHY")
+    joints: list[_Joint] = []
+    open_joints: list[int] = []
+    in_end = False
+    while True:
+        word = words.next()
+        key = word.upper()
+        if key == "MOTION" and not open_joints and joints:
+            return joints
+        if key in ("ROOT", "JOINT"):
+            if (key == "ROOT") == bool(open_joints) or in_end or len(joints) >= MOST_JOINTS:
+                raise words.error(f"joint {len(joints)} stands in a wrong place")
+            name = _name(words)
+            joints.append(_Joint(name, open_joints[-1] if open_joints else -1, np.zeros(3)))
+            open_joints.append(len(joints) - 1)
+        elif key == "END" and open_joints and not in_end:
+            in_end = True
+            while words.next() != "{":
+                pass
+        elif key == "OFFSET" and open_joints:
+            offset = np.array([words.number() for _ in range(3)])
+            if in_end:
+                joints[open_joints[-1]].end = offset
+            else:
+                joints[open_joints[-1]].offset = offset
+        elif key == "CHANNELS" and open_joints and not in_end:
+            channels = tuple(words.next().lower() for _ in range(words.count(6, "channels")))
+            if len(set(channels)) != len(channels) or not set(channels) <= _CHANNELS:
+                raise words.error(f"joint '{joints[open_joints[-1]].name}' has channels {' '.join(channels)[:80]}")
+            joints[open_joints[-1]].channels = channels
+        elif word == "}" and open_joints:
+            if not in_end:
+                open_joints.pop()
+            in_end = False
+        else:
+            raise words.error(f"'{word[:40]}' stands in the hierarchy")
+
+
+_CHANNELS = {f"{axis}{kind}" for axis in "xyz" for kind in ("position", "rotation")}
+
+
+def _name(words: _Words) -> str:
+    """A joint's name: all words up to the brace, without what joint paths cannot hold."""
+    parts = []
+    while (word := words.next()) != "{":
+        parts.append(word)
+    return "_".join(parts).replace("/", "_")[:200] or "joint"
+
+
+def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
+    words.expect("Frames:")
+    width = sum(len(joint.channels) for joint in joints)
+    left = len(words.words) - words.place - 3
+    if not width:
+        raise words.error("no joint has a channel")
+    frames = words.count(max(left // width, 0), "frames, of which the file holds fewer")
+    words.expect("Frame")
+    words.expect("Time:")
+    step = words.number()
+    if not frames:
+        raise words.error("holds no frame", "export the animated range")
+    if not 1e-5 < step < 100:
+        raise words.error(f"has a frame time of {step:g} s", "export it with the right rate")
+    return frames, step
+
+
+def _values(words: _Words, frames: int, width: int) -> np.ndarray:
+    block = words.words[words.place : words.place + frames * width]
+    try:
+        values = np.array(block).astype(float).reshape(frames, width)
+    except ValueError as error:
+        raise words.error(f"its frames hold what is no number ({str(error)[:80]})") from None
+    bad = ~(np.abs(values) <= LARGEST).all(axis=1)
+    if bad.any():
+        raise words.error(f"frame {bad.argmax()} holds NaN or too large a number", "repair the take")
+    return values
+
+
+def _likely_unit(joints: list[_Joint]) -> float:
+    """That unit in which the skeleton, legs and trunk stretched out, is as high as a person."""
+    rest = _rest(joints)
+    # From the lowest end of any chain to the highest, along the bones: bent or spread rest poses count in full.
+    length = np.zeros(len(joints))
+    up, down = [], []
+    for i, joint in enumerate(joints):
+        if joint.parent >= 0:
+            length[i] = length[joint.parent] + np.linalg.norm(joint.offset)
+        reach = length[i] + (0 if joint.end is None else np.linalg.norm(joint.end))
+        (up if rest[i, 1] >= rest[0, 1] else down).append(reach)
+    height = max(up, default=0) + max(down, default=0)
+    if not height > 0:
+        return 1.0
+    usual = [unit for unit in UNITS if 1.2 < 0.95 * height * unit < 2.4]
+    return usual[0] if usual else 1.7 / height
+
+
+def _rest(joints: list[_Joint]) -> np.ndarray:
+    rest = np.zeros((len(joints), 3))
+    for i, joint in enumerate(joints):
+        rest[i] = joint.offset + (rest[joint.parent] if joint.parent >= 0 else 0)
+    return rest
+
+
+def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> tuple[Skeleton, np.ndarray]:
+    """Skeleton, and world transforms (T, J, 4, 4) [m]."""
+    world = np.tile(np.eye(4), (len(values), len(joints), 1, 1))
+    column = 0
+    paths: list[str] = []
+    for i, joint in enumerate(joints):
+        channels = values[:, column : column + len(joint.channels)]
+        column += len(joint.channels)
+        place = np.tile(joint.offset, (len(values), 1))
+        axes, angles = "", []
+        for k, channel in enumerate(joint.channels):
+            if channel.endswith("position"):
+                place[:, "xyz".index(channel[0])] = channels[:, k]
+            else:
+                axes += channel[0].upper()
+                angles.append(channels[:, k])
+        local = np.tile(np.eye(4), (len(values), 1, 1))
+        local[:, :3, 3] = place * unit
+        if axes:
+            turn = np.stack(angles, axis=-1) if len(axes) > 1 else angles[0]
+            local[:, :3, :3] = Rotation.from_euler(axes, turn, degrees=True).as_matrix()
+        world[:, i] = local if joint.parent < 0 else world[:, joint.parent] @ local
+        path = joint.name if joint.parent < 0 else f"{paths[joint.parent]}/{joint.name}"
+        paths.append(path if path not in paths else f"{path}_{i}")
+    bind = np.tile(np.eye(4), (len(joints), 1, 1))
+    bind[:, :3, 3] = _rest(joints) * unit
+    return Skeleton(paths, [joint.parent for joint in joints], bind), world
+
+
+def _first_of_motion(world: np.ndarray) -> int:
+    """0, or 1 where the first frame is a T-pose from which the motion jumps away."""
+    if len(world) < 4:
+        return 0
+    cosine = (np.einsum("tjxy,tjxy->tj", world[1:, :, :3, :3], world[:-1, :, :3, :3]) - 1) / 2
+    jump = np.arccos(np.clip(cosine, -1, 1)).max(axis=1)
+    return int(jump[0] > 0.3 and jump[0] > 4 * jump[1:].max())

@@ -1,0 +1,122 @@
+"""BVH files give the motion they hold, and hostile ones one clear line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats.bvh import read_bvh
+
+REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "motion"
+
+TEXT = """HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT head
+  {
+    OFFSET 0 80 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 20 0
+    }
+  }
+  JOINT foot
+  {
+    OFFSET 0 -90 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+0 90 0  0 0 0  0 0 0  0 0 0
+10 90 0  90 0 30  0 90 0  0 0 0
+"""
+
+
+def written(folder, text=TEXT):
+    path = folder / "take.bvh"
+    path.write_text(text)
+    return path
+
+
+def test_channels_turn_in_the_order_in_which_they_stand(tmp_path):
+    motion = read_bvh(written(tmp_path))
+    assert motion.unit == 0.01 and motion.skeleton.names == ("hips", "hips/head", "hips/foot")
+    assert np.allclose(motion.clip.times, [0, 0.04])
+    assert np.allclose(motion.clip.joints[0, 1, :3, 3], [0, 1.7, 0])
+    # Z 90 degrees, then Y 30 about the axes so turned: Y goes to -X; X goes to Y, tipped by the second turn.
+    turn = motion.clip.joints[1, 0, :3, :3]
+    assert np.allclose(turn @ [0, 1, 0], [-1, 0, 0])
+    assert np.allclose(turn @ [1, 0, 0], [0, np.cos(np.pi / 6), -np.sin(np.pi / 6)])
+    assert np.allclose(motion.clip.joints[1, 1, :3, 3], [0.1 - 0.8, 0.9, 0])
+
+
+def test_unit_and_rate_can_be_given(tmp_path):
+    motion = read_bvh(written(tmp_path), unit=0.02, rate=50)
+    assert np.allclose(motion.skeleton.bind[1, :3, 3], [0, 1.6, 0])
+    assert np.allclose(motion.clip.times, [0, 0.02])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fact"),
+    [
+        ("Frames: 2", "Frames: 900000000000", "number 9"),
+        ("Frames: 2", "Frames: -1", "frames"),
+        ("Frames: 2", "Frames: 3", "frames"),
+        ("Frames: 2", "Frames: 0", "no frame"),
+        ("CHANNELS 3", "CHANNELS 1e9", "number 1e9"),
+        ("CHANNELS 3", "CHANNELS 7", "channels"),
+        ("Zrotation Xrotation Yrotation\n    End", "Zrotation Zrotation Yrotation\n    End", "channels"),
+        ("OFFSET 0 80 0", "OFFSET 0 nan 0", "number"),
+        ("OFFSET 0 80 0", "OFFSET 0 1e300 0", "number"),
+        ("0.04", "0", "frame time"),
+        ("10 90 0", "10 x 0", "no number"),
+        ("10 90 0", "10 inf 0", "frame 1"),
+        ("HIERARCHY", "MOTION", "HIERARCHY"),
+        ("}\nMOTION", "MOTION", "MOTION"),
+    ],
+)
+def test_what_cannot_be_meant_is_said_in_one_line(tmp_path, old, new, fact):
+    assert old in TEXT
+    with pytest.raises(NeuralocksError, match=fact) as caught:
+        read_bvh(written(tmp_path, TEXT.replace(old, new, 1)))
+    assert "take.bvh" in str(caught.value) and "\n" not in str(caught.value) and ";" in str(caught.value)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cut=st.integers(0, len(TEXT)), junk=st.binary(max_size=30))
+def test_truncated_and_spoilt_files_are_refused_or_read(tmp_path, cut, junk):
+    path = tmp_path / "spoilt.bvh"
+    path.write_bytes(TEXT.encode()[:cut] + junk + TEXT.encode()[cut + len(junk) :])
+    try:
+        read_bvh(path)
+    except NeuralocksError as error:
+        assert "spoilt.bvh" in str(error)
+
+
+def test_deep_hierarchies_do_not_overflow(tmp_path):
+    deep = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n" + "JOINT b\n{\n" * 100_000
+    with pytest.raises(NeuralocksError):
+        read_bvh(written(tmp_path, deep))
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the shared motion capture is not there")
+def test_real_files_are_people():
+    files = sorted(REAL.glob("*.bvh"))
+    assert files
+    for path in files:
+        motion = read_bvh(path)
+        assert 1.0 < np.ptp(motion.skeleton.bind[:, 1, 3]) < 2.2, path.name
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the shared motion capture is not there")
+def test_a_leading_t_pose_is_dropped():
+    assert len(read_bvh(REAL / "01_01.bvh").clip.times) == 2751
+    assert len(read_bvh(REAL / "02_01.bvh").clip.times) == 343
