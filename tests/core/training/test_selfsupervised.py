@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's training: its moments, its losses, and hair that learns to droop and to swing without a simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from neuralocks_core import rotation
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.character import Body, Character
+from neuralocks_core.physics.bend_twist import Cosserat
+from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.moment_losses import moment_losses
+from neuralocks_core.training.moments import MomentPool, nearest_planes, vertex_normals
+from neuralocks_core.training.networks import StrandNet, deform
+from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary, train_on_moments
+from tests.core.rigs import HEAD, bind, person
+from tests.core.training.test_train import straight_hair
+
+SPEC = BoundarySpec(bins=(1,) * 8)
+
+
+def _ball(radius=0.08):
+    """An octahedron cut finer, as (points, triangles)."""
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(3, radius)
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+def _headed():
+    points, triangles = _ball()
+    body = Body(
+        points + bind()[HEAD, :3, 3],
+        triangles,
+        np.full((len(points), 1), HEAD),
+        np.ones((len(points), 1)),
+        {"large": 0.1 * points},
+    )
+    return Character(person().skeleton, body)
+
+
+@pytest.fixture(scope="module")
+def pool():
+    pool = MomentPool(TrainingScene(_headed(), (straight_hair(),), spec=SPEC, frames=40, strands=16))
+    pool.grow(4)
+    return pool
+
+
+@pytest.fixture(scope="module")
+def inputs(pool):
+    groom = pool.scene.grooms[0]
+    return [strand_inputs(groom, np.random.default_rng(0).normal(size=(len(groom.rest), 32)))]
+
+
+def _net(pool, inputs, **options):
+    torch.manual_seed(0)
+    net = StrandNet(pool.scene.spec.size)
+    frames = np.concatenate([m.vectors for m in pool.moments])
+    history = pool.scene.spec.slices["history"]
+    net.set_normalisation(torch.from_numpy(inputs[0]), torch.from_numpy(frames), history, **options)
+    return net
+
+
+def _losses(net, pool, inputs, options, count=6, dynamics=1.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return moment_losses(net, *pool.batch(rng, count), inputs, pool.scene.spec, options, rng, dynamics)
+
+
+def _values(losses):
+    return {name: value.item() for name, value in losses.items()}
+
+
+def test_the_pool_is_the_same_for_the_same_scene(pool):
+    again = MomentPool(pool.scene)
+    again.grow(4)
+    assert len(again.moments) == len(pool.moments) > 8
+    for one, two in zip(pool.moments, again.moments):
+        np.testing.assert_array_equal(one.vectors, two.vectors)
+        np.testing.assert_array_equal(one.back, two.back)
+
+
+def test_hair_carried_rigidly_by_an_accelerating_head_feels_that_acceleration(pool):
+    """x - x^ of a point fixed to the head is the head's own second difference, which the history has as R^T (g - a)."""
+    gravity, history = SPEC.slices["gravity"], SPEC.slices["history"]
+    for moment in pool.moments:
+        origin = np.array([0.0, 0, 0, 1])
+        second = origin - 2 * moment.back[0] @ origin + moment.back[1] @ origin
+        felt = moment.gravity - second[:3] * 30**2
+        vector = moment.vectors[2]
+        if np.linalg.norm(felt - moment.gravity) < 5 * 9.81:  # the boundary limits what is beyond
+            np.testing.assert_allclose(vector[gravity] + vector[history][:3], felt / 9.81, atol=2e-3)
+
+
+def test_planes_are_outward_and_far_points_have_none():
+    from scipy.spatial import cKDTree
+
+    points, triangles = _ball()
+    normals = vertex_normals(points, triangles)
+    asked = np.array([[0.1, 0, 0], [0.07, 0, 0], [0.5, 0, 0]])
+    planes, distance = nearest_planes(cKDTree(points), normals, asked)
+    heights = (planes[:, :3] * asked).sum(1) - planes[:, 3]
+    np.testing.assert_allclose(heights[:2], [0.02, -0.01], atol=1e-3)
+    assert heights[2] > 100 and distance[2] == pytest.approx(0.42, abs=1e-3)
+
+
+def test_an_untrained_network_leaves_hair_at_rest_and_each_potential_is_there(pool, inputs):
+    net = _net(pool, inputs)
+    torch.nn.init.zeros_(net.out.weight)
+    losses = _values(_losses(net, pool, inputs, SelfSupervisedOptions(style=(100.0,))))
+    assert set(losses) == {
+        *("stretch", "bend_twist", "gravity", "inertia", "inertia_past", "damping"),
+        *("body_collision", "self_collision", "hair_style", "adhesion"),
+    }
+    for name in ("stretch", "bend_twist", "gravity", "hair_style", "adhesion"):
+        assert abs(losses[name]) < 1e-5, name
+    assert losses["inertia"] > 1e-4
+
+
+def test_each_choice_changes_what_is_minimised(pool, inputs):
+    net = _net(pool, inputs)
+    options = SelfSupervisedOptions(random_materials=False)
+    base = _losses(net, pool, inputs, options)
+    assert "inertia_past" not in _losses(net, pool, inputs, replace(options, undetached=0.0))
+    static = _losses(net, pool, inputs, replace(options, static=True))
+    assert not {"inertia", "damping"} & set(static)
+    direct = _losses(net, pool, inputs, replace(options, form=Cosserat.DIRECT))
+    assert not torch.isclose(direct["bend_twist"], base["bend_twist"], rtol=1e-6)
+    free = _losses(net, pool, inputs, replace(options, output="displacement"))
+    assert free["stretch"] > 10 * base["stretch"]
+    heavy = _losses(net, pool, inputs, replace(options, random_materials=True), seed=1)
+    assert not torch.isclose(heavy["gravity"], base["gravity"])
+
+
+def test_a_past_that_is_not_detached_changes_the_gradient(pool, inputs):
+    net, grads = _net(pool, inputs), []
+    for past in (0.0, 8.0):
+        net.zero_grad()
+        options = SelfSupervisedOptions(undetached=past, random_materials=False)
+        sum(_losses(net, pool, inputs, options).values()).backward()
+        grads.append(net.frame.weight.grad.clone())
+    assert all(g.isfinite().all() for g in grads) and not torch.allclose(*grads)
+
+
+def _answer(net, groom, inputs, vector, bind_vector):
+    with torch.no_grad():
+        offsets = net(torch.from_numpy(inputs[0]), torch.from_numpy(np.stack([vector, bind_vector])))
+        return deform(offsets[0], torch.from_numpy(groom.rest), offsets[1]).numpy()
+
+
+def test_hair_learns_gravity_and_to_trail_without_any_simulation(pool, inputs):
+    """A bowed head: hair swings to hang along gravity. A head that speeds up to the left: hair trails to its right."""
+    net, scene = _net(pool, inputs), pool.scene
+    options = SelfSupervisedOptions(steps=250, poses=8, pool=len(pool.moments), volume=0.0, rate=3e-3)
+    for state in train_on_moments(pool, inputs, net, options):
+        assert np.isfinite(list(state["losses"].values())).all()
+    bind_vector = pool.hair[0].bind.copy()
+    bind_vector[SPEC.slices["material"]] = 0
+    tilted = bind_vector.copy()
+    turn = rotation.from_vector(np.array([0.0, 0.0, 0.5]))
+    tilted[SPEC.slices["gravity"]] = turn.T @ [0, -1, 0]
+    droop = _answer(net, scene.grooms[0], inputs, tilted, bind_vector)[:, -1]
+    assert (droop @ (turn.T @ [0, -1, 0] - np.array([0, -1, 0]))).mean() > 0.01
+    pushed = bind_vector.copy()
+    pushed[SPEC.slices["history"]].reshape(8, -1)[:3, 0] = -0.7
+    trail = _answer(net, scene.grooms[0], inputs, pushed, bind_vector)[:, -1, 0].mean()
+    assert trail < -0.002
+
+
+def test_the_papers_own_settings_train(pool, inputs):
+    options = SelfSupervisedOptions.paper(steps=3, poses=2, pool=1)
+    assert options.output == "displacement" and options.undetached == 0 and options.form is Cosserat.DIRECT
+    assert paper_boundary().steps == 30
+    paper_pool = MomentPool(pool.scene, supported=False, nearest_vertices=True)
+    paper_pool.grow()
+    assert not paper_pool.hair[0].rods.support.any()
+    states = list(train_on_moments(paper_pool, inputs, _net(pool, inputs), options))
+    assert states[-1]["done"] == 1.0 and states[-1]["step"] == 3
