@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A library of hairstyles that grow on any scalp."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import NeuralocksError
+from ..groom import Groom
+from ..strands import root_uv
+from . import loose, tied
+from .growth import Site, evenly, march
+from .obstacle import Obstacle
+from .scalp import Scalp, from_head
+from .shaping import Shape, shaped
+
+STYLES = (*loose.STYLES, *tied.STYLES)
+"""Names of the styles that `grow` knows."""
+
+MOST_STRANDS = 150_000
+
+__all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "from_head", "grow"]
+
+_STEPS = 24
+"""Vertices of a strand before it is waved or curled."""
+
+_ROOT_WIDTH, _TIP_WIDTH = 9e-5, 5e-5  # [m], real hair
+
+
+def grow(
+    style: str,
+    scalp: Scalp,
+    count: int,
+    seed: int = 0,
+    body: tuple[np.ndarray, np.ndarray] | Obstacle | None = None,
+) -> Groom:
+    """Grow a hairstyle.
+
+    Args:
+        style: one of `STYLES`.
+        scalp: where hair grows, in bind space.
+        count: how many strands, 1 to 150,000.
+        seed: the same one gives the same groom.
+        body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made of them,
+            which is worth keeping for several styles; without one, a usual head, neck and shoulders.
+
+    Raises:
+        NeuralocksError: an unknown style, or a strand count out of range.
+    """
+    if style not in STYLES:
+        raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
+    if not 1 <= count <= MOST_STRANDS:
+        raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
+    random = np.random.default_rng(seed)
+    obstacle = body if isinstance(body, Obstacle) else Obstacle(scalp, body)
+    size = scalp.radius / 0.1
+    chosen = loose.STYLES.get(style) or tied.STYLES[style]
+    site = _site(chosen, scalp, count, random, size)
+    if style in loose.STYLES:
+        axis = march(site, chosen.plan(site), scalp, obstacle, _STEPS)
+    else:
+        axis = tied.gathered(site, chosen, scalp, obstacle, chosen.shape.vertices)
+    points = shaped(axis, site, chosen.shape, obstacle, size)
+    if chosen.shape.vertices == _STEPS:
+        points = evenly(points, _STEPS).astype(np.float32)
+        points[:, 0] = axis[:, 0]
+    vertices = points.shape[1]
+    width = np.linspace(_ROOT_WIDTH, _TIP_WIDTH, vertices, dtype=np.float32)
+    guides = np.zeros(count, bool)
+    guides[site.guide] = True
+    return Groom(
+        name=style,
+        points=points.reshape(-1, 3),
+        counts=np.full(count, vertices, np.int32),
+        widths=np.tile(width, count),
+        root_uv=root_uv(site.roots.place, scalp.head_centre),
+        guides=guides,
+    )
+
+
+def _site(
+    style: loose.Loose | tied.Tied, scalp: Scalp, count: int, random: np.random.Generator, size: float
+) -> Site:
+    roots = scalp.roots(count, random)
+    density = getattr(style, "density", None)
+    if density is not None:
+        many = scalp.roots(4 * count, random)
+        chance = density((many.place - scalp.head_centre) / scalp.radius)
+        kept = np.argsort(random.random(4 * count) / np.maximum(chance, 1e-6), kind="stable")[:count]
+        roots = type(roots)(many.place[kept], many.normal[kept], many.border[kept])
+    clumps = int(np.clip(scalp.area / (style.shape.clump_spacing * size) ** 2, 1, count))
+    guides = np.arange(clumps)  # roots come in random order: the first ones are as good as any
+    nearest = cKDTree(roots.place[guides]).query(
+        roots.place + 0.15 * style.shape.clump_spacing * size * random.normal(size=(count, 3))
+    )[1]
+    nearest[guides] = guides
+    return Site(
+        roots=roots,
+        seen=(roots.place - scalp.head_centre) / scalp.radius,
+        clump=nearest,
+        guide=guides[nearest],
+        of_clump=random.random((clumps, 4))[nearest],
+        own=random.random((count, 4)),
+    )

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What hair must not grow into: signed distance to head, neck and shoulders on a grid, quick to ask."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import NeuralocksError
+from .scalp import Scalp
+
+_CELL = 0.08
+"""Grid spacing in head radii (7 mm on an adult)."""
+
+
+class Obstacle:
+    """Signed distance around the head, sampled on a grid once and interpolated linearly.
+
+    Args:
+        scalp: gives the head's place and size.
+        body: points (V, 3) [m] and triangles (F, 3) of the body or head in bind space; without one, a head,
+            neck and shoulders of usual proportions stand in.
+    """
+
+    def __init__(self, scalp: Scalp, body: tuple[np.ndarray, np.ndarray] | None = None) -> None:
+        radius, centre = scalp.radius, scalp.head_centre
+        self._low = centre - radius * np.array([3.2, 7.0, 3.0])
+        high = centre + radius * np.array([3.2, 2.2, 3.0])
+        self._step = _CELL * radius
+        axes = [np.arange(a, b, self._step) for a, b in zip(self._low, high, strict=True)]
+        self._shape = np.array([len(axis) for axis in axes])
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        if body is None:
+            distance = _stand_in(grid, scalp)
+        else:
+            distance = _to_surface(grid, *body)
+        field = distance.reshape(self._shape)
+        slope = np.stack(np.gradient(field, self._step), axis=-1)
+        self._field = np.concatenate([field[..., None], slope], axis=-1).astype(np.float32).reshape(-1, 4)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distance [m] (N,), negative inside, and the unit direction out (N, 3).
+
+        Args:
+            points: (N, 3) [m]; outside the grid the nearest value on its border is taken.
+        """
+        at = (points - self._low) / self._step
+        at = np.clip(at, 0.0, self._shape - 1.001).astype(np.float32)
+        cell = at.astype(np.int64)
+        part = at - cell
+        stride = np.array([self._shape[1] * self._shape[2], self._shape[2], 1])
+        first = cell @ stride
+        total = np.zeros((len(points), 4), np.float32)
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.ones(len(points), np.float32)
+            for axis, upper in enumerate(corner):
+                weight *= part[:, axis] if upper else 1 - part[:, axis]
+            total += weight[:, None] * self._field.take(first + corner @ stride, axis=0)
+        slope = total[:, 1:]
+        return total[:, 0], slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-6)
+
+    def push_out(self, points: np.ndarray, margin: np.ndarray | float) -> np.ndarray:
+        """Points (N, 3) moved to at least `margin` [m] (N,) from the surface, along the way out."""
+        distance, out = self.distance(points)
+        return points + np.maximum(margin - distance, 0.0)[:, None] * out
+
+
+def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(N,) signed distance to a mesh by its nearest corner or face middle.
+
+    Near the surface the distance is that to the sample's tangent plane. That is coarser than
+    `collider.Collider` and many times faster; grown hair keeps some millimetres away.
+    """
+    points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
+    if (
+        not len(triangles)
+        or triangles.min() < 0
+        or triangles.max() >= len(points)
+        or not np.isfinite(points).all()
+    ):
+        raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
+    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    face = np.cross(b - a, c - a)
+    normal = np.zeros_like(points)
+    for corner in range(3):
+        np.add.at(normal, triangles[:, corner], face)
+    used = np.unique(triangles)
+    sample = np.concatenate([points[used], (a + b + c) / 3])
+    normal = np.concatenate([normal[used], face])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    low, high = grid.min(axis=0) - 0.1, grid.max(axis=0) + 0.1
+    inside = ((sample > low) & (sample < high)).all(axis=1)
+    if not inside.any():
+        raise NeuralocksError("body: none of its mesh lies near the scalp; give both in the same space")
+    sample, normal = sample[inside], normal[inside]
+    distance, nearest = cKDTree(sample).query(grid, workers=-1)
+    plane = ((grid - sample[nearest]) * normal[nearest]).sum(axis=1)
+    flat = np.clip(2.0 - distance / 0.006, 0.0, 1.0)  # the plane's up to 6 mm away, the sample's beyond 12 mm
+    return np.where(plane < 0, -1.0, 1.0) * (flat * np.abs(plane) + (1 - flat) * distance)
+
+
+def _stand_in(points: np.ndarray, scalp: Scalp) -> np.ndarray:
+    """(N,) about the signed distance to an ellipsoid head fitted to the scalp, a neck and shoulders."""
+    radius = scalp.radius
+    p = points - scalp.head_centre
+    own = scalp.points[np.unique(scalp.triangles)] - scalp.head_centre
+    # Semi-axes that put the scalp's points on the ellipsoid in the least-squares sense.
+    inverse = np.linalg.lstsq(own**2, np.ones(len(own)), rcond=None)[0]
+    axes = np.where(inverse > 0, 1 / np.sqrt(np.maximum(inverse, 1e-9)), radius).clip(
+        0.7 * radius, 1.4 * radius
+    )
+    scaled = np.linalg.norm(p / axes, axis=1)
+    head = scaled * (scaled - 1) / np.maximum(np.linalg.norm(p / axes**2, axis=1), 1e-9)
+    head = np.where(scaled < 0.3, -0.7 * radius, head)
+    neck = _capsule(p, [0, -0.5 * radius, -0.1 * radius], [0, -2.4 * radius, -0.4 * radius], 0.52 * radius)
+    shoulders = _capsule(
+        p,
+        [-1.6 * radius, -3.0 * radius, -0.4 * radius],
+        [1.6 * radius, -3.0 * radius, -0.4 * radius],
+        0.6 * radius,
+    )
+    trunk = _capsule(p, [0, -3.4 * radius, -0.2 * radius], [0, -8 * radius, -0.2 * radius], 1.1 * radius)
+    return np.minimum(np.minimum(head, neck), np.minimum(shoulders, trunk))
+
+
+def _capsule(p: np.ndarray, a: list[float], b: list[float], radius: float) -> np.ndarray:
+    a, along = np.asarray(a), np.asarray(b) - np.asarray(a)
+    share = np.clip((p - a) @ along / (along @ along), 0.0, 1.0)
+    return np.linalg.norm(p - a - share[:, None] * along, axis=1) - radius

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The skin that hair grows from, and where on it the roots stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import NeuralocksError
+
+# The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
+# forehead, up is in skull heights from the head's centre. From the nape behind and over the ear, the
+# sideburn, to the forehead; read off a statistical head, on others at least plausible.
+_HAIRLINE = np.array(
+    [
+        *[(-1.0, -0.85), (-0.42, -0.80), (-0.22, -0.46)],
+        *[(-0.17, 0.02), (0.155, 0.03)],
+        *[(0.20, -0.14), (0.38, -0.10)],
+        *[(0.52, 0.23), (0.71, 0.47), (0.91, 0.54), (1.1, 0.56)],
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Scalp:
+    """Triangles that carry hair, in bind space: metres, Y up, face +Z."""
+
+    points: np.ndarray
+    """(V, 3) float64 [m]; may be the whole body's, only the triangles count."""
+    triangles: np.ndarray
+    """(F, 3) int, outward."""
+    head_centre: np.ndarray
+    """(3,) float64 [m], middle of the skull."""
+
+    def __post_init__(self) -> None:
+        points = np.asarray(self.points, np.float64)
+        triangles = np.asarray(self.triangles)
+        centre = np.asarray(self.head_centre, np.float64)
+        if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
+            raise NeuralocksError("scalp: is not points (V, 3) and triangles (F, 3); give a triangle mesh")
+        if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
+            raise NeuralocksError(
+                "scalp: has no triangles or names points that are not there; mark the scalp again"
+            )
+        if not np.isfinite(points[triangles]).all() or centre.shape != (3,) or not np.isfinite(centre).all():
+            raise NeuralocksError("scalp: its points or its centre are not finite; repair the mesh")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "triangles", triangles.astype(np.int64))
+        object.__setattr__(self, "head_centre", centre)
+        if not self.area > 1e-6:
+            raise NeuralocksError(
+                f"scalp: its area is {self.area:g} m^2; mark a larger one or check the unit"
+            )
+
+    @property
+    def area(self) -> float:
+        """[m^2]."""
+        return float(self._areas.sum())
+
+    @property
+    def radius(self) -> float:
+        """Size of the head [m]: mean distance of the scalp from the head's centre, about 0.1 for an adult."""
+        middle = self.points[self.triangles].mean(axis=1)
+        distance = np.linalg.norm(middle - self.head_centre, axis=1)
+        return float(np.average(distance, weights=self._areas))
+
+    @property
+    def _areas(self) -> np.ndarray:
+        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
+        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+    def roots(self, count: int, random: np.random.Generator) -> Roots:
+        """`count` roots spread evenly over the scalp, thinning out towards its border.
+
+        Args:
+            count: how many.
+            random: draws the places.
+        """
+        areas = self._areas
+        corners = self.points[self.triangles]
+        # One draw in each of equally large pieces of area: much more even than independent draws.
+        at = (np.arange(2 * count) + random.random(2 * count)) / (2 * count) * areas.sum()
+        triangle = np.minimum(np.searchsorted(np.cumsum(areas), at), len(areas) - 1)
+        u, v = random.random((2, len(triangle)))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        weight = np.stack([1 - u - v, u, v], axis=1)
+        place = np.einsum("nc,nci->ni", weight, corners[triangle])
+        # A real hairline is ragged: hair thins out over its last centimetre.
+        border = self._border_distance(place) / (0.1 * self.radius)
+        chance = np.clip(0.12 + border, 0.0, 1.0)
+        order = np.argsort(random.random(len(place)) / chance, kind="stable")[:count]
+        order.sort()
+        order = random.permutation(order)
+        normals = self._normals()[self.triangles[triangle[order]]]
+        normal = np.einsum("nc,nci->ni", weight[order], normals)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        return Roots(place[order], normal, border[order] * 0.1 * self.radius)
+
+    def _border_distance(self, places: np.ndarray) -> np.ndarray:
+        """(N,) distance [m] to the scalp's edge; large where it has none."""
+        edges = np.sort(
+            np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        )
+        edge, uses = np.unique(edges, axis=0, return_counts=True)
+        edge = edge[uses == 1]
+        if not len(edge):
+            return np.full(len(places), np.inf)
+        share = np.linspace(0.0, 1.0, 8)[:, None, None]
+        line = (self.points[edge[:, 0]] * (1 - share) + self.points[edge[:, 1]] * share).reshape(-1, 3)
+        return cKDTree(line).query(places)[0]
+
+    def _normals(self) -> np.ndarray:
+        """(V, 3) unit normals of the points; zero off the scalp."""
+        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
+        face = np.cross(b - a, c - a)
+        normal = np.zeros_like(self.points)
+        for corner in range(3):
+            np.add.at(normal, self.triangles[:, corner], face)
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """Where strands begin."""
+
+    place: np.ndarray
+    """(S, 3) [m]."""
+    normal: np.ndarray
+    """(S, 3) unit, out of the skin."""
+    border: np.ndarray
+    """(S,) distance to the hairline [m]."""
+
+
+def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray) -> Scalp:
+    """Mark a plausible scalp on a head: above the hairline, the crown and the back down to the nape.
+
+    Args:
+        points: (V, 3) [m], bind space, Y up, face +Z; of the head or the whole body.
+        triangles: (F, 3) int, outward.
+        head_centre: (3,) [m], middle of the skull.
+
+    Raises:
+        NeuralocksError: nothing of the mesh lies where a scalp would be.
+    """
+    points = np.asarray(points, np.float64)
+    triangles = np.asarray(triangles, np.int64)
+    head_centre = np.asarray(head_centre, np.float64)
+    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    middle = (a + b + c) / 3 - head_centre
+    # The skull's radius: up from its centre, where nothing but skull lies.
+    above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06) & (middle[:, 1] > 0)
+    if not above.any():
+        raise NeuralocksError("scalp: no mesh lies above the head's centre; mark the scalp by hand")
+    radius = float(middle[above, 1].max())
+    seen = middle / radius
+    skull = seen[(seen[:, 1] > 0.35) & (np.linalg.norm(seen, axis=1) < 1.5)]
+    back, front = skull[:, 2].min(), skull[:, 2].max()
+    forward = (2 * seen[:, 2] - front - back) / max(front - back, 1e-9)
+    up = np.interp(forward, _HAIRLINE[:, 0], _HAIRLINE[:, 1])
+    outward = (np.cross(b - a, c - a) * middle).sum(axis=1) > 0
+    # Ears stick out sideways below the hairline's arch; the eyeballs and the mouth lie too deep.
+    size = np.linalg.norm(seen, axis=1)
+    ear = (np.abs(seen[:, 0]) > 0.78) & (seen[:, 1] < 0.05)
+    chosen = (seen[:, 1] > up) & outward & (size > 0.6) & (size < 1.5) & ~ear
+    if not chosen.any():
+        raise NeuralocksError("scalp: nothing of the mesh lies above the hairline; mark the scalp by hand")
+    return Scalp(points, triangles[chosen], head_centre)
