@@ -22,10 +22,10 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
+from neuralocks_core.training.lessons import normalise, samples
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
-from neuralocks_core.training.train import normalise
 
 SPEC = BoundarySpec()
 ROWS = {
@@ -72,7 +72,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollo
                     inputs[:, 34:66] = 0
         torch.manual_seed(options.seed)
         net = StrandNet(spec.size, motion=options.motion)
-        normalise(net, banks["rollouts"], spec, options)
+        normalise(net, *samples(banks["rollouts"]), spec.slices["history"], options.static)
         *_, state = regress(banks["rollouts"], net, options, list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
         print(f"| {row} | {state['step']} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)

@@ -23,7 +23,7 @@ class RolloutFarm:
     """
 
     def __init__(self, scene: TrainingScene, folder: Path, count: int, processes: int = 1):
-        self.folder = Path(folder)
+        self.folder, self.count = Path(folder), count
         self.folder.mkdir(parents=True, exist_ok=True)
         context = multiprocessing.get_context("spawn")
         self._processes = [

@@ -55,18 +55,32 @@ class Gauge:
         return {name: round(value, 4) for name, value in asdict(self).items()}
 
 
-def measure(net: StrandNet, bank: RolloutBank, output: str = "direction", history: slice | None = None) -> Gauge:
-    """Compare the network with all rollouts of a held-out bank."""
+def measure(
+    net: StrandNet,
+    bank: RolloutBank,
+    output: str = "direction",
+    history: slice | None = None,
+    anchored: bool = True,
+) -> Gauge:
+    """Compare the network with all rollouts of a held-out bank.
+
+    Args:
+        net: the network.
+        bank: rollouts that it never saw.
+        output: see `networks.deform`.
+        history: where the history lies in the boundary vector.
+        anchored: its answer for the held bind pose is subtracted.
+    """
     sums = {name: [] for name in ("position", "rigid", "static")}
     motion, motion_static, speeds, ways, wrong, deep = [], [], [], [], [], []
     for rollout in bank.rollouts:
         target = rollout.moved[rollout.first :].astype(np.float32) * STEP
         length = bank.lengths[rollout.groom][rollout.strands][:, None]
-        answer = predicted(net, bank, rollout, output)[rollout.first :]
+        answer = predicted(net, bank, rollout, output, anchored)[rollout.first :]
         held = rollout.vectors.copy()
         if history is not None:
             held[:, history] = 0
-        still = predicted(net, bank, replace(rollout, vectors=held), output)[rollout.first :]
+        still = predicted(net, bank, replace(rollout, vectors=held), output, anchored)[rollout.first :]
         for name, error in (("position", answer - target), ("rigid", target), ("static", still - target)):
             sums[name].append(100 * (np.linalg.norm(error, axis=-1) / length).mean())
         swing = _swing(target)

@@ -191,7 +191,9 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
 
 
 @torch.no_grad()
-def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str = "direction") -> np.ndarray:
+def predicted(
+    net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str = "direction", anchored: bool = True
+) -> np.ndarray:
     """The network's displacement (T, n, 24, 3) float32 [m] over a whole rollout."""
     chosen = rollout.strands
     device = next(net.parameters()).device
@@ -200,7 +202,7 @@ def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str =
     offsets = net.tail(strands[None], net.frame_part(frames)[:, None])
     offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
     rest = torch.from_numpy(rollout.rest).to(device)
-    return deform(offsets[:-1], rest, offsets[-1:], output).cpu().numpy()
+    return deform(offsets[:-1], rest, offsets[-1:] if anchored else None, output).cpu().numpy()
 
 
 def _norm(vectors: Tensor) -> Tensor:

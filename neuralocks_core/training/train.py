@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training a strand model in one command: strand codes, rollouts made alongside, the network, the model file."""
+"""Training a strand model in one command: strand codes, what is learned from, the network, the model file."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
@@ -21,12 +21,12 @@ from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoen
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import measure
+from neuralocks_core.training.lessons import lesson, normalise, wait
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
+from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.selfsupervised import SelfSupervisedOptions
 
-FIRST = 24
-"""Rollouts to wait for before the network starts: enough to normalise its inputs by."""
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
 SAVE_EVERY = 45.0
@@ -36,7 +36,7 @@ SAVE_EVERY = 45.0
 def train_strands(
     scene: TrainingScene,
     out: str | Path,
-    options: RegressionOptions | None = None,
+    options: RegressionOptions | SelfSupervisedOptions | None = None,
     *,
     rollouts: int = 1200,
     processes: int = 1,
@@ -47,12 +47,13 @@ def train_strands(
     command: str = "",
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Path:
-    """Train on rollouts of the solver and write a model file.
+    """Train on rollouts of the solver, or on the physics of random moments, and write a model file.
 
     Args:
         scene: character, grooms, motion.
         out: the model file to write, `*.neuralocks`.
-        options: budget and settings of the network's training.
+        options: budget and settings of the network's training; their kind chooses the way: RegressionOptions
+            for rollouts, SelfSupervisedOptions for the paper's.
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
         processes: that make rollouts; the network's training uses what is left.
         work: folder for checkpoint and rollouts; `OUT.training` beside the model where left out.
@@ -80,17 +81,19 @@ def train_strands(
     torch.set_num_threads(max(1, torch.get_num_threads() - processes))
     report = _Reporter(progress)
     scene_out = replace(scene, held_out=True)
+    count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
     with (
-        RolloutFarm(scene, work / "rollouts", rollouts, processes) as farm,
+        RolloutFarm(scene, work / "rollouts", count, processes if count else 0) as farm,
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
         coder = _coder(scene, work, options, report)
         codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
-        bank, held = RolloutBank(scene, codes), RolloutBank(scene_out, codes)
-        _wait(farm, min(FIRST, rollouts), report)
-        bank.add(farm.files())
-        net = StrandNet(scene.spec.size, bank.inputs[0].shape[1], motion=options.motion)
-        normalise(net, bank, scene.spec, options)
+        teacher, held = lesson(scene, codes, options, farm, report), RolloutBank(scene_out, codes)
+        history = scene.spec.slices["history"]
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(options.seed)
+            net = StrandNet(scene.spec.size, teacher.inputs[0].shape[1], motion=options.motion)
+        normalise(net, *teacher.samples(), history, options.static)
         meta = {"step": 0, "done": 0.0, "seconds": 0.0}
         modules = {"net": net}
         if resume:
@@ -101,50 +104,44 @@ def train_strands(
         def refill(optimiser):
             return checkpoint.load(saved, modules, optimiser)
 
-        for state in regress(bank, net, options, farm.files, resume=refill if resume else None):
+        def look():
+            held.add(held_farm.files())
+            return measure(net, held, options.output, history, teacher.anchored) if held.rollouts else None
+
+        for state in teacher.train(net, refill if resume else None):
             if farm.failed() or held_farm.failed():
                 raise NeuralocksError(
                     "training: the solver's process ended early; free some memory and go on with --resume"
                 )
             now = time.monotonic()
-            if (
-                now - last > SAVE_EVERY
-                or state["done"] >= 1.0
-                or (gauge is None and len(held_farm.files()) >= HELD_OUT)
-            ):
-                last = now
-                held.add(held_farm.files())
-                if held.rollouts:
-                    net.eval()
-                    gauge = measure(net, held, options.output, scene.spec.slices["history"])
-                    net.train()
+            first = gauge is None and len(held_farm.files()) >= HELD_OUT
+            if now - last > SAVE_EVERY or state["done"] >= 1.0 or first:
+                last, gauge = now, look()
                 meta = {"step": state["step"], "done": state["done"], "seconds": now - began}
                 checkpoint.save(saved, meta, modules, state["optimiser"])
             losses = " ".join(f"{name} {value:.4f}" for name, value in state["losses"].items())
-            report(state["done"], f"{state['step']} steps, {len(bank.rollouts)} rollouts; {gauge or losses}")
+            report(state["done"], f"{state['step']} steps, {teacher.told()}; {gauge or losses}")
         if gauge is None:
-            _wait(held_farm, HELD_OUT, report)
-            held.add(held_farm.files())
-            gauge = measure(net, held, options.output, scene.spec.slices["history"])
+            wait(held_farm, HELD_OUT, report)
+            gauge = look()
     card = {
         "command": command,
         "seed": scene.seed,
-        "method": "regression on rollouts of the reference solver",
+        "method": teacher.method,
         "minutes": round(meta["seconds"] / 60, 1),
         "steps": meta["step"],
-        "rollouts": len(bank.rollouts),
-        "solver residual": float(np.median([r.residual for r in bank.rollouts])),
+        **teacher.card(),
         "strands": [int(groom.valid.sum()) for groom in scene.grooms],
         "strand code error [mm]": round(
             float(np.mean([1e3 * coder.errors(scalp_local(g)[g.valid]).mean() for g in scene.grooms])), 2
         ),
-        "options": asdict(options),
+        "options": asdict(options, dict_factory=_plain),
     }
     description = {
         "kind": "strands",
         "boundary": scene.spec.to_json(),
         "output": options.output,
-        "anchored": True,
+        "anchored": teacher.anchored,
         "static": options.static,
         "training": card,
         "report": {"held out": gauge.to_json()},
@@ -167,7 +164,7 @@ class _Reporter:
             self._progress(int(1000 * done), 1000, message)
 
 
-def _coder(scene, work: Path, options: RegressionOptions, report) -> StrandAutoencoder:
+def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
     """The strand autoencoder: trained once, kept for a resumed run."""
     saved = work / "codes.npz"
     coder = StrandAutoencoder()
@@ -183,19 +180,6 @@ def _coder(scene, work: Path, options: RegressionOptions, report) -> StrandAutoe
     return coder
 
 
-def _wait(farm: RolloutFarm, count: int, report) -> None:
-    while len(farm.files()) < count:
-        if farm.failed() or not farm.alive:
-            raise NeuralocksError("training: the solver's process ended early; free some memory and try again")
-        report(0.0, f"first simulations: {len(farm.files())} of {count}")
-        time.sleep(0.2)
-
-
-def normalise(net: StrandNet, bank: RolloutBank, spec: BoundarySpec, options: RegressionOptions) -> None:
-    """Set the network's input normalisation from the rollouts and strands of a bank."""
-    strands = np.concatenate([bank.inputs[r.groom][r.strands] for r in bank.rollouts])
-    strands = np.concatenate([strands, *(inputs[:: max(1, len(inputs) // 500)] for inputs in bank.inputs)])
-    frames = np.concatenate([r.vectors for r in bank.rollouts])
-    net.set_normalisation(
-        torch.from_numpy(strands), torch.from_numpy(frames), spec.slices["history"], static=options.static
-    )
+def _plain(fields: list[tuple[str, object]]) -> dict:
+    """Options as JSON takes them."""
+    return {name: value.value if isinstance(value, Enum) else value for name, value in fields}

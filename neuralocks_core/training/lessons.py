@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The two ways of training behind one face: rollouts of the solver, and the physics of random moments."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.farm import RolloutFarm
+from neuralocks_core.training.moments import MOMENTS, MomentPool
+from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
+from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, train_on_moments
+
+FIRST = 24
+"""Clips to wait for before the network starts: enough to normalise its inputs by."""
+
+
+def lesson(
+    scene: TrainingScene,
+    codes: list[np.ndarray],
+    options: RegressionOptions | SelfSupervisedOptions,
+    farm: RolloutFarm,
+    report: Callable[[float, str], None],
+) -> RolloutLesson | MomentLesson:
+    """What the kind of options asks for."""
+    kind = MomentLesson if isinstance(options, SelfSupervisedOptions) else RolloutLesson
+    return kind(scene, codes, options, farm, report)
+
+
+class RolloutLesson:
+    """Regression on rollouts that a farm makes meanwhile; see `regression`."""
+
+    method = "regression on rollouts of the reference solver"
+
+    def __init__(self, scene, codes, options: RegressionOptions, farm, report):
+        self.options, self.farm, self.anchored = options, farm, True
+        self.bank = RolloutBank(scene, codes)
+        self.inputs = self.bank.inputs
+        wait(farm, min(FIRST, farm.count), report)
+        self.bank.add(farm.files())
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
+        return samples(self.bank)
+
+    def train(self, net: StrandNet, resume) -> Iterator[dict]:
+        """See `regression.regress`."""
+        return regress(self.bank, net, self.options, self.farm.files, resume=resume)
+
+    def told(self) -> str:
+        """What there is to learn from, in a word."""
+        return f"{len(self.bank.rollouts)} rollouts"
+
+    def card(self) -> dict:
+        """For the model card."""
+        residual = float(np.median([r.residual for r in self.bank.rollouts]))
+        return {"rollouts": len(self.bank.rollouts), "solver residual": residual}
+
+
+class MomentLesson:
+    """The physics of random moments; see `selfsupervised`."""
+
+    method = "self-supervised on the potentials of random moments"
+
+    def __init__(self, scene, codes, options: SelfSupervisedOptions, farm, report):
+        self.options, self.anchored = options, options.supported
+        self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
+        self.pool = MomentPool(
+            replace(scene, strands=options.strands),
+            supported=options.supported,
+            nearest_vertices=options.paper_adhesion,
+        )
+        for i in range(FIRST):
+            report(0.0, f"first motions: {i} of {FIRST}")
+            self.pool.grow()
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
+        frames = np.concatenate([m.vectors for m in self.pool.moments])
+        if not self.options.random_materials:
+            frames = frames.copy()
+            frames[:, self.pool.scene.spec.slices["material"]] = 0
+        return np.concatenate([inputs[:: max(1, len(inputs) // 500)] for inputs in self.inputs]), frames
+
+    def train(self, net: StrandNet, resume) -> Iterator[dict]:
+        """See `selfsupervised.train_on_moments`."""
+        return train_on_moments(self.pool, self.inputs, net, self.options, resume=resume)
+
+    def told(self) -> str:
+        """What there is to learn from, in a word."""
+        return f"{len(self.pool.moments)} moments"
+
+    def card(self) -> dict:
+        """For the model card."""
+        return {"moments": len(self.pool.moments), "clips": len(self.pool.moments) // MOMENTS}
+
+
+def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
+    """Strand inputs (n, 70) and boundary vectors (m, F) of a bank's rollouts."""
+    strands = np.concatenate([bank.inputs[r.groom][r.strands] for r in bank.rollouts])
+    strands = np.concatenate([strands, *(inputs[:: max(1, len(inputs) // 500)] for inputs in bank.inputs)])
+    return strands, np.concatenate([r.vectors for r in bank.rollouts])
+
+
+def normalise(net: StrandNet, strands: np.ndarray, frames: np.ndarray, history: slice, static: bool) -> None:
+    """Set the network's input normalisation from samples."""
+    net.set_normalisation(torch.from_numpy(strands), torch.from_numpy(frames), history, static=static)
+
+
+def wait(farm: RolloutFarm, count: int, report: Callable[[float, str], None]) -> None:
+    """Until a farm has made so many rollouts."""
+    while len(farm.files()) < count:
+        if farm.failed() or not farm.alive:
+            raise NeuralocksError("training: the solver's process ended early; free some memory and try again")
+        report(0.0, f"first simulations: {len(farm.files())} of {count}")
+        time.sleep(0.2)
