@@ -179,3 +179,16 @@ def test_the_papers_own_settings_train(pool, inputs):
     assert not paper_pool.hair[0].rods.support.any()
     states = list(train_on_moments(paper_pool, inputs, _net(pool, inputs), options))
     assert states[-1]["done"] == 1.0 and states[-1]["step"] == 3
+
+
+def test_one_call_trains_the_papers_way_and_says_so(pool, tmp_path):
+    pytest.importorskip("warp", reason="the gauge compares with the solver")
+    from neuralocks_core import model
+    from neuralocks_core.training.train import train_strands
+
+    scene = replace(pool.scene, spec=paper_boundary(), frames=34, strands=8)
+    options = SelfSupervisedOptions.paper(steps=6, poses=2, strands=8, pool=1)
+    meta = model.read(train_strands(scene, tmp_path / "paper.neuralocks", options)).meta
+    assert meta["output"] == "displacement" and not meta["anchored"]
+    assert meta["training"]["method"].startswith("self-supervised") and meta["training"]["steps"] == 6
+    assert meta["training"]["options"]["form"] == "direct" and meta["report"]["held out"]["rigid"] > 0
