@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sampling in the background: a few frames at a time while Blender is idle, so that live hair catches up with an
+edited animation by itself.
+"""
+
+import time
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+from .scene.sampling import sample, stepping
+from .session import session
+
+SLICE = 0.05
+"""Longest time that Blender is kept busy at once [s]."""
+PAUSE = 0.3
+"""Time without a further edit before sampling begins [s]."""
+
+_work: list = []
+
+
+def request() -> None:
+    """Sample what is out of date, soon; without a window there is nobody to wait, and operators sample when they
+    need it.
+    """
+    if bpy.app.background:
+        return
+    _work.clear()
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=PAUSE)
+
+
+def cancel() -> None:
+    """Stop; the motion stays out of date."""
+    _work.clear()
+    session.sampling = None
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+
+
+def _tick():
+    from .live import needs_sampling, refresh
+
+    context = bpy.context
+    scene = context.scene
+    if _busy(context):
+        return PAUSE
+    if not _work:
+        todo = [a for a in needs_sampling(scene) if a.name not in session.failed]
+        if not todo:
+            session.sampling = None
+            _redraw(context)
+            return None
+        _work.append((todo[0].name, sample(context, todo[0])))
+    name, frames = _work[0]
+    end = time.perf_counter() + SLICE
+    try:
+        with stepping(scene):
+            for done, total in frames:
+                session.sampling = done / total
+                if time.perf_counter() > end:
+                    break
+            else:
+                _work.clear()
+    except (NeuralocksError, ReferenceError) as error:
+        session.messages[name] = str(error)
+        session.failed.add(name)
+        _work.clear()
+    if not _work:
+        refresh(scene)
+    _redraw(context)
+    return 0.01
+
+
+def _busy(context) -> bool:
+    playing = any(w.screen.is_animation_playing for w in context.window_manager.windows)
+    return playing or bpy.app.is_job_running("RENDER")
+
+
+def _redraw(context) -> None:
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()

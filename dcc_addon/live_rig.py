@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
+
+import json
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig import RigModel
+
+from .services.bones import LiveBones
+from .session import session
+
+
+def live_armatures(scene) -> list:
+    """Armatures of the scene whose hair bones are live."""
+    return [o for o in scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_live]
+
+
+def live_toggled(armature, context) -> None:
+    """The Live switch of the hair bones was used."""
+    session.messages.pop(armature.name, None)
+    if armature.neuralocks_character.rig_live:
+        from .background import request
+        from .live import refresh
+
+        request()
+        refresh(context.scene)
+    else:
+        rest(armature)
+
+
+def update(scene, graph, moved: bool = False) -> None:
+    """Turn the hair bones of every live rig."""
+    for armature in live_armatures(scene):
+        try:
+            _update(armature, scene, graph, moved)
+        except NeuralocksError as error:
+            show_rest(armature)
+            session.messages[armature.name] = str(error)
+
+
+def _update(armature, scene, graph, moved) -> None:
+    from .live import pose
+
+    sampled = session.rigs.get(armature.name)
+    if sampled is None:
+        raise NeuralocksError(f"{armature.name}: its motion is not sampled yet; press Sample Motion")
+    bones = bind(armature, sampled)
+    joints = pose(armature, sampled, scene, graph, moved)
+    settings = armature.neuralocks_character
+    turns = bones.turns([scene.frame_current_final / sampled.motion.rate], settings.rig_motion, joints[None])[0]
+    _keep(armature, bones.bones)
+    for name, turn in zip(bones.bones, turns.tolist(), strict=True):
+        bone = armature.pose.bones[name]
+        bone.rotation_mode = "QUATERNION"
+        bone.rotation_quaternion = turn
+    armature.update_tag()
+    session.messages.pop(armature.name, None)
+
+
+def bind(armature, sampled) -> LiveBones:
+    """The rig model bound to this armature, once."""
+    from .live import model_path
+
+    bones = session.chains.get(armature.name)
+    if bones is None:
+        settings = armature.neuralocks_character
+        model = RigModel.load(model_path(settings.rig_model, "rig"))
+        bones = session.chains[armature.name] = LiveBones.of(model, sampled.rig, sampled.character, settings.chains)
+    bones.follow(sampled.character, sampled.clip)
+    return bones
+
+
+def rest(armature) -> None:
+    """Give the hair bones the rotations back that they had before."""
+    session.chains.pop(armature.name, None)
+    show_rest(armature)
+
+
+def _keep(armature, bones) -> None:
+    settings = armature.neuralocks_character
+    if settings.rig_kept:
+        return
+    kept = {}
+    for name in bones:
+        bone = armature.pose.bones[name]
+        kept[name] = [
+            bone.rotation_mode,
+            list(bone.rotation_quaternion),
+            list(bone.rotation_euler),
+            list(bone.rotation_axis_angle),
+        ]
+    settings.rig_kept = json.dumps(kept)
+
+
+def show_rest(armature) -> None:
+    """The rotations from before; the model stays bound."""
+    settings = armature.neuralocks_character
+    try:
+        kept = json.loads(settings.rig_kept or "{}")
+    except json.JSONDecodeError:
+        kept = {}
+    for name, (mode, quaternion, euler, axis_angle) in kept.items():
+        bone = armature.pose.bones.get(name) if armature.pose else None
+        if bone is not None:
+            bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
+            bone.rotation_mode = mode
+    if kept:
+        settings.rig_kept = ""
+        armature.update_tag()

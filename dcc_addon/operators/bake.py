@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake to USD, bake and attach, report card."""
+
+import os
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..live import material_words, model_path
+from ..scene import attach
+from ..scene.export import write_shot
+from ..scene.sampling import hairs_of, sample, stepping
+from ..session import session
+from .base import Stepwise, shown_armature, shown_hair
+
+
+def output_path(path: str) -> str:
+    """Absolute path of a bake.
+
+    Raises:
+        NeuralocksError: it is relative to a file that is not saved, or its folder cannot be written.
+    """
+    if not path.strip():
+        raise NeuralocksError("Output: no file is named; choose where the bake is written")
+    if path.startswith("//") and not bpy.data.filepath:
+        raise NeuralocksError(
+            f"{path}: this file is not saved yet, so there is no folder beside it; save the file or choose a full path"
+        )
+    full = os.path.abspath(bpy.path.abspath(path))
+    if not full.lower().endswith((".usd", ".usda", ".usdc")):
+        full += ".usdc"
+    return full
+
+
+def frame_range(scene) -> tuple[int, int]:
+    """First and last frame of the bake."""
+    settings = scene.neuralocks
+    if settings.use_scene_range:
+        return scene.frame_start, scene.frame_end
+    if settings.frame_end < settings.frame_start:
+        raise NeuralocksError(
+            f"Bake: the range ends at {settings.frame_end}, before {settings.frame_start}; set a later end"
+        )
+    return settings.frame_start, settings.frame_end
+
+
+def bake_steps(context, armature, hairs, path: str):
+    """Sample, write the shot beside the bake, bake it; yields (done, total, message), returns {hair name: (bake,
+    prim path)}.
+
+    The same functions that the command line calls, on a stage that holds the numbers of the live view.
+    """
+    from usd.bake import bake
+
+    scene = context.scene
+    full = output_path(path)
+    first, last = frame_range(scene)
+    if not hairs:
+        raise NeuralocksError(f"{armature.name}: no hair belongs to this character; attach a hair object in the panel")
+    looks = {(*material_words(h.neuralocks_hair), h.neuralocks_hair.motion, h.neuralocks_hair.model) for h in hairs}
+    if not os.access(os.path.dirname(full) if os.path.isdir(os.path.dirname(full)) else "/", os.W_OK):
+        raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
+    with stepping(scene):
+        for done, total in sample(context, armature):
+            yield done, 2 * total, f"Sampling the motion of {armature.name}"
+    sampled = session.rigs[armature.name]
+    baked = {}
+    for number, look in enumerate(sorted(looks)):
+        group = [
+            h
+            for h in hairs
+            if (*material_words(h.neuralocks_hair), h.neuralocks_hair.motion, h.neuralocks_hair.model) == look
+        ]
+        stem = Path(full)
+        out = stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{number + 1}{stem.suffix}")
+        shot = out.with_name(f"{out.stem}_shot.usdc")
+        prims = write_shot(shot, armature, scene, sampled, group)
+        settings = group[0].neuralocks_hair
+        job = _Threaded(
+            lambda say, shot=shot, out=out, settings=settings: bake(
+                shot,
+                out,
+                model_path(settings.model),
+                frames=f"{first}:{last}",
+                subframes=scene.neuralocks.subframes + 1,
+                material=material_words(settings),
+                strength=settings.motion,
+                progress=say,
+            )
+        )
+        yield from job.steps(len(looks), number)
+        baked |= {h.name: (str(out), prims[h.name]) for h in group}
+    return baked
+
+
+class _Threaded:
+    """A bake in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
+
+    def __init__(self, function):
+        self._function = function
+
+    def steps(self, parts: int, part: int):
+        import threading
+
+        state = {"done": (0, 1, "Baking"), "cancel": False}
+
+        def say(done, total, message):
+            if state["cancel"]:
+                raise NeuralocksError("Bake: cancelled")
+            state["done"] = done, total, message
+
+        def run():
+            try:
+                self._function(say)
+            except BaseException as error:
+                state["error"] = error
+
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        try:
+            while thread.is_alive():
+                thread.join(0.02)
+                done, total, _ = state["done"]
+                share = (part + done / max(total, 1)) / parts
+                yield 0.5 + 0.5 * share, 1, "Baking the hair"
+        finally:
+            state["cancel"] = True
+            thread.join()
+        if "error" in state:
+            raise state["error"]
+
+
+class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
+    """Bake the moving hair of this character to a USD layer, equal to what is shown live"""
+
+    bl_idname = "neuralocks.bake"
+    bl_label = "Bake to USD"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File", description="USD file to write; the one of the panel when empty", subtype="FILE_PATH"
+    )
+
+    def steps(self, context):
+        armature = shown_armature(context)
+        path = self.filepath or context.scene.neuralocks.output
+        baked = yield from bake_steps(context, armature, hairs_of(armature, context.scene), path)
+        return f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}"
+
+
+class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
+    """Bake the moving hair and put the cache back on the hair object, so that it plays and renders without this
+    add-on
+    """
+
+    bl_idname = "neuralocks.bake_attach"
+    bl_label = "Bake and Attach"
+
+    filepath: StringProperty(
+        name="File", description="USD file to write; the one of the panel when empty", subtype="FILE_PATH"
+    )
+
+    def steps(self, context):
+        armature, hair = shown_armature(context), shown_hair(context)
+        attach.check_possible()
+        name, path = hair.name, self.filepath or context.scene.neuralocks.output
+        baked = yield from bake_steps(context, armature, [hair], path)
+        hair = bpy.data.objects[name]
+        hair.neuralocks_hair.live = False
+        attach.attach(hair, *baked[name])
+        return f"{name}: now plays {baked[name][0]}"
+
+
+class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
+    """Take the baked cache off the hair object again"""
+
+    bl_idname = "neuralocks.detach"
+    bl_label = "Remove Cache"
+
+    def steps(self, context):
+        hair = shown_hair(context)
+        found = attach.detach(hair)
+        yield 1, 1, ""
+        return f"{hair.name}: cache removed" if found else f"{hair.name}: it has no cache"
+
+
+class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
+    """Bake into a temporary folder and measure it: stretch, hair inside the body, motion, settling"""
+
+    bl_idname = "neuralocks.report_card"
+    bl_label = "Report Card"
+    bl_options = {"REGISTER"}
+
+    def steps(self, context):
+        import shutil
+        import tempfile
+
+        armature, hair = shown_armature(context), shown_hair(context)
+        name = hair.name
+        folder = tempfile.mkdtemp(prefix="neuralocks_")
+        try:
+            baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
+            session.cards[name] = _card(baked[name][0])
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        for line in session.cards[name]:
+            self.report({"INFO"}, line)
+        return f"{name}: report card made"
+
+
+def _card(path: str) -> list[str]:
+    from usd.evaluate import evaluate
+
+    card = evaluate(path)
+    return [str(line) for line in card.lines()]
+
+
+CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)

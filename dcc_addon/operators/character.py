@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finding the character, looking over its rig, sampling its motion."""
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..live import refresh
+from ..scene import armature as armature_reader
+from ..scene.sampling import sample
+from ..services import rig as rig_service
+from .base import Hardened, Stepwise, shown_armature
+
+
+class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
+    """Take the character and the hair from the selection, or the only ones in the scene"""
+
+    bl_idname = "neuralocks.find"
+    bl_label = "Find Character and Hair"
+
+    def work(self, context):
+        settings, scene = context.scene.neuralocks, context.scene
+        chosen = [*context.selected_objects, *scene.objects]
+        armature = next((o for o in chosen if o.type == "ARMATURE"), None)
+        if armature is None:
+            raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
+        hair = next((o for o in chosen if o.type == "CURVES"), None)
+        settings.armature, settings.hair = armature, hair
+        if hair is not None and hair.neuralocks_hair.armature is None:
+            hair.neuralocks_hair.armature = armature
+        return f"Character {armature.name}" + (f", hair {hair.name}" if hair else ", no hair Curves in this scene")
+
+
+class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
+    """Look over the rig: which bone is which, and what may spoil the hair"""
+
+    bl_idname = "neuralocks.check"
+    bl_label = "Check Rig"
+    bl_options = {"REGISTER"}
+
+    def work(self, context):
+        armature = shown_armature(context)
+        rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
+        lines = rig_service.advice(rig)
+        for line in lines:
+            self.report({"WARNING"}, line)
+        return None if lines else f"{armature.name}: the rig is fine"
+
+
+class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
+    """Step through the frames once and remember how the rig moves, with constraints, IK, drivers and NLA"""
+
+    bl_idname = "neuralocks.sample_motion"
+    bl_label = "Sample Motion"
+    bl_options = {"REGISTER"}
+    steps_frames = True
+
+    def steps(self, context):
+        armature = shown_armature(context)
+        name = armature.name
+        for done, total in sample(context, armature):
+            yield done, total, f"Sampling the motion of {name}"
+        return f"{name}: motion sampled"
+
+    def _finish(self, context):
+        super()._finish(context)
+        refresh(context.scene)
+
+    def execute(self, context):
+        result = super().execute(context)
+        refresh(context.scene)
+        return result
+
+
+CLASSES = (NEURALOCKS_OT_find, NEURALOCKS_OT_check, NEURALOCKS_OT_sample)

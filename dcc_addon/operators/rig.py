@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigged hair: chains, keyframes, export."""
+
+import bpy
+from bpy.props import StringProperty
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..live_rig import bind, rest
+from ..scene import actions
+from ..scene.sampling import ensure, sample, stepping
+from ..services.bones import chains_of
+from ..services.motion import frame_numbers
+from ..session import session
+from .bake import frame_range, output_path
+from .base import Hardened, Stepwise, shown_armature
+
+
+class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
+    """Find the chains of hair bones below the head"""
+
+    bl_idname = "neuralocks.find_chains"
+    bl_label = "Find Hair Bones"
+    bl_options = {"REGISTER"}
+
+    def work(self, context):
+        armature = shown_armature(context)
+        sampled = ensure(context, armature)
+        chains = chains_of(sampled.character, armature.neuralocks_character.chains)
+        lines = [
+            f"{chains.chain_name(i)}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
+            for i in range(len(chains.roots))
+        ]
+        session.cards[armature.name] = lines
+        return f"{armature.name}: {len(chains)} hair bones in {len(lines)} chains"
+
+
+class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
+    """Key the hair bones, and nothing else, in an action of its own on an NLA track that can be muted"""
+
+    bl_idname = "neuralocks.bake_keys"
+    bl_label = "Bake to Keyframes"
+
+    def steps(self, context):
+        armature, scene = shown_armature(context), context.scene
+        name = armature.name
+        first, last = frame_range(scene)
+        actions.remove(armature)
+        armature.neuralocks_character.rig_live = False
+        rest(armature)
+        with stepping(scene):
+            for done, total in sample(context, armature):
+                yield done, total, f"Sampling the motion of {name}"
+        armature = bpy.data.objects[name]
+        bones = bind(armature, session.rigs[name])
+        frames = frame_numbers(first, last, 0)
+        turns = bones.turns(frames / session.rigs[name].motion.rate, armature.neuralocks_character.rig_motion)
+        action = actions.bake_keys(armature, bones.bones, frames, turns)
+        return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
+
+
+class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
+    """Remove the baked keyframes of the hair bones"""
+
+    bl_idname = "neuralocks.remove_keys"
+    bl_label = "Remove Baked Keys"
+
+    def work(self, context):
+        armature = shown_armature(context)
+        if not actions.remove(armature):
+            raise NeuralocksError(f"{armature.name}: it has no baked hair keys; bake them first")
+        return f"{armature.name}: baked hair keys removed"
+
+
+class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
+    """Write the rig with moving hair bones as a USD skeleton animation"""
+
+    bl_idname = "neuralocks.export_skel"
+    bl_label = "USD Animation"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File", description="USD file to write; beside the panel's output when empty", subtype="FILE_PATH"
+    )
+
+    def steps(self, context):
+        from pathlib import Path
+
+        from usd.rig_bake import bake_rig
+
+        from ..live import model_path
+        from ..scene.export import write_shot
+
+        armature, scene = shown_armature(context), context.scene
+        settings, name = armature.neuralocks_character, armature.name
+        out = Path(output_path(self.filepath or scene.neuralocks.output.replace("bake", "rig_bake")))
+        with stepping(scene):
+            for done, total in sample(context, armature):
+                yield done, total, f"Sampling the motion of {name}"
+        shot = out.with_name(f"{out.stem}_shot.usdc")
+        write_shot(shot, bpy.data.objects[name], scene, session.rigs[name], [])
+        bake_rig(shot, out, model_path(settings.rig_model, "rig"))
+        return f"{name}: hair bones written to {out}"
+
+
+class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
+    """Write the model of the hair bones as a C header for a game engine"""
+
+    bl_idname = "neuralocks.export_c"
+    bl_label = "C Header"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File", description="Header to write", default="//neuralocks_hair.h", subtype="FILE_PATH"
+    )
+
+    def work(self, context):
+        from neuralocks_core.export_c import export_c
+
+        from ..live import model_path
+
+        armature = shown_armature(context)
+        if self.filepath.startswith("//") and not bpy.data.filepath:
+            raise NeuralocksError(f"{self.filepath}: this file is not saved yet; save it or choose a full path")
+        out = export_c(model_path(armature.neuralocks_character.rig_model, "rig"), bpy.path.abspath(self.filepath))
+        return f"C header written to {out}"
+
+
+CLASSES = (
+    NEURALOCKS_OT_find_chains,
+    NEURALOCKS_OT_bake_keys,
+    NEURALOCKS_OT_remove_keys,
+    NEURALOCKS_OT_export_skel,
+    NEURALOCKS_OT_export_c,
+)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Training in the background: Blender stays usable, the panel shows how far it is."""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+from bpy.props import EnumProperty
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..scene.export import write_shot
+from ..scene.sampling import ensure
+from ..services.training_job import TrainingJob, default_python, problem
+from ..session import session
+from .base import Hardened, shown_armature, shown_hair
+
+_jobs: list = []
+_checked: dict[str, str] = {}
+
+
+def job() -> TrainingJob | None:
+    """The training that runs or has just ended."""
+    return _jobs[0] if _jobs else None
+
+
+def stop() -> None:
+    """Cancel what runs and forget it."""
+    if _jobs:
+        _jobs[0].cancel()
+        _jobs.clear()
+    if bpy.app.timers.is_registered(_watch):
+        bpy.app.timers.unregister(_watch)
+
+
+def training_python() -> str:
+    """The interpreter named in the preferences, or one found beside the packages."""
+    addon = bpy.context.preferences.addons.get(__package__.rsplit(".", 1)[0])
+    chosen = addon.preferences.python.strip() if addon is not None and addon.preferences else ""
+    return bpy.path.abspath(chosen) if chosen else default_python()
+
+
+def training_python_problem(fresh: bool = False) -> str:
+    """Why training cannot run here, with the remedy; asked of the interpreter once."""
+    python = training_python()
+    if fresh or python not in _checked:
+        _checked[python] = problem(python)
+    return _checked[python]
+
+
+class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
+    """Train a model for this character in the background; Blender stays usable"""
+
+    bl_idname = "neuralocks.train"
+    bl_label = "Train for This Character"
+    bl_options = {"REGISTER"}
+
+    kind: EnumProperty(items=[("strands", "Strands", "Strand hair"), ("rig", "Bones", "Hair bones")], default="strands")
+
+    def work(self, context):
+        running = job()
+        if running is not None and running.running:
+            raise NeuralocksError("Training: one is running already; wait for it or cancel it")
+        trouble = training_python_problem(fresh=True)
+        if trouble:
+            raise NeuralocksError(trouble)
+        armature = shown_armature(context)
+        target = shown_hair(context) if self.kind == "strands" else armature
+        sampled = ensure(context, armature)
+        folder = Path(tempfile.mkdtemp(prefix="neuralocks_"))
+        character = folder / "character.usdc"
+        write_shot(character, armature, context.scene, sampled, [target] if self.kind == "strands" else [])
+        out = _out(target.name)
+        settings = {
+            "kind": self.kind,
+            "character": str(character),
+            "out": out,
+            "minutes": context.scene.neuralocks.train_minutes,
+        }
+        stop()
+        _jobs.append(TrainingJob(training_python(), settings))
+        _jobs[0].target = (target.name, self.kind)
+        bpy.app.timers.register(_watch, first_interval=0.5)
+        return f"Training a model for {target.name} in the background"
+
+
+class NEURALOCKS_OT_cancel_training(Hardened, bpy.types.Operator):
+    """Stop the training that runs in the background"""
+
+    bl_idname = "neuralocks.cancel_training"
+    bl_label = "Cancel Training"
+    bl_options = {"REGISTER"}
+
+    def work(self, _context):
+        stop()
+        return "Training cancelled"
+
+
+def finish() -> str | None:
+    """Take over the result of an ended training: the model goes to what it was trained for. A message for the
+    panel, or None while it runs.
+    """
+    from ..live import refresh
+
+    running = job()
+    if running is None or running.running:
+        return None
+    name, kind = running.target
+    target = bpy.data.objects.get(name)
+    if running.succeeded and target is not None:
+        if kind == "strands":
+            target.neuralocks_hair.model = running.out
+        else:
+            target.neuralocks_character.rig_model = running.out
+        message = f"{name}: trained"
+    else:
+        message = f"{name}: training failed: {running.failure()}"
+    session.messages["training"] = message
+    stop()
+    refresh(bpy.context.scene)
+    return message
+
+
+def _watch():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+    running = job()
+    if running is None:
+        return None
+    if not running.running:
+        finish()
+        return None
+    return 0.5
+
+
+def _out(name: str) -> str:
+    """A new model file beside the .blend, or in the user's own folder while that is not saved."""
+    label = "".join(c if c.isalnum() else "_" for c in name)
+    folder = (
+        Path(bpy.data.filepath).parent
+        if bpy.data.filepath
+        else Path(bpy.utils.user_resource("DATAFILES", path="neuralocks", create=True))
+    )
+    number = 1
+    while (folder / f"{label}_{number}.neuralocks").exists():
+        number += 1
+    return str(folder / f"{label}_{number}.neuralocks")
+
+
+CLASSES = (NEURALOCKS_OT_train, NEURALOCKS_OT_cancel_training)

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab, in the order in which an artist works: character, strands, hair bones, bake."""
+
+import textwrap
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+from .operators.training import job
+from .session import session
+
+_findings: dict[tuple, tuple[list, str]] = {}
+
+
+class _Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Neuralocks"
+
+
+class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
+    """Who carries the hair"""
+
+    bl_label = "Character"
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.neuralocks
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(settings, "armature")
+        armature = settings.armature
+        if armature is None:
+            layout.operator("neuralocks.find", icon="VIEWZOOM")
+            return
+        character = armature.neuralocks_character
+        layout.prop(character, "body")
+        layout.prop_search(character, "head_bone", armature.data, "bones")
+        lines, problem = findings(armature)
+        for line in lines:
+            words(layout, line, "INFO")
+        if problem:
+            words(layout, problem, "ERROR")
+        _motion(layout, armature)
+
+
+def _motion(layout, armature) -> None:
+    """How up to date the sampled motion is."""
+    sampled = session.rigs.get(armature.name)
+    row = layout.row()
+    if session.sampling is not None:
+        row.label(text=f"Sampling motion {100 * session.sampling:.0f} %", icon="TIME")
+    elif sampled is None:
+        row.label(text="Motion not sampled", icon="QUESTION")
+    elif sampled.stale:
+        row.label(text="Animation has changed", icon="ERROR")
+    else:
+        row.label(text=f"Motion of {len(sampled.motion.frames)} frames", icon="CHECKMARK")
+    row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
+    message(layout, armature.name)
+
+
+class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
+    """Strand hair"""
+
+    bl_label = "Strands"
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.neuralocks
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(settings, "hair")
+        hair = settings.hair
+        if hair is None:
+            layout.operator("neuralocks.from_particles", icon="PARTICLES")
+            return
+        own = hair.neuralocks_hair
+        if own.armature is None or own.armature != settings.armature:
+            if own.armature is not None:
+                words(layout, f"This hair belongs to {own.armature.name}", "INFO")
+            layout.operator("neuralocks.assign", icon="LINKED")
+        layout.prop(own, "model")
+        _training(layout, settings, "strands")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.prop(own, "live", toggle=True, icon="PLAY")
+        message(layout, hair.name)
+        column = layout.column(align=True)
+        for name in ("bend", "weight", "damping", "clumping", "motion"):
+            column.prop(own, name, slider=True)
+        layout.operator("neuralocks.reset_look", icon="LOOP_BACK")
+        layout.operator("neuralocks.report_card", icon="PRESET")
+        for line in session.cards.get(hair.name, ()):
+            words(layout, line, "NONE")
+
+
+def _training(layout, settings, kind: str) -> None:
+    running = job()
+    if running is None:
+        row = layout.row(align=True)
+        row.operator("neuralocks.train", icon="MODIFIER").kind = kind
+        row.prop(settings, "train_minutes", text="")
+        message(layout, "training")
+        return
+    left = running.seconds_left
+    box = layout.box()
+    text = f"Training {100 * running.done:.0f} %" + ("" if left is None else f", {max(1, round(left / 60))} min left")
+    if hasattr(box, "progress"):
+        box.progress(factor=running.done, text=text)
+    else:
+        box.label(text=text, icon="TIME")
+    words(box, running.message, "NONE")
+    box.operator("neuralocks.cancel_training", icon="CANCEL")
+
+
+class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
+    """Hair made of bones"""
+
+    bl_label = "Rigged Hair"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.neuralocks
+        layout.use_property_split, layout.use_property_decorate = True, False
+        armature = settings.armature
+        if armature is None:
+            layout.label(text="Choose a character first", icon="INFO")
+            return
+        own = armature.neuralocks_character
+        layout.prop(own, "chains")
+        layout.operator("neuralocks.find_chains", icon="BONE_DATA")
+        for line in session.cards.get(armature.name, ()):
+            words(layout, line, "NONE")
+        layout.prop(own, "rig_model")
+        _training(layout, settings, "rig")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.prop(own, "rig_live", toggle=True, icon="PLAY")
+        layout.prop(own, "rig_motion", slider=True)
+        message(layout, armature.name)
+        row = layout.row(align=True)
+        row.operator("neuralocks.bake_keys", icon="KEYINGSET")
+        row.operator("neuralocks.remove_keys", text="", icon="X")
+        row = layout.row(align=True)
+        row.operator("neuralocks.export_skel", icon="EXPORT")
+        row.operator("neuralocks.export_c", icon="FILE_SCRIPT")
+
+
+class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
+    """Moving hair as a file"""
+
+    bl_label = "Bake"
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.neuralocks
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(settings, "use_scene_range")
+        if not settings.use_scene_range:
+            column = layout.column(align=True)
+            column.prop(settings, "frame_start")
+            column.prop(settings, "frame_end")
+        layout.prop(settings, "subframes")
+        layout.prop(settings, "output")
+        if settings.output.startswith("//") and not bpy.data.filepath:
+            words(layout, "Save this file first, or choose a full path", "INFO")
+        layout.operator("neuralocks.bake", icon="EXPORT")
+        row = layout.row(align=True)
+        row.operator("neuralocks.bake_attach", icon="LINKED")
+        row.operator("neuralocks.detach", text="", icon="X")
+
+
+def findings(armature) -> tuple[list[str], str]:
+    """What is found of the rig, and what is wrong with it; looked at again only when bones or choices change."""
+    from .scene import armature as armature_reader
+    from .services import rig as rig_service
+
+    chosen = armature.neuralocks_character.head_bone
+    key = armature.name, len(armature.data.bones), chosen
+    if key not in _findings:
+        _findings.clear()
+        try:
+            rig = armature_reader.read(armature, chosen)
+            humanoid = rig.humanoid()
+            head = humanoid["head"]
+            _findings[key] = [f"Head: {rig.bones[head]} ({humanoid.reasons['head']})", *rig_service.advice(rig)], ""
+        except NeuralocksError as error:
+            _findings[key] = [], str(error)
+    return _findings[key]
+
+
+def message(layout, name: str) -> None:
+    """What went wrong with an object, if anything did."""
+    if session.messages.get(name):
+        words(layout, session.messages[name], "ERROR")
+
+
+def words(layout, text: str, icon: str) -> None:
+    """A text of any length, broken into lines that fit the sidebar."""
+    width = max(
+        20, int(bpy.context.region.width / (7 * bpy.context.preferences.system.ui_scale)) if bpy.context.region else 40
+    )
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, width) or [""]):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+
+
+CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)

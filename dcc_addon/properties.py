@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is saved in the file: settings of each hair object and of each character, and what the panel shows."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+
+def _is_armature(_self, candidate) -> bool:
+    return candidate.type == "ARMATURE"
+
+
+def _is_mesh(_self, candidate) -> bool:
+    return candidate.type == "MESH"
+
+
+def _is_hair(_self, candidate) -> bool:
+    return candidate.type == "CURVES"
+
+
+def _live_changed(hair_settings, context) -> None:
+    from .live import live_toggled
+
+    live_toggled(hair_settings.id_data, context)
+
+
+def _look_changed(hair_settings, context) -> None:
+    from .live import refresh
+
+    refresh(context.scene)
+
+
+def _rig_live_changed(character, context) -> None:
+    from .live_rig import live_toggled
+
+    live_toggled(character.id_data, context)
+
+
+def _rig_look_changed(character, context) -> None:
+    from .live import refresh
+
+    refresh(context.scene)
+
+
+def _model_changed(settings, context) -> None:
+    from .session import session
+
+    session.forget(settings.id_data.name_full)
+    _look_changed(settings, context)
+
+
+def _character_changed(settings, context) -> None:
+    from .session import session
+
+    session.forget_motion(settings.id_data.name_full)
+
+
+class HairSettings(bpy.types.PropertyGroup):
+    """On a hair Curves object."""
+
+    armature: PointerProperty(
+        name="Armature", description="The rig whose head carries this hair", type=bpy.types.Object, poll=_is_armature
+    )
+    model: StringProperty(
+        name="Model",
+        description="Trained model file (*.neuralocks); empty means the model that comes with the add-on",
+        subtype="FILE_PATH",
+        update=_model_changed,
+    )
+    live: BoolProperty(
+        name="Live", description="Move the hair with the character, at any frame and in renders", update=_live_changed
+    )
+    bend: FloatProperty(
+        name="Stiffness",
+        description="How strongly strands keep their shape, relative to average hair",
+        default=1.0,
+        min=0.2,
+        max=5.0,
+        soft_min=0.2,
+        soft_max=5.0,
+        update=_look_changed,
+    )
+    weight: FloatProperty(
+        name="Weight",
+        description="How heavy the hair is, relative to average hair",
+        default=1.0,
+        min=0.5,
+        max=2.0,
+        update=_look_changed,
+    )
+    damping: FloatProperty(
+        name="Damping",
+        description="How fast a swing dies out, relative to average hair",
+        default=1.0,
+        min=0.4,
+        max=2.0,
+        update=_look_changed,
+    )
+    clumping: FloatProperty(
+        name="Clumping",
+        description="How strongly neighbouring strands stay together, relative to average hair",
+        default=1.0,
+        min=0.0,
+        max=4.0,
+        update=_look_changed,
+    )
+    motion: FloatProperty(
+        name="Motion",
+        description="How much of the movement shows; at 0 the hair hangs as in a held pose",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_look_changed,
+    )
+    muted: StringProperty(options={"HIDDEN"}, description="Modifiers that are off while the hair is live, as JSON")
+
+
+class CharacterSettings(bpy.types.PropertyGroup):
+    """On an armature object."""
+
+    body: PointerProperty(
+        name="Body",
+        description="The skin mesh that the armature moves; found when left empty",
+        type=bpy.types.Object,
+        poll=_is_mesh,
+        update=_character_changed,
+    )
+    head_bone: StringProperty(
+        name="Head bone",
+        description="The bone that carries the hair; found by name when left empty",
+        update=_character_changed,
+    )
+    rig_model: StringProperty(
+        name="Model",
+        description="Trained model file for hair bones (*.neuralocks); empty means the one that comes with the add-on",
+        subtype="FILE_PATH",
+        update=_rig_look_changed,
+    )
+    rig_live: BoolProperty(
+        name="Live", description="Turn the hair bones with the motion of the head", update=_rig_live_changed
+    )
+    chains: StringProperty(
+        name="Chains",
+        description="Names of the first hair bones, with * for anything, separated by commas; found when left empty",
+        update=_rig_look_changed,
+    )
+    rig_kept: StringProperty(
+        options={"HIDDEN"}, description="Rotations of the hair bones from before they were live, as JSON"
+    )
+    rig_motion: FloatProperty(
+        name="Motion",
+        description="How much of the movement shows",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_rig_look_changed,
+    )
+
+
+class SceneSettings(bpy.types.PropertyGroup):
+    """On a scene: what the panel works on, and where bakes go."""
+
+    armature: PointerProperty(
+        name="Armature", description="The character shown in this panel", type=bpy.types.Object, poll=_is_armature
+    )
+    hair: PointerProperty(
+        name="Hair", description="The hair Curves object shown in this panel", type=bpy.types.Object, poll=_is_hair
+    )
+    use_scene_range: BoolProperty(name="Scene Range", description="Bake the frames of the scene", default=True)
+    frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
+    frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    subframes: IntProperty(
+        name="Sub-frames", description="Samples between two frames, for motion blur", default=0, min=0, max=15
+    )
+    output: StringProperty(
+        name="Output",
+        description="Where the bake is written; // is the folder of this file",
+        default="//neuralocks_bake.usdc",
+        subtype="FILE_PATH",
+    )
+    train_minutes: FloatProperty(
+        name="Minutes", description="How long a training may take", default=15.0, min=0.05, max=720.0
+    )
+    train_for: EnumProperty(
+        name="Train",
+        items=[("STRANDS", "Strands", "A model for strand hair"), ("RIG", "Bones", "A model for hair bones")],
+        default="STRANDS",
+    )
+
+
+class Preferences(bpy.types.AddonPreferences):
+    """Where training runs: torch is too large to ship, and is not needed for anything else."""
+
+    bl_idname = __package__
+
+    python: StringProperty(
+        name="Python for training",
+        description="A Python with torch, in which Neuralocks trains (python3 -m pip install 'neuralocks[train]')",
+        subtype="FILE_PATH",
+    )
+
+    def draw(self, _context):
+        column = self.layout.column()
+        column.prop(self, "python")
+        from .operators.training import training_python_problem
+
+        problem = training_python_problem()
+        column.label(text=problem or "Ready to train.", icon="INFO" if problem else "CHECKMARK")
+
+
+CLASSES = (HairSettings, CharacterSettings, SceneSettings, Preferences)
+
+
+def attach() -> None:
+    """Put the settings on Blender's types."""
+    bpy.types.Object.neuralocks_hair = PointerProperty(type=HairSettings)
+    bpy.types.Object.neuralocks_character = PointerProperty(type=CharacterSettings)
+    bpy.types.Scene.neuralocks = PointerProperty(type=SceneSettings)
+
+
+def detach() -> None:
+    """Take them off again."""
+    del bpy.types.Scene.neuralocks
+    del bpy.types.Object.neuralocks_character
+    del bpy.types.Object.neuralocks_hair

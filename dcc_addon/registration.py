@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything the add-on puts into Blender, and takes out again, in one place."""
+
+import bpy
+
+from . import background, handlers, live, live_rig, operators, panels, properties
+from .session import session
+
+CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+
+
+def register() -> None:
+    """Enable the add-on."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    properties.attach()
+    handlers.attach()
+    if hasattr(bpy.data, "scenes"):  # while Blender starts no file is open yet; its load calls the handler
+        handlers.on_load()
+
+
+def unregister() -> None:
+    """Disable it: hair at rest, no handler, timer, process or class left behind."""
+    background.cancel()
+    operators.training.stop()
+    handlers.detach()
+    for scene in bpy.data.scenes:
+        for hair in live.live_hairs(scene):
+            live.rest(hair)
+        for armature in live_rig.live_armatures(scene):
+            live_rig.rest(armature)
+    session.clear()
+    properties.detach()
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

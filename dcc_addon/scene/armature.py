@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An armature object: rest pose, and the evaluated pose of any depsgraph."""
+
+import numpy as np
+
+from ..services import names
+from ..services.rig import RigArrays
+
+
+def matrix(value) -> np.ndarray:
+    """A Blender matrix as (4, 4) float64."""
+    return np.array(value, float)
+
+
+def read(armature, head_bone: str = "") -> RigArrays:
+    """The rest pose, bones ordered parents first."""
+    bones = armature.data.bones
+    index = {bone.name: i for i, bone in enumerate(bones)}
+    parents = [index[bone.parent.name] if bone.parent else -1 for bone in bones]
+    order = names.parents_first(parents)
+    place = np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    rest = np.empty((len(bones), 4, 4), np.float32)
+    if len(bones):
+        bones.foreach_get("matrix_local", rest.ravel())
+    return RigArrays(
+        armature.name,
+        tuple(bones[i].name for i in order),
+        np.array([place[parents[i]] if parents[i] >= 0 else -1 for i in order], int),
+        rest.astype(float).swapaxes(1, 2)[order],
+        head_bone,
+    )
+
+
+class PoseReader:
+    """Reads world transforms of all joints of one armature, fast and in the order of its `RigArrays`."""
+
+    def __init__(self, armature, bones: tuple[str, ...]):
+        self.name = armature.name
+        pose = {bone.name: i for i, bone in enumerate(armature.pose.bones)}
+        self._order = np.array([pose[name] for name in bones], int)
+        self._buffer = np.empty((len(pose), 4, 4), np.float32)
+
+    def world(self, evaluated) -> np.ndarray:
+        """(J, 4, 4) in Blender's world space, of an evaluated armature object."""
+        evaluated.pose.bones.foreach_get("matrix", self._buffer.ravel())
+        local = self._buffer.astype(float).swapaxes(1, 2)[self._order]
+        return matrix(evaluated.matrix_world) @ local

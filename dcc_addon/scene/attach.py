@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A baked cache on a hair object: Blender's own modifier plays it, on any machine, without this add-on."""
+
+import os
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+MODIFIER = "Neuralocks Cache"
+
+
+def check_possible() -> None:
+    """Refuse where Blender was built without USD."""
+    if not getattr(bpy.app.build_options, "usd", True):
+        raise NeuralocksError(
+            "Bake and Attach: this Blender is built without USD; use Bake to USD, or Blender from blender.org"
+        )
+
+
+def attach(hair, path: str, prim: str) -> None:
+    """Let the hair play the groom `prim` of the USD file `path`."""
+    from .placing import mute_deformers
+
+    detach(hair)
+    mute_deformers(hair)
+    hair.neuralocks_hair.muted = ""  # off for good: the cache has the surface's motion in it
+    cache = _cache_file(path)
+    cache.scale = 1.0
+    modifier = hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
+    modifier.cache_file = cache
+    modifier.object_path = prim
+    if len(hair.modifiers) > 1:
+        index = hair.modifiers.find(MODIFIER)
+        if hasattr(hair.modifiers, "move"):
+            hair.modifiers.move(index, 0)
+
+
+def detach(hair) -> bool:
+    """Take the cache off; whether there was one."""
+    modifier = hair.modifiers.get(MODIFIER)
+    if modifier is None:
+        return False
+    cache = modifier.cache_file
+    hair.modifiers.remove(modifier)
+    if cache is not None and not cache.users:
+        bpy.data.cache_files.remove(cache)
+    return True
+
+
+def _cache_file(path: str):
+    """The data block of a cache file; only the open operator makes one."""
+    known = {c.name for c in bpy.data.cache_files}
+    for cache in bpy.data.cache_files:
+        if os.path.abspath(bpy.path.abspath(cache.filepath)) == os.path.abspath(path):
+            return cache
+    bpy.ops.cachefile.open(filepath=path)
+    cache = next(c for c in bpy.data.cache_files if c.name not in known)
+    if bpy.data.filepath and os.path.splitdrive(path)[0] == os.path.splitdrive(bpy.data.filepath)[0]:
+        cache.filepath = bpy.path.relpath(path)
+    return cache

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The body mesh at rest: surface, vertex groups and shape keys."""
+
+import numpy as np
+
+from ..services.rig import BodyArrays
+
+
+def find(armature, objects):
+    """The mesh that this armature deforms, the largest one, or None."""
+    deformed = [
+        o
+        for o in objects
+        if o.type == "MESH" and any(m.type == "ARMATURE" and m.object == armature for m in o.modifiers)
+    ]
+    return max(deformed, key=lambda o: len(o.data.vertices), default=None)
+
+
+def read(mesh_object) -> BodyArrays:
+    """Vertices of the basis shape, triangles, weights and shape keys."""
+    mesh = mesh_object.data
+    points = _coordinates(mesh.vertices)
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    rows = [(v.index, g.group, g.weight) for v in mesh.vertices for g in v.groups]
+    shapes = {}
+    keys = mesh.shape_keys
+    if keys and len(keys.key_blocks) > 1:
+        basis = _coordinates(keys.reference_key.data)
+        points = basis
+        for block in keys.key_blocks:
+            if block != keys.reference_key:
+                shapes[block.name] = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
+    return BodyArrays(
+        mesh_object.name,
+        points,
+        triangles,
+        tuple(group.name for group in mesh_object.vertex_groups),
+        np.array(rows, float).reshape(-1, 3),
+        shapes,
+    )
+
+
+def shape_values(mesh_object) -> np.ndarray:
+    """Values (B,) of the shape keys as they are now, in the order of `BodyArrays.shapes`."""
+    keys = mesh_object.data.shape_keys if mesh_object is not None else None
+    if not keys or len(keys.key_blocks) < 2:
+        return np.zeros(0)
+    return np.array([0.0 if b.mute else b.value for b in keys.key_blocks if b != keys.reference_key])
+
+
+def _coordinates(elements) -> np.ndarray:
+    values = np.empty((len(elements), 3), np.float32)
+    elements.foreach_get("co", values.ravel())
+    return values.astype(float)

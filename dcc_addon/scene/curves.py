@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hair Curves object: its strands, and where its rest shape is kept while the live view moves the points.
+
+The rest shape lies in the attribute `neuralocks_rest` of the Curves while it is live, so it is saved, appended and
+undone with the hair; the absence of
+the attribute says that the points themselves are at rest.
+"""
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+REST = "neuralocks_rest"
+
+
+def counts(data) -> np.ndarray:
+    """Points of each strand, (S,) int32."""
+    values = np.empty(len(data.curves), np.int32)
+    data.curves.foreach_get("points_length", values)
+    return values
+
+
+def points(data) -> np.ndarray:
+    """Points at rest, (P, 3) float32 in the object's space, whether the hair is live or not."""
+    return _read(data, REST if has_rest(data) else "position")
+
+
+def shown(data) -> np.ndarray:
+    """Points as they are, (P, 3) float32."""
+    return _read(data, "position")
+
+
+def radius(data) -> np.ndarray | None:
+    """(P,) float32 in the object's space, or None."""
+    attribute = data.attributes.get("radius")
+    if attribute is None or attribute.domain != "POINT" or len(attribute.data) != len(data.points):
+        return None
+    values = np.empty(len(attribute.data), np.float32)
+    attribute.data.foreach_get("value", values)
+    return values
+
+
+def has_rest(data) -> bool:
+    """Whether the rest shape is kept aside because the points are moved."""
+    attribute = data.attributes.get(REST)
+    return attribute is not None and len(attribute.data) == len(data.points)
+
+
+def keep_rest(data) -> None:
+    """Put the points aside as rest shape, unless they already are.
+
+    Raises:
+        NeuralocksError: the data belongs to another file.
+    """
+    if data.library is not None:
+        raise NeuralocksError(f"{data.name}: the hair is linked from another file; make it local or a library override")
+    if has_rest(data):
+        return
+    stale = data.attributes.get(REST)
+    if stale is not None:  # the strands were edited since: the old rest shape fits them no longer
+        data.attributes.remove(stale)
+    values = _read(data, "position")
+    attribute = data.attributes.new(REST, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", values.ravel())
+
+
+def restore_rest(data) -> bool:
+    """Put the points back to rest and forget the copy; whether there was one."""
+    if not has_rest(data):
+        return False
+    write(data, _read(data, REST))
+    data.attributes.remove(data.attributes[REST])
+    data.update_tag()
+    return True
+
+
+def write(data, values: np.ndarray) -> None:
+    """Move the points to (P, 3) float32. The caller tags the data.
+
+    A flat contiguous float32 array is copied as a block; any other kind goes through Python numbers, ten to a hundred
+    times slower.
+    """
+    data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None):
+    """A new Curves data block of polylines from counts (S,) and points (P, 3)."""
+    import bpy
+
+    data = bpy.data.hair_curves.new(name)
+    if hasattr(data, "add_curves"):
+        data.add_curves([int(n) for n in strands])
+        _make_poly(data)
+    else:
+        data = _by_conversion(name, strands, points_of, data)
+    write(data, points_of)
+    if material is not None:
+        data.materials.append(material)
+    return data
+
+
+def _make_poly(data) -> None:
+    """Straight segments: Catmull-Rom, the default, is evaluated at twelve times the points by Blender 5.2, in vain
+    for 24-point strands.
+    """
+    if hasattr(data, "set_types"):
+        data.set_types(type="POLY")
+        return
+    # Blender 4.2 keeps count of the types and is not told when the attribute `curve_type` is written: it then writes
+    # beyond its arrays. One
+    # evaluated point a segment draws the same.
+    data.attributes.new("resolution", "INT", "CURVE").data.foreach_set("value", np.ones(len(data.curves), np.int32))
+
+
+def _by_conversion(name, strands, points_of, empty):
+    """Blender before 3.5 cannot add strands from Python: an edge mesh is turned into curves by geometry nodes."""
+    import bpy
+
+    bpy.data.hair_curves.remove(empty)
+    ends = np.cumsum(strands)
+    first = np.arange(len(points_of) - 1)
+    edges = np.stack([first, first + 1], axis=1)[~np.isin(first + 1, ends)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(p) for p in points_of.tolist()], [tuple(e) for e in edges.tolist()], [])
+    holder = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(holder)
+    tree = bpy.data.node_groups.new("neuralocks_to_curves", "GeometryNodeTree")
+    tree.inputs.new("NodeSocketGeometry", "Geometry")
+    tree.outputs.new("NodeSocketGeometry", "Geometry")
+    source, target = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    convert = tree.nodes.new("GeometryNodeMeshToCurve")
+    tree.links.new(source.outputs[0], convert.inputs[0])
+    tree.links.new(convert.outputs[0], target.inputs[0])
+    holder.modifiers.new("convert", "NODES").node_group = tree
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    bpy.context.view_layer.objects.active = holder
+    holder.select_set(True)
+    bpy.ops.object.convert(target="CURVES")
+    data = holder.data
+    bpy.data.objects.remove(holder)
+    bpy.data.node_groups.remove(tree)
+    if not mesh.users:
+        bpy.data.meshes.remove(mesh)
+    return data
+
+
+def _read(data, name: str) -> np.ndarray:
+    attribute = data.attributes.get(name)
+    values = np.zeros((len(data.points), 3), np.float32)
+    if attribute is not None and len(values):
+        attribute.data.foreach_get("vector", values.ravel())
+    return values

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A character of the scene as a USD shot, from the very numbers that the live view reads."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..services import names
+from ..services.motion import Motion
+from ..services.rig import joint_weights
+from . import body as body_reader
+from . import curves
+from .placing import bind_place
+from .sampling import body_of, hairs_of
+
+
+def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str]:
+    """Write the armature's motion, its body and its hair at rest.
+
+    Args:
+        path: the USD file.
+        armature, scene: what to write.
+        sampled: its `SampledRig`.
+        hairs: hair objects to write; all that the armature carries if left out.
+
+    Returns:
+        prim path of each hair object, by name.
+
+    Raises:
+        NeuralocksError: the file cannot be written, or the USD libraries are missing.
+    """
+    from usd.scene_writer import HairArrays, SceneArrays, SkinArrays, hair_path, write_scene
+
+    motion, rig = sampled.motion, sampled.rig
+    from_core = np.linalg.inv(_core(motion))
+    bind = from_core @ sampled.character.skeleton.bind
+    hairs = hairs_of(armature, scene) if hairs is None else hairs
+    labels = names.unique([f"Hair_{h.name}" for h in hairs])
+    prims = []
+    for hair, label in zip(hairs, labels, strict=True):
+        data, radius = hair.data, curves.radius(hair.data)
+        prims.append(
+            HairArrays(
+                label,
+                curves.points(data),
+                curves.counts(data),
+                None if radius is None or not len(radius) else 2 * radius,
+                bind_place(hair, armature, sampled),
+                motion.places[hair.name],
+                sampled.character.head,
+            )
+        )
+    body, skin, shape = body_of(armature, scene), None, motion.shape
+    if body is not None and body.name in motion.places:
+        arrays = body_reader.read(body)
+        place = motion.places[body.name][0]
+        shapes = {
+            n: o @ place[:3, :3].T
+            for n, o in zip(names.unique(list(arrays.shapes)), arrays.shapes.values(), strict=True)
+        }
+        indices, weights = joint_weights(arrays, rig.bones)
+        triangles = arrays.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else arrays.triangles
+        skin = SkinArrays(arrays.points @ place[:3, :3].T + place[:3, 3], triangles, indices, weights, shapes)
+    rest = bind.copy()
+    for joint, parent in enumerate(rig.parents):
+        if parent >= 0:
+            rest[joint] = np.linalg.inv(bind[parent]) @ bind[joint]
+    write_scene(
+        Path(path),
+        SceneArrays(
+            motion.metres_per_unit,
+            motion.rate,
+            motion.frames,
+            rig.paths,
+            bind,
+            rest,
+            motion.translation,
+            motion.rotation,
+            motion.scale,
+            skin,
+            shape,
+            prims,
+        ),
+    )
+    return {hair.name: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
+
+
+def _core(motion: Motion) -> np.ndarray:
+    from ..services.axes import to_core
+
+    return to_core(motion.metres_per_unit)

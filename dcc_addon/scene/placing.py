@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a hair object lies in the bind pose, and modifiers that would move its hair a second time."""
+
+import json
+
+import numpy as np
+
+
+def bind_place(hair, armature, sampled) -> np.ndarray:
+    """World transform (4, 4) of the hair object in the bind pose.
+
+    Hair that is parented to a bone has moved with the pose already at the first frame: this is taken out again.
+    """
+    place = sampled.motion.places[hair.name][0]
+    if hair.parent == armature and hair.parent_type == "BONE" and hair.parent_bone in sampled.rig.bones:
+        joint = sampled.rig.bones.index(hair.parent_bone)
+        bind = sampled.motion.places[""][0] @ sampled.rig.rest[joint] @ sampled.trim[joint]
+        return bind @ np.linalg.inv(sampled.world[0, joint]) @ place
+    return place
+
+
+def mute_deformers(hair) -> None:
+    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done
+    that.
+    """
+    settings = hair.neuralocks_hair
+    if settings.muted:
+        return
+    found = {}
+    for modifier in hair.modifiers:
+        cached = modifier.type == "MESH_SEQUENCE_CACHE"
+        if cached or (modifier.type == "NODES" and _follows_surface(modifier.node_group)):
+            found[modifier.name] = [modifier.show_viewport, modifier.show_render]
+            modifier.show_viewport = modifier.show_render = False
+    settings.muted = json.dumps(found) if found else ""
+
+
+def unmute_deformers(hair) -> None:
+    """Switch them on again as they were."""
+    settings = hair.neuralocks_hair
+    try:
+        found = json.loads(settings.muted or "{}")
+    except json.JSONDecodeError:
+        found = {}
+    for name, (viewport, render) in found.items():
+        modifier = hair.modifiers.get(name)
+        if modifier is not None:
+            modifier.show_viewport, modifier.show_render = viewport, render
+    settings.muted = ""
+
+
+def _follows_surface(tree, depth: int = 0) -> bool:
+    if tree is None or depth > 8:
+        return False
+    for node in tree.nodes:
+        if node.bl_idname == "GeometryNodeDeformCurvesOnSurface":
+            return True
+        if node.bl_idname == "GeometryNodeGroup" and _follows_surface(node.node_tree, depth + 1):
+            return True
+    return False

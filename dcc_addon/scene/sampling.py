@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sampling a rig's motion by stepping through the frames, so that constraints, IK, drivers and NLA count."""
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..services import rig as rig_service
+from ..services.axes import to_core
+from ..services.motion import Motion, frame_numbers, trim_of
+from ..session import SampledRig, session
+from . import armature as armature_reader
+from . import body as body_reader
+
+
+def hairs_of(armature, scene) -> list:
+    """Hair objects of the scene that this armature carries."""
+    return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.armature == armature]
+
+
+def body_of(armature, scene):
+    """The body mesh chosen by the artist, else the one found."""
+    chosen = armature.neuralocks_character.body
+    if chosen is not None and chosen.name in scene.objects:
+        return chosen
+    return body_reader.find(armature, scene.objects)
+
+
+def key_of(armature, scene) -> tuple:
+    """What a sampling of this armature depends on besides its animation."""
+    settings, body = armature.neuralocks_character, body_of(armature, scene)
+    return (
+        scene.frame_start,
+        scene.frame_end,
+        scene.neuralocks.subframes,
+        round(scene.render.fps / scene.render.fps_base, 6),
+        round(scene.unit_settings.scale_length, 9),
+        body.name if body else "",
+        settings.head_bone,
+        len(armature.data.bones),
+        tuple(sorted(o.name for o in hairs_of(armature, scene))),
+    )
+
+
+def sample(context, armature) -> Iterator[tuple[int, int]]:
+    """Step through the scene's frames; yields (done, total) and puts the result into the session at the end.
+
+    The current frame is put back between the yields only by the caller (see `stepping`), and always at the end.
+
+    Raises:
+        NeuralocksError: the armature cannot be sampled, in plain words.
+    """
+    scene = context.scene
+    rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
+    rig.humanoid()
+    body = body_of(armature, scene)
+    tracked = {o.name: o for o in [*hairs_of(armature, scene), *([body] if body else [])]}
+    frames = frame_numbers(scene.frame_start, scene.frame_end, scene.neuralocks.subframes)
+    key = key_of(armature, scene)
+    joints = np.empty((len(frames), len(rig.bones), 4, 4))
+    places = {name: np.empty((len(frames), 4, 4)) for name in ["", *tracked]}
+    shapes = []
+    name, reader = armature.name, None
+    for row, frame in enumerate(frames):
+        whole = int(np.floor(frame + 1e-6))
+        scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+        graph = context.evaluated_depsgraph_get()
+        armature = bpy.data.objects.get(name)
+        if armature is None:
+            raise NeuralocksError(f"{name}: the armature was deleted while its motion was sampled; start again")
+        evaluated = armature.evaluated_get(graph)
+        if not evaluated.is_evaluated:
+            raise NeuralocksError(
+                f"{name}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
+            )
+        reader = reader or armature_reader.PoseReader(armature, rig.bones)
+        joints[row] = reader.world(evaluated)
+        places[""][row] = evaluated.matrix_world
+        for other in tracked:
+            places[other][row] = bpy.data.objects[other].evaluated_get(graph).matrix_world
+        shapes.append(body_reader.shape_values(bpy.data.objects[body.name] if body else None))
+        yield row + 1, len(frames)
+    rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
+    untrimmed = places[""][0] @ rig.rest
+    motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
+    arrays = body_reader.read(bpy.data.objects[body.name]) if body else None
+    character = rig_service.character(rig, places[""][0], arrays, places[body.name][0] if body else None, unit)
+    clip = motion.clip(to_core(unit))
+    session.forget_motion(name)
+    session.rigs[name] = SampledRig(rig, motion, character, clip, trim_of(untrimmed, name), key)
+    session.readers[name] = reader
+
+
+class stepping:
+    """While frames are stepped: the live view is off, and the current frame comes back at the end."""
+
+    def __init__(self, scene):
+        self._scene = scene
+
+    def __enter__(self):
+        self._frame = self._scene.frame_current, self._scene.frame_subframe
+        session.paused += 1
+
+    def __exit__(self, *_):
+        try:
+            self._scene.frame_set(self._frame[0], subframe=self._frame[1])
+        finally:
+            session.paused -= 1
+
+
+def ensure(context, armature) -> SampledRig:
+    """The sampled motion, sampled now if there is none or it is stale."""
+    found = session.rigs.get(armature.name)
+    if found is None or found.stale or found.key != key_of(armature, context.scene):
+        with stepping(context.scene):
+            for _ in sample(context, armature):
+                pass
+        found = session.rigs[armature.name]
+    return found

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's world (Z up, characters look along -Y, any unit) and the core's (metres, Y up, +Z)."""
+
+import numpy as np
+
+# The same turn with which `usd.border` reads a stage that is Z up: one result by either way.
+_TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def to_core(metres_per_unit: float = 1.0) -> np.ndarray:
+    """Transform (4, 4) from Blender's world space to the core's; `metres_per_unit` is the scene's unit scale."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = _TURN * metres_per_unit
+    return matrix
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Points (N, 3) through an affine transform (4, 4), in float64."""
+    return np.asarray(points, float) @ matrix[:3, :3].T + matrix[:3, 3]

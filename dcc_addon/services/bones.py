@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair bones: which they are, and how they turn at any time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
+from neuralocks_core.rig.network import RigSampler
+
+from .rig import RigArrays
+
+
+def chains_of(character: Character, patterns: str = "") -> HairChains:
+    """The hair chains of a character.
+
+    Args:
+        character: with its body, if that is known.
+        patterns: names of first joints, separated by commas; found by themselves where empty.
+    """
+    wanted = [word.strip() for word in patterns.split(",") if word.strip()]
+    return find_chains(character, _meshes(character), wanted or None)
+
+
+def _meshes(character: Character) -> list[SkinnedMesh] | None:
+    body = character.body
+    if body is None:
+        return None
+    return [SkinnedMesh("body", body.points, body.triangles, body.joint_indices, body.joint_weights)]
+
+
+@dataclass(eq=False)
+class LiveBones:
+    """A rig model bound to a character.
+
+    Attributes:
+        bones: names of the hair bones, (N), as in Blender.
+        joints: their places in the skeleton, (N,).
+    """
+
+    model: RigModel
+    bones: tuple[str, ...]
+    joints: np.ndarray
+
+    @classmethod
+    def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":
+        """Bind a model; the error says why it does not fit this rig."""
+        joints = model.chains.match(rig.paths)
+        model.chains.check_same(chains_of(character, patterns))
+        return cls(model, tuple(rig.bones[j] for j in joints), joints)
+
+    def follow(self, character: Character, clip: Clip) -> None:
+        """Read the body's history from this clip from now on."""
+        if getattr(self, "_clip", None) is not clip:
+            self._clip, self._sampler = clip, RigSampler(self.model.spec, character, clip)
+
+    def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+        """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4)
+        are the poses drawn.
+        """
+        return self.model.evaluate(self._sampler.features(times, strength, joints))

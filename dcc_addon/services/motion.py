@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig's motion, sampled once: joint by joint translation, rotation and scale, as USD will store it.
+
+Blender's matrices are turned at once into the float32 channels of a SkelAnimation, and everything else is computed
+from these: live view, bake and the
+exported stage then see the very same numbers.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import from_quaternion, rotation_part, to_quaternion
+
+TOLERANCE = 1e-4
+"""Transforms that differ by less than this (in matrix entries) are the same pose."""
+
+
+def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
+    """Transforms (..., 4, 4) with rotation, translation and one scale each: what a chain of joints can carry.
+
+    Stretched bones (IK stretch, squash) have a different scale along each axis, which relative to a parent is
+    shear; hair does not need it.
+    """
+    joints = np.asarray(joints, float)
+    try:
+        turn = rotation_part(joints, subject)
+    except NeuralocksError as error:
+        if "mirrored" in str(error):
+            raise NeuralocksError(
+                f"{subject}: it is mirrored (negative scale); apply its scale (Ctrl A in Object Mode)"
+            ) from None
+        raise
+    scale = np.cbrt(np.linalg.det(joints[..., :3, :3]))
+    result = joints.copy()
+    result[..., :3, :3] = turn * scale[..., None, None]
+    return result
+
+
+def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
+    """Per joint, the scale (J, 4, 4) that makes its bind transform a plain rotation and translation.
+
+    Applied to bind and posed transforms alike it cancels; it keeps the scale of an object out of channels of half
+    precision.
+    """
+    size = np.cbrt(np.linalg.det(similar(bind, subject)[:, :3, :3]))
+    trim = np.zeros((len(bind), 4, 4))
+    trim[:, [0, 1, 2], [0, 1, 2]] = 1 / size[:, None]
+    trim[:, 3, 3] = 1
+    return trim
+
+
+def _matrices(translation, rotation, scale) -> np.ndarray:
+    result = np.zeros((*translation.shape[:-1], 4, 4))
+    result[..., :3, :3] = from_quaternion(rotation.astype(float)) * scale.astype(float)[..., None, :]
+    result[..., :3, 3] = translation
+    result[..., 3, 3] = 1
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What was sampled of one armature, in Blender's world space and unit.
+
+    Attributes:
+        frames: ascending frame numbers, (T,), fractions for sub-frames.
+        rate: frames per second.
+        metres_per_unit: the scene's unit scale.
+        parents: (J,).
+        translation, rotation, scale: local channels, (T, J, 3), (T, J, 4) wxyz and (T, J, 3) float32.
+        shape: values of the body's shape keys, (T, B) float32.
+        places: world transforms (T, 4, 4) of the armature (key "") and of each hair and body object, by name.
+    """
+
+    frames: np.ndarray
+    rate: float
+    metres_per_unit: float
+    parents: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    scale: np.ndarray
+    shape: np.ndarray
+    places: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def from_world(
+        cls, frames, rate, metres_per_unit, parents, bind, joints, shape, places, subject="armature"
+    ) -> "Motion":
+        """From world transforms of every joint in the bind pose, (J, 4, 4), and over time, (T, J, 4, 4).
+
+        Channels are relative to the parent as stored, rounding included, so that rounding does not add up along the
+        spine.
+        """
+        trim = trim_of(bind, subject)
+        joints, parents = similar(joints, subject) @ trim, np.asarray(parents, int)
+        stored = np.empty_like(joints)
+        translation, scale = (np.empty((*joints.shape[:2], 3), np.float32) for _ in range(2))
+        rotation = np.empty((*joints.shape[:2], 4), np.float32)
+        for joint, parent in enumerate(parents):
+            local = joints[:, joint] if parent < 0 else np.linalg.inv(stored[:, parent]) @ joints[:, joint]
+            size = np.cbrt(np.linalg.det(local[:, :3, :3]))
+            translation[:, joint] = local[:, :3, 3]
+            rotation[:, joint] = to_quaternion(local[:, :3, :3] / size[:, None, None])
+            scale[:, joint] = size.astype(np.float16)[:, None]  # scales of a SkelAnimation have half precision
+            own = _matrices(translation[:, joint], rotation[:, joint], scale[:, joint])
+            stored[:, joint] = own if parent < 0 else stored[:, parent] @ own
+        return cls(
+            np.asarray(frames, float),
+            float(rate),
+            float(metres_per_unit),
+            parents,
+            translation,
+            rotation,
+            scale,
+            np.asarray(shape, np.float32),
+            dict(places),
+        )
+
+    @property
+    def times(self) -> np.ndarray:
+        """(T,) [s]."""
+        return self.frames / self.rate
+
+    def world(self) -> np.ndarray:
+        """Joints (T, J, 4, 4) in Blender's world space, from the stored channels."""
+        joints = _matrices(self.translation, self.rotation, self.scale)
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                joints[:, joint] = joints[:, parent] @ joints[:, joint]
+        return joints
+
+    def clip(self, to_core: np.ndarray, loop: bool = False) -> Clip:
+        """The same as the core reads it."""
+        return Clip(self.times, to_core @ self.world(), self.shape, loop)
+
+    def row(self, frame: float) -> int | None:
+        """Index of the sample taken at `frame`, or None."""
+        row = int(np.searchsorted(self.frames, frame - 1e-4))
+        return row if row < len(self.frames) and abs(self.frames[row] - frame) < 1e-3 else None
+
+
+def frame_numbers(start: int, end: int, subframes: int) -> np.ndarray:
+    """Frames to sample from `start` to `end`, with `subframes` more between any two, (T,)."""
+    if end < start:
+        raise NeuralocksError(f"frame range: it ends at {end}, before its start {start}; set an end after the start")
+    step = subframes + 1
+    return start + np.arange((end - start) * step + 1) / step

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names of bones as joint paths that every USD reader accepts."""
+
+import re
+
+import numpy as np
+
+
+def identifier(name: str) -> str:
+    """`name` with only letters, digits and underscores, not beginning with a digit."""
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "_"
+    return f"_{plain}" if plain[0].isdigit() else plain
+
+
+def unique(names: list[str]) -> list[str]:
+    """Identifiers of `names`, each different from all others (Blender reads only the last part of a joint path)."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        base = identifier(name)[:58]
+        candidate, number = base, 1
+        while candidate in taken:
+            number += 1
+            candidate = f"{base}_{number}"
+        taken.add(candidate)
+        result.append(candidate)
+    return result
+
+
+def joint_paths(bones: list[str], parents: list[int]) -> list[str]:
+    """Joint paths (J) of bones listed parents first."""
+    paths: list[str] = []
+    for leaf, parent in zip(unique(bones), parents, strict=True):
+        paths.append(leaf if parent < 0 else f"{paths[parent]}/{leaf}")
+    return paths
+
+
+def parents_first(parents: list[int]) -> np.ndarray:
+    """An order (J,) in which every parent comes before its children, else as given."""
+    order, placed = [], set()
+
+    def place(joint: int) -> None:
+        way = []
+        while joint >= 0 and joint not in placed:
+            way.append(joint)
+            joint = parents[joint]
+        for step in reversed(way):
+            placed.add(step)
+            order.append(step)
+
+    for joint in range(len(parents)):
+        place(joint)
+    return np.array(order, int)

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Blender rig, read as arrays, as the core's character; and in plain words what is wrong with it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.humanoid import find_humanoid
+
+from . import names
+from .axes import to_core, transformed
+from .motion import similar, trim_of
+
+
+@dataclass(frozen=True, eq=False)
+class RigArrays:
+    """An armature's rest pose, in the armature's own space and Blender's unit.
+
+    Attributes:
+        name: the armature object's name.
+        bones: bone names, parents first, (J).
+        parents: (J,) int.
+        rest: rest transforms in armature space, (J, 4, 4).
+        head_bone: name of the head bone if the artist chose one.
+    """
+
+    name: str
+    bones: tuple[str, ...]
+    parents: np.ndarray
+    rest: np.ndarray
+    head_bone: str = ""
+
+    @property
+    def paths(self) -> list[str]:
+        """Joint paths (J)."""
+        return names.joint_paths(list(self.bones), list(self.parents))
+
+    def by_hand(self) -> dict[str, str]:
+        """The joint map given by the artist."""
+        if not self.head_bone:
+            return {}
+        if self.head_bone not in self.bones:
+            raise NeuralocksError(f"{self.name}: it has no bone '{self.head_bone}'; choose the head bone again")
+        return {"head": self.paths[self.bones.index(self.head_bone)]}
+
+    def humanoid(self):
+        """Which bone is which; the error says it in the words of the panel."""
+        if not self.bones:
+            raise NeuralocksError(f"{self.name}: the armature has no bones; choose the armature that moves the body")
+        try:
+            return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3], self.by_hand())
+        except NeuralocksError as error:
+            if "head" in str(error) and not self.head_bone:
+                raise NeuralocksError(f"{self.name}: no bone is named like a head; choose the head bone") from None
+            raise
+
+
+@dataclass(frozen=True, eq=False)
+class BodyArrays:
+    """A skinned mesh at rest, in its own space.
+
+    Attributes:
+        name: the mesh object's name.
+        points: (V, 3); triangles: (F, 3).
+        groups: vertex group names; weights: (N, 3) rows of vertex, group, weight.
+        shapes: shape key name -> offsets (V, 3).
+    """
+
+    name: str
+    points: np.ndarray
+    triangles: np.ndarray
+    groups: tuple[str, ...]
+    weights: np.ndarray
+    shapes: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+INFLUENCES = 4
+"""Joints that move one vertex, at most: the strongest are kept."""
+
+
+def joint_weights(body: BodyArrays, bones: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Joint indices and weights (V, 4) of the body; vertices without weights stay with the first joint."""
+    column = {bone: i for i, bone in enumerate(bones)}
+    joint_of_group = np.array([column.get(group, -1) for group in body.groups] or [-1])
+    count = len(body.points)
+    indices, weights = np.zeros((count, INFLUENCES), int), np.zeros((count, INFLUENCES))
+    if len(body.weights):
+        vertex, group = body.weights[:, 0].astype(int), body.weights[:, 1].astype(int)
+        joint, weight = joint_of_group[group], body.weights[:, 2]
+        kept = (joint >= 0) & (weight > 0)
+        vertex, joint, weight = vertex[kept], joint[kept], weight[kept]
+        order = np.lexsort((joint, -weight, vertex))
+        vertex, joint, weight = vertex[order], joint[order], weight[order]
+        rank = np.arange(len(vertex)) - np.searchsorted(vertex, vertex)
+        strong = rank < INFLUENCES
+        indices[vertex[strong], rank[strong]] = joint[strong]
+        weights[vertex[strong], rank[strong]] = weight[strong]
+    total = weights.sum(axis=1, keepdims=True)
+    weights[total[:, 0] <= 0, 0] = 1
+    return indices, weights / np.where(total > 0, total, 1)
+
+
+def character(
+    rig: RigArrays,
+    place: np.ndarray,
+    body: BodyArrays | None = None,
+    body_place: np.ndarray | None = None,
+    metres_per_unit: float = 1.0,
+) -> Character:
+    """The character in the core's space.
+
+    Args:
+        rig: the armature at rest.
+        place: world transform (4, 4) of the armature object at the first sampled frame.
+        body, body_place: the mesh and its world transform at that frame.
+        metres_per_unit: the scene's unit scale.
+    """
+    core = to_core(metres_per_unit)
+    humanoid = rig.humanoid()
+    skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
+    return Character(skeleton, None if body is None else _body(body, core @ body_place, rig.bones), humanoid)
+
+
+def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:
+    """Bind transforms (J, 4, 4) in Blender's world, without scale, for an armature object that stands at `place`."""
+    bind = similar(place @ rig.rest, rig.name)
+    return bind @ trim_of(bind, rig.name)
+
+
+def _body(body: BodyArrays, matrix: np.ndarray, bones: tuple[str, ...]) -> Body:
+    # The float32 of a stage's points, so that a body measured here and in the exported stage is the same one.
+    points = transformed(body.points, matrix)
+    shapes = {name: offsets @ matrix[:3, :3].T for name, offsets in body.shapes.items()}
+    triangles = body.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else body.triangles
+    return Body(points, triangles, *joint_weights(body, bones), shapes)
+
+
+def groom(
+    name: str,
+    points: np.ndarray,
+    counts: np.ndarray,
+    place: np.ndarray,
+    metres_per_unit: float = 1.0,
+    radius: np.ndarray | None = None,
+) -> Groom:
+    """The groom in bind world space.
+
+    Args:
+        name: what messages call it.
+        points: (P, 3) in the hair object's space; counts: (S,).
+        place: world transform (4, 4) of the hair object in the bind pose.
+        metres_per_unit: the scene's unit scale.
+        radius: (P,) in the hair object's space.
+    """
+    if not len(counts) or not len(points):
+        raise NeuralocksError(f"{name}: the hair has no strands; add hair to it or choose another object")
+    if counts.max() < 2:
+        raise NeuralocksError(f"{name}: every strand has one point only; give the strands two points or more")
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{name}: some points are not finite; delete these strands")
+    matrix = to_core(metres_per_unit) @ place
+    widths = None if radius is None or not len(radius) else 2 * radius * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    return Groom(name, transformed(points, matrix), counts, widths)
+
+
+def advice(rig: RigArrays) -> list[str]:
+    """What an artist should know about the rig, in plain words; an empty list is good news."""
+    found = rig.humanoid()
+    lines = []
+    unseen = {
+        "neck": "the neck bend",
+        "upper_chest": "the body turn",
+        "left_upper_arm": "the left arm",
+        "right_upper_arm": "the right arm",
+    }
+    for part, what in unseen.items():
+        if part not in found:
+            lines.append(f"No {part.replace('_', ' ')} bone found: the hair will not see {what}")
+    return lines

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Training in a process of its own, in a Python that has torch; Blender stays usable and only reads its lines."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+CHILD = Path(__file__).with_name("training_child.py")
+
+
+def problem(python: str) -> str:
+    """What keeps this Python from training, with the remedy; empty when it can.
+
+    Args:
+        python: path of an interpreter; empty means none is set.
+    """
+    remedy = "install one with: python3 -m pip install 'neuralocks[train]', and name it in the add-on's preferences"
+    if not python:
+        return f"Training needs a Python with torch, which is too large to come with the add-on; {remedy}"
+    if not os.path.isfile(python):
+        return f"{python}: no such file; {remedy}"
+    try:
+        done = subprocess.run(
+            [python, str(CHILD), "--check"],
+            env=environment(),
+            capture_output=True,
+            text=True,
+            timeout=60,
+            stdin=subprocess.DEVNULL,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"{python}: cannot be run ({type(error).__name__}); {remedy}"
+    if done.returncode:
+        lines = [line for line in done.stderr.strip().splitlines() if line]
+        return f"{python}: {lines[-1] if lines else 'does not run'}; {remedy}"
+    return ""
+
+
+def environment() -> dict[str, str]:
+    """This process's environment without what belongs to Blender's own Python; the packages lying beside the add-on
+    can be found.
+    """
+    import neuralocks_core
+
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    root = Path(neuralocks_core.__file__).resolve().parent.parent
+    # A source checkout serves the child too. A site-packages folder does not: its compiled packages are for Blender's
+    # Python.
+    if root.name not in ("site-packages", "packages"):
+        kept["PYTHONPATH"] = str(root)
+    return kept
+
+
+class TrainingJob:
+    """A running training.
+
+    Attributes:
+        done, message: progress from 0 to 1, and the latest line with the gauge.
+        error: why it failed, in one line; empty otherwise.
+        out: the model file that it writes.
+    """
+
+    def __init__(self, python: str, settings: dict):
+        self.done, self.message, self.error, self.out = 0.0, "Starting", "", settings["out"]
+        self._began = time.monotonic()
+        self._cancelled = False
+        group = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x00000200}
+        self._process = subprocess.Popen(
+            [python, str(CHILD)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment(),
+            text=True,
+            **group,
+        )
+        self._process.stdin.write(json.dumps(settings))
+        self._process.stdin.close()
+        self._tail: list[str] = []
+        self._threads = [threading.Thread(target=f, daemon=True) for f in (self._listen, self._drain)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it still works."""
+        return self._process.poll() is None or any(t.is_alive() for t in self._threads)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether it ended well."""
+        return not self.running and not self._cancelled and self._process.returncode == 0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimate from what is done so far."""
+        spent = time.monotonic() - self._began
+        return spent * (1 - self.done) / self.done if self.done > 0.01 else None
+
+    def cancel(self) -> None:
+        """Stop it, with the processes that it started."""
+        self._cancelled = True
+        if self._process.poll() is None:
+            try:
+                if os.name == "posix":
+                    os.killpg(self._process.pid, signal.SIGTERM)
+                else:
+                    self._process.terminate()
+                self._process.wait(5)
+            except (ProcessLookupError, subprocess.TimeoutExpired):
+                if os.name == "posix":
+                    os.killpg(self._process.pid, signal.SIGKILL)
+                else:
+                    self._process.kill()
+                self._process.wait(5)
+
+    def failure(self) -> str:
+        """Why it failed, in one line."""
+        if self.error or self._cancelled or self.running or self._process.returncode == 0:
+            return self.error
+        return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
+
+    def _listen(self) -> None:
+        for line in self._process.stdout:
+            try:
+                said = json.loads(line)
+            except json.JSONDecodeError:
+                continue
+            if "error" in said:
+                self.error = str(said["error"])
+            else:
+                self.done = float(said.get("done", self.done))
+                self.message = str(said.get("message", self.message))
+
+    def _drain(self) -> None:
+        for line in self._process.stderr:
+            if line.strip():
+                self._tail = [*self._tail[-20:], line.strip()]
+
+
+def default_python() -> str:
+    """An interpreter that may have torch: that of an activated or nearby environment."""
+    name = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    import neuralocks_core
+
+    candidates = [
+        os.environ.get("VIRTUAL_ENV", ""),
+        str(Path(neuralocks_core.__file__).resolve().parent.parent / ".venv"),
+    ]
+    return next((str(Path(c) / name) for c in candidates if c and (Path(c) / name).is_file()), "")

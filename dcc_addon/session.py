@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is computed once and kept in memory while Blender runs; nothing here is saved, and losing it costs only time.
+
+Blender objects are looked up by name each time: a pointer kept over an undo or a file load is invalid.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.motion import Clip
+
+from .services.motion import Motion
+from .services.rig import RigArrays
+
+
+@dataclass(eq=False)
+class SampledRig:
+    """One armature with its sampled motion, as Blender and as the core see it."""
+
+    rig: RigArrays
+    motion: Motion
+    character: Character
+    clip: Clip
+    trim: np.ndarray
+    """See `services.motion.trim_of`."""
+    key: tuple
+    """What the sampling depended on: frame range, sub-frames, rate, unit, body, head bone, hair."""
+    stale: bool = False
+    """Whether the animation has changed since."""
+
+    @cached_property
+    def world(self) -> np.ndarray:
+        """Joints (T, J, 4, 4) in Blender's world space."""
+        return self.motion.world()
+
+
+@dataclass(eq=False)
+class Session:
+    """Sampled rigs and prepared hair, by object name; messages for the panel."""
+
+    rigs: dict[str, SampledRig] = field(default_factory=dict)
+    hairs: dict[str, object] = field(default_factory=dict)
+    readers: dict[str, object] = field(default_factory=dict)
+    chains: dict[str, object] = field(default_factory=dict)
+    models: dict[str, tuple] = field(default_factory=dict)
+    messages: dict[str, str] = field(default_factory=dict)
+    cards: dict[str, list[str]] = field(default_factory=dict)
+    paused: int = 0
+    """Above zero while frames are stepped for sampling: the live view then stays out of the way."""
+    sampling: float | None = None
+    """Share of a sampling in the background that is done."""
+    failed: set[str] = field(default_factory=set)
+    """Armatures that could not be sampled in the background; tried again when something about them changes."""
+
+    def forget(self, name: str) -> None:
+        """Drop what was prepared for a hair object or for the hair bones of an armature."""
+        self.hairs.pop(name, None)
+        self.chains.pop(name, None)
+        self.messages.pop(name, None)
+
+    def forget_motion(self, name: str) -> None:
+        """Drop what was sampled of an armature, and the hair that it carries."""
+        self.rigs.pop(name, None)
+        self.failed.discard(name)
+        self.readers.pop(name, None)
+        self.chains.pop(name, None)
+        self.hairs.clear()
+        self.messages.pop(name, None)
+
+    def clear(self) -> None:
+        """Forget everything, at file load and when the add-on goes."""
+        self.__init__()
+
+
+session = Session()

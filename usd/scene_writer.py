@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write an animated character with hair as a shot, from arrays: what an application without a USD exporter of its
+own hands over.
+"""
+
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+
+from .border import row_matrix
+
+ROOT = "/Character"
+
+
+@dataclass(frozen=True, eq=False)
+class SkinArrays:
+    """A skinned mesh in bind world space.
+
+    Attributes:
+        points: (V, 3); triangles: (F, 3).
+        joint_indices, joint_weights: (V, I).
+        shapes: blend shape name (a valid identifier) -> offsets (V, 3).
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    joint_indices: np.ndarray
+    joint_weights: np.ndarray
+    shapes: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class HairArrays:
+    """A groom.
+
+    Attributes:
+        name: a valid identifier.
+        points: (P, 3) in the prim's own space; counts: (S,); widths: (P,) or None.
+        bind_place: the prim's place in the bind pose, (4, 4).
+        places: its place at every frame, (T, 4, 4).
+        joint: index of the joint that carries it.
+    """
+
+    name: str
+    points: np.ndarray
+    counts: np.ndarray
+    widths: np.ndarray | None
+    bind_place: np.ndarray
+    places: np.ndarray
+    joint: int
+
+
+@dataclass(frozen=True, eq=False)
+class SceneArrays:
+    """A character in motion, in the units of the stage, Z up.
+
+    Attributes:
+        metres_per_unit, rate: of the stage.
+        frames: time codes, (T,).
+        joints: joint paths, parents first, (J); bind: their bind transforms in the world, (J, 4, 4).
+        rest: local rest transforms, (J, 4, 4).
+        translation, rotation, scale: (T, J, 3), (T, J, 4) wxyz, (T, J, 3), local.
+        skin: the body, or None; shape: blend shape weights (T, B).
+        hair: grooms.
+    """
+
+    metres_per_unit: float
+    rate: float
+    frames: np.ndarray
+    joints: list[str]
+    bind: np.ndarray
+    rest: np.ndarray
+    translation: np.ndarray
+    rotation: np.ndarray
+    scale: np.ndarray
+    skin: SkinArrays | None
+    shape: np.ndarray
+    hair: list[HairArrays]
+
+
+def write_scene(path, scene: SceneArrays) -> Path:
+    """Write the shot, whole or not at all.
+
+    Raises:
+        NeuralocksError: the file cannot be written there.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".usd", ".usda", ".usdc"):
+        raise NeuralocksError(f"{path}: a shot is written as USD; end the name with .usdc")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".shot-") as folder:
+            part = Path(folder) / path.name
+            stage = Usd.Stage.CreateNew(str(part))
+            _author(stage, scene)
+            stage.GetRootLayer().Save()
+            del stage
+            os.replace(part, path)
+    except OSError as error:
+        raise NeuralocksError(
+            f"{path}: cannot be written ({error.strerror}); choose a folder you can write to"
+        ) from None
+    return path
+
+
+def hair_path(name: str) -> str:
+    """Prim path of the groom with this name."""
+    return f"{ROOT}/{name}"
+
+
+def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, scene.metres_per_unit)
+    stage.SetTimeCodesPerSecond(scene.rate)
+    stage.SetFramesPerSecond(scene.rate)
+    stage.SetStartTimeCode(float(scene.frames[0]))
+    stage.SetEndTimeCode(float(scene.frames[-1]))
+    root = UsdSkel.Root.Define(stage, ROOT)
+    stage.SetDefaultPrim(root.GetPrim())
+    skeleton = UsdSkel.Skeleton.Define(stage, f"{ROOT}/Rig")
+    skeleton.CreateJointsAttr(scene.joints)
+    skeleton.CreateBindTransformsAttr(Vt.Matrix4dArray([row_matrix(m) for m in scene.bind]))
+    skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray([row_matrix(m) for m in scene.rest]))
+    animation = _animation(stage, scene)
+    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
+    if scene.skin is not None:
+        _skin(stage, scene.skin, skeleton)
+    for hair in scene.hair:
+        _hair(stage, hair, scene.frames, skeleton)
+
+
+def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
+    animation = UsdSkel.Animation.Define(stage, f"{ROOT}/Rig/Motion")
+    animation.CreateJointsAttr(scene.joints)
+    translations, rotations, scales = (
+        animation.CreateTranslationsAttr(),
+        animation.CreateRotationsAttr(),
+        animation.CreateScalesAttr(),
+    )
+    shapes = list(scene.skin.shapes) if scene.skin else []
+    if shapes:
+        animation.CreateBlendShapesAttr(shapes)
+        weights = animation.CreateBlendShapeWeightsAttr()
+    for row, frame in enumerate(map(float, scene.frames)):
+        translations.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(scene.translation[row], np.float32)), frame)
+        rotations.Set(Vt.QuatfArray([Gf.Quatf(*map(float, q)) for q in scene.rotation[row]]), frame)
+        scales.Set(Vt.Vec3hArray([Gf.Vec3h(*map(float, s)) for s in scene.scale[row]]), frame)
+        if shapes:
+            weights.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(scene.shape[row], np.float32)), frame)
+    return animation
+
+
+def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> None:
+    mesh = UsdGeom.Mesh.Define(stage, f"{ROOT}/Body")
+    points = np.ascontiguousarray(skin.points, np.float32)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(skin.triangles), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(skin.triangles, np.int32).ravel()))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    binding = _bind(mesh.GetPrim(), skeleton, np.eye(4))
+    width = skin.joint_indices.shape[1]
+    indices, weights = binding.CreateJointIndicesPrimvar(False, width), binding.CreateJointWeightsPrimvar(False, width)
+    indices.Set(Vt.IntArray.FromNumpy(np.ascontiguousarray(skin.joint_indices, np.int32).ravel()))
+    weights.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(skin.joint_weights, np.float32).ravel()))
+    targets = []
+    for name, offsets in skin.shapes.items():
+        shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(f"shape_{name}"))
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(offsets, np.float32)))
+        shape.CreateNormalOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.zeros_like(offsets, np.float32)))
+        targets.append(shape.GetPath())
+    if targets:
+        binding.CreateBlendShapesAttr(list(skin.shapes))
+        binding.CreateBlendShapeTargetsRel().SetTargets(targets)
+
+
+def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdSkel.Skeleton) -> None:
+    curves = UsdGeom.BasisCurves.Define(stage, hair_path(hair.name))
+    points = np.ascontiguousarray(hair.points, np.float32)
+    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+    curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(hair.counts, np.int32)))
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    widths = np.full(1, 1e-4, np.float32) if hair.widths is None else np.ascontiguousarray(hair.widths, np.float32)
+    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths))
+    curves.SetWidthsInterpolation(UsdGeom.Tokens.constant if hair.widths is None else UsdGeom.Tokens.vertex)
+    reach = np.float32(widths.max() / 2)
+    curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])))
+    op = curves.AddTransformOp(UsdGeom.XformOp.PrecisionDouble)
+    op.Set(row_matrix(hair.places[0]))
+    if (np.abs(hair.places - hair.places[0]) > 1e-9).any():
+        for frame, place in zip(map(float, frames), hair.places, strict=True):
+            op.Set(row_matrix(place), frame)
+    binding = _bind(curves.GetPrim(), skeleton, hair.bind_place)
+    binding.CreateJointIndicesPrimvar(True, 1).Set([hair.joint])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+
+
+def _bind(prim: Usd.Prim, skeleton: UsdSkel.Skeleton, bind_place: np.ndarray) -> UsdSkel.BindingAPI:
+    binding = UsdSkel.BindingAPI.Apply(prim)
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateGeomBindTransformAttr(row_matrix(bind_place))
+    return binding
