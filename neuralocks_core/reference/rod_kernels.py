@@ -4,7 +4,7 @@
 Unknowns are the vertices behind the clamp and, so that the band stays narrow, the twist of each edge's parallel
 transported frame: a change of an early edge turns all later frames (holonomy), which would make the Hessian dense.
 With the twist as a fourth unknown, tied to the edges by a stiff row, the system is block-banded: 4x4 blocks, two to
-each side, solved by a block LDL^T. Edges never change length: a step turns them.
+each side, solved by a block Cholesky. Edges never change length: a step turns them.
 
 All arrays are (K, S), vertex first, so that GPU threads read neighbouring memory. Scratch has one column per thread on
 a GPU and a single one on a CPU, where threads run one after the other and the column stays in the cache.
@@ -12,11 +12,14 @@ a GPU and a single one on a CPU, where threads run one after the other and the c
 
 import warp as wp
 
-FOLD = wp.constant(wp.float64(1e-6))
-"""Smallest 1 + cos of the angle between two edges: keeps a folded strand finite."""
+FOLD = wp.constant(wp.float64(0.02))
+"""1 + cos of the angle between two edges below which (168 degrees) the bend's direction fades out. The direction of an
+exact fold is undefined, and a strand that swings through one would meet a cliff in the energy."""
+RATE = wp.constant(wp.float64(1.0))
+"""Most that a Newton step believes the bend vector to turn with an edge; 1/2 on a straight strand."""
 STRETCH = wp.constant(wp.float64(1e6))
 """Stiffness against stretch inside a Newton step [m^2/s^2]; what is left of it becomes the tension."""
-TWIST_TIE = wp.constant(wp.float64(1e4))
+TWIST_TIE = wp.constant(wp.float64(1e3))
 """Stiffness of the row that ties the frames' twist to the edges, in units of the bend stiffness."""
 MARGIN_LINEAR = wp.constant(wp.float64(0.02))
 """Penetration [m] from which the collision force stops growing."""
@@ -58,6 +61,14 @@ def collision_energy(depth: wp.float64, stiffness: wp.float64):
 
 
 @wp.func
+def bend_scale(open: wp.float64):
+    """1 / sqrt(2 (1 + cos)), which makes the cross product of two edges sin(theta/2) long; straight on below FOLD."""
+    limit = wp.max(open, FOLD)
+    scale = wp.float64(1.0) / wp.sqrt(wp.float64(2.0) * limit)
+    return scale - scale * scale * scale * (open - limit)
+
+
+@wp.func
 def energy(
     rods: Rods,
     x: array_vec,
@@ -89,12 +100,14 @@ def energy(
                 total += rods.mass[i, s] * collision_energy(depth, collision)
         if i < vertices - 1:
             after = (x[i + 1, c] - p) / rods.length[i + 1, s]
-            sum = wp.max(one + wp.dot(e, after), FOLD)
-            bend = wp.cross(e, after) / wp.sqrt(wp.float64(2.0) * sum)
+            open = one + wp.dot(e, after)
+            bend = bend_scale(open) * wp.cross(e, after)
             rest = wp.quat_rotate(q, rods.curl[i, s])
             frame[i, c] = rest
-            total += rods.bend[i, s] * wp.dot(bend - rest, bend - rest)
-            q = wp.normalize(wp.quatd(bend[0], bend[1], bend[2], wp.sqrt(half * sum)) * q)
+            # |bend - rest|^2, with |bend|^2 = sin^2(theta/2) in the form that is smooth up to the fold
+            square = half * (one - wp.dot(e, after)) + wp.dot(rest, rest) - wp.float64(2.0) * wp.dot(bend, rest)
+            total += rods.bend[i, s] * square
+            q = wp.normalize(wp.quatd(bend[0], bend[1], bend[2], wp.sqrt(half * wp.max(open, FOLD))) * q)
             e = after
     return total
 
@@ -145,6 +158,7 @@ def assemble(
     zero = wp.float64(0.0)
     one = wp.float64(1.0)
     two = wp.float64(2.0)
+    half = wp.float64(0.5)
     vertices = scratch.now.shape[0]
     for k in range(2, vertices):
         p = scratch.now[k, c]
@@ -178,16 +192,16 @@ def assemble(
         f = (scratch.now[j + 1, c] - scratch.now[j, c]) / ahead
         sum = wp.max(one + wp.dot(e, f), FOLD)
         cross = wp.cross(e, f)
-        scale = one / wp.sqrt(two * sum)
-        slope = -scale * scale * scale
+        slope = -one / (two * sum * wp.sqrt(two * sum))
+        scale = bend_scale(one + wp.dot(e, f))
         bend = scale * cross
         rest = scratch.frame[j, c]
         a = rods.bend[j, s]
-        force = two * a * (bend - rest)
+        force = -two * a * rest
         along = slope * wp.dot(force, cross)
         hol = -cross / sum
-        ge = scale * wp.cross(f, force) + along * f + moment * hol
-        gf = scale * wp.cross(force, e) + along * e + moment * hol
+        ge = scale * wp.cross(f, force) + (along - half * a) * f + moment * hol
+        gf = scale * wp.cross(force, e) + (along - half * a) * e + moment * hol
         ge = (ge - wp.dot(ge, e) * e) / back
         gf = (gf - wp.dot(gf, f) * f) / ahead
         moment += -two * a * wp.dot(bend, wp.cross(e, rest))
@@ -201,10 +215,13 @@ def assemble(
         if wp.abs(e[0]) > wp.float64(0.7):
             u = wp.cross(e, wp.vec3d(zero, one, zero))
         u = wp.normalize(u)
-        for turn in range(2):
-            lean = slope * wp.dot(u, cross)
-            ru = scale * wp.cross(f, u) + lean * f
-            rv = scale * wp.cross(u, e) + lean * e
+        # near a fold the bend's direction turns faster than any quadratic model can follow: cap its rate
+        rate = wp.min(scale, RATE)
+        fall = -rate * rate * rate
+        for _turn in range(2):
+            lean = fall * wp.dot(u, cross)
+            ru = rate * wp.cross(f, u) + lean * f
+            rv = rate * wp.cross(u, e) + lean * e
             ru = (ru - wp.dot(ru, e) * e) / back
             rv = (rv - wp.dot(rv, f) * f) / ahead
             add_row(scratch, c, j, ru, rv, -wp.dot(u, wp.cross(e, rest)), zero, two * a)
@@ -244,36 +261,64 @@ def add_tension(rods: Rods, scratch: Scratch, tension: array_real, c: int, s: in
 
 
 @wp.func
+def inverse_factor(a: wp.mat44d):
+    """Inverse G of the Cholesky factor of a: G a G^T = 1. An inverse of `a` itself would lose all digits here."""
+    one = wp.float64(1.0)
+    zero = wp.float64(0.0)
+    tiny = wp.float64(1e-30)
+    g00 = one / wp.sqrt(wp.max(a[0, 0], tiny))
+    c10 = a[1, 0] * g00
+    c20 = a[2, 0] * g00
+    c30 = a[3, 0] * g00
+    g11 = one / wp.sqrt(wp.max(a[1, 1] - c10 * c10, tiny))
+    c21 = (a[2, 1] - c20 * c10) * g11
+    c31 = (a[3, 1] - c30 * c10) * g11
+    g22 = one / wp.sqrt(wp.max(a[2, 2] - c20 * c20 - c21 * c21, tiny))
+    c32 = (a[3, 2] - c30 * c20 - c31 * c21) * g22
+    g33 = one / wp.sqrt(wp.max(a[3, 3] - c30 * c30 - c31 * c31 - c32 * c32, tiny))
+    g10 = -g11 * c10 * g00
+    g21 = -g22 * c21 * g11
+    g32 = -g33 * c32 * g22
+    g20 = -g22 * (c20 * g00 + c21 * g10)
+    g31 = -g33 * (c31 * g11 + c32 * g21)
+    g30 = -g33 * (c30 * g00 + c31 * g10 + c32 * g20)
+    return wp.mat44d(
+        g00, zero, zero, zero, g10, g11, zero, zero, g20, g21, g22, zero, g30, g31, g32, g33
+    )  # fmt: skip
+
+
+@wp.func
 def factor_and_solve(scratch: Scratch, c: int):
-    """Block LDL^T of the banded system; the step ends in `step`."""
+    """Block Cholesky of the banded system; the step ends in `step`.
+
+    diagonal becomes the inverse factor, lower1 and lower2 the factor's blocks.
+    """
     vertices = scratch.now.shape[0]
-    # diagonal becomes its inverse; lower1, lower2 become the factors
     for k in range(2, vertices):
         d = scratch.diagonal[k, c]
         y = scratch.right[k, c]
-        c1 = scratch.lower1[k, c]
         if k > 3:
-            a2 = scratch.lower2[k, c]
-            l2 = a2 * scratch.diagonal[k - 2, c]
-            c1 = c1 - a2 * wp.transpose(scratch.lower1[k - 1, c])
-            d = d - l2 * wp.transpose(a2)
+            l2 = scratch.lower2[k, c] * wp.transpose(scratch.diagonal[k - 2, c])
+            d = d - l2 * wp.transpose(l2)
             y = y - l2 * scratch.right[k - 2, c]
             scratch.lower2[k, c] = l2
+            scratch.lower1[k, c] = scratch.lower1[k, c] - l2 * wp.transpose(scratch.lower1[k - 1, c])
         if k > 2:
-            l1 = c1 * scratch.diagonal[k - 1, c]
-            d = d - l1 * wp.transpose(c1)
+            l1 = scratch.lower1[k, c] * wp.transpose(scratch.diagonal[k - 1, c])
+            d = d - l1 * wp.transpose(l1)
             y = y - l1 * scratch.right[k - 1, c]
             scratch.lower1[k, c] = l1
-        scratch.diagonal[k, c] = wp.inverse(d)
-        scratch.right[k, c] = y
+        g = inverse_factor(d)
+        scratch.diagonal[k, c] = g
+        scratch.right[k, c] = g * y
     k = vertices - 1
     while k >= 2:
-        z = scratch.diagonal[k, c] * scratch.right[k, c]
+        z = scratch.right[k, c]
         if k + 1 < vertices:
             z = z - wp.transpose(scratch.lower1[k + 1, c]) * scratch.step[k + 1, c]
         if k + 2 < vertices:
             z = z - wp.transpose(scratch.lower2[k + 2, c]) * scratch.step[k + 2, c]
-        scratch.step[k, c] = z
+        scratch.step[k, c] = wp.transpose(scratch.diagonal[k, c]) * z
         k -= 1
 
 
@@ -325,8 +370,9 @@ def newton(
         scratch.now[k, c] = x[k, s]
     best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
     left = wp.float64(0.0)
-    go = bool(True)
-    n = int(0)
+    go = bool(True)  # noqa: UP018 -- warp takes a plain literal for a constant
+    n = int(0)  # noqa: UP018
+    fails = int(0)  # noqa: UP018
     while go:
         assemble(rods, scratch, c, s, target, pull, plane, margin, collision)
         left = wp.sqrt(add_tension(rods, scratch, tension, c, s))
@@ -335,7 +381,7 @@ def newton(
         else:
             factor_and_solve(scratch, c)
             size = wp.float64(1.0)
-            search = bool(True)
+            search = bool(True)  # noqa: UP018
             while search:
                 turn_edges(rods, scratch, c, s, size)
                 value = energy(rods, scratch.trial, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
@@ -344,22 +390,27 @@ def newton(
                     best = value
                     search = False
                 else:
-                    size = size * wp.float64(0.5)
-                    if size < wp.float64(0.003):
+                    size = size * wp.float64(0.4)
+                    if size < wp.float64(0.001):
                         search = False
                         size = wp.float64(0.0)
-                        go = False
+                        fails += 1
+                        go = fails < 3
             for k in range(2, vertices):
-                e = (scratch.now[k, c] - scratch.now[k - 1, c]) / rods.length[k, s]
-                d = take(scratch.step[k, c])
-                if k > 2:
-                    d = d - take(scratch.step[k - 1, c])
-                # a failed step still improves the tension, which is what the residual is measured with
-                gain = wp.max(size, wp.float64(0.5)) * STRETCH * wp.dot(d, e) / rods.length[k, s]
-                tension[k, s] = tension[k, s] + gain
+                if size > wp.float64(0.0):
+                    e = (scratch.now[k, c] - scratch.now[k - 1, c]) / rods.length[k, s]
+                    d = take(scratch.step[k, c])
+                    if k > 2:
+                        d = d - take(scratch.step[k - 1, c])
+                    tension[k, s] = tension[k, s] + size * STRETCH * wp.dot(d, e) / rods.length[k, s]
+                else:
+                    # tensions of another state may have misled the step
+                    tension[k, s] = wp.float64(0.0)
             if size > wp.float64(0.0):
                 for k in range(2, vertices):
                     scratch.now[k, c] = scratch.trial[k, c]
+            else:
+                best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
             n += 1
     for k in range(2, vertices):
         x[k, s] = scratch.now[k, c]

@@ -125,7 +125,7 @@ def body_planes(
         bound = wp.min(reach, wp.length(wp.mesh_eval_position(mesh, last, uv[0], uv[1]) - q) + 1.0e-5)
     hit = wp.mesh_query_point_sign_normal(mesh, q, bound, 1.0e-3)
     found = NO_PLANE
-    element = int(-1)
+    element = int(-1)  # noqa: UP018
     if hit.result:
         element = hit.face
         corner[k, s] = wp.vec2(hit.u, hit.v)
