@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build the shipped shot: python examples/make_shot.py [-o examples/shot] [--strands 4000] [--body]
+"""Build the shipped shot: python examples/make_shot.py [-o examples/shot] [--strands 5000] [--body]
 
 Layers as a pipeline has them: body.usdc (character), motion.usdc (animation), groom.usdc (hair at rest, skinned to the
 head) and shot.usda, which puts them together with a camera and lights.
@@ -17,8 +17,10 @@ sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve
 from acting import SECONDS, act  # noqa: E402
 
 from neuralocks_core.groom import Groom  # noqa: E402
+from neuralocks_core.hairstyles import grow  # noqa: E402
+from neuralocks_core.hairstyles.scalp import Scalp  # noqa: E402
 from usd.animation import write_animation  # noqa: E402
-from usd.body import ROOT, SKELETON, write_body  # noqa: E402
+from usd.body import MESH, ROOT, SKELETON, write_body  # noqa: E402
 from usd.stage import read_rigs  # noqa: E402
 
 RATE = 24.0
@@ -30,8 +32,8 @@ def main() -> None:
     """Write the four layers."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "shot")
-    parser.add_argument("--strands", type=int, default=4000)
-    parser.add_argument("--style", default="long_wavy")
+    parser.add_argument("--strands", type=int, default=5000)
+    parser.add_argument("--style", default="wavy")
     parser.add_argument("--body", action="store_true", help="build the body again (needs anny)")
     options = parser.parse_args()
     folder = options.output
@@ -49,10 +51,17 @@ def main() -> None:
 
 def grow_groom(body: Path, style: str, strands: int) -> Groom:
     """Hair of one of the library's styles on the body's marked scalp."""
-    from neuralocks_core.hairstyles import grow
-    from usd.scalp import read_scalp
-
-    return grow(style, read_scalp(body), strands, seed=1)
+    character = read_rigs(body)[0].character
+    stage = Usd.Stage.Open(str(body))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(MESH))
+    marked = UsdGeom.Subset(stage.GetPrimAtPath(f"{MESH}/scalp")).GetIndicesAttr().Get()
+    quads = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 4)[np.array(marked)]
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    to_bind = character.canonical_to_bind
+    centre = to_bind[:3, :3] @ character.head_centre + to_bind[:3, 3]
+    skin = character.body
+    scalp = Scalp(np.array(mesh.GetPointsAttr().Get(), float), triangles, centre)
+    return grow(style, scalp, strands, seed=1, body=(skin.points, skin.triangles))
 
 
 def write_motion(path: Path, character) -> None:

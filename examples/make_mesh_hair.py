@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Make the example of rigged mesh hair: eight locks of four joints and a cap on the shipped body, and a short shot.
+
+    python examples/make_mesh_hair.py [-o examples/mesh_hair]
+
+writes `character.usda` (body, hair mesh and hair joints, at rest) and `shot.usda` (the same with a loop of head and body motion; the hair
+joints rest), both on top of `examples/shot/body.usdc`. Then:
+
+    neuralocks rig train examples/mesh_hair/character.usda -o hair.neuralocks
+    neuralocks rig bake examples/mesh_hair/shot.usda -o baked.usda --model hair.neuralocks
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.collider import Collider
+from neuralocks_core.puppet import Puppet
+from neuralocks_core.rotation import to_quaternion
+from usd.border import Border, open_stage, row_matrix
+from usd.rig_source import read_rig
+
+HERE = Path(__file__).resolve().parent
+LOCKS = {  # name: where it leaves the head (degrees from the face, height [m]), length [m], half width, half thickness [m]
+    "front_l": (62, 0.045, 0.24, 0.019, 0.009),
+    "front_r": (-62, 0.045, 0.24, 0.019, 0.009),
+    "side_l": (100, 0.050, 0.27, 0.030, 0.011),
+    "side_r": (-100, 0.050, 0.27, 0.030, 0.011),
+    "back_l": (136, 0.045, 0.29, 0.032, 0.012),
+    "back_r": (-136, 0.045, 0.29, 0.032, 0.012),
+    "nape_l": (168, 0.040, 0.30, 0.030, 0.013),
+    "nape_r": (-168, 0.040, 0.30, 0.030, 0.013),
+}
+JOINTS, RINGS, SIDES = 4, 15, 10
+CLEARANCE = 0.008
+"""From the skin to the middle of a lock, over its half thickness [m]."""
+
+
+def main() -> None:
+    """Write both files."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--out", type=Path, default=HERE / "mesh_hair")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    make_character(out / "character.usda", HERE / "shot" / "body.usdc")
+    make_shot(out / "shot.usda", out / "character.usda")
+
+
+def make_character(path: Path, body_path: Path) -> None:
+    """Body with hair joints and hair mesh, at rest."""
+    body_stage = open_stage(body_path)
+    skeleton_prim = next(p for p in body_stage.Traverse() if p.IsA(UsdSkel.Skeleton))
+    rig = read_rig(body_stage, skeleton_prim, Border.of(body_stage))
+    character = rig.character
+    head_at = character.skeleton.bind[character.head, :3, 3]
+    collider = Collider(character.body.points - head_at, character.body.triangles)
+    names, parents, binds = [], [], []
+    points, faces, indices, weights = _cap(body_stage, character, head_at)
+    head = character.head
+    for name, lock in LOCKS.items():
+        curve, flats = _curve(collider, *lock)
+        first = len(character.skeleton.names) + len(names)
+        for i in range(JOINTS):
+            names.append(f"{names[-1] if i else character.skeleton.names[head]}/hair_{name}_{i + 1}")
+            parents.append(first + i - 1 if i else head)
+            binds.append(_bone_frame(*_bone(curve, i), head_at))
+        ring_points, ring_faces, along = _tube(curve, flats, lock[3], lock[4])
+        faces += [[f + len(points) for f in face] for face in ring_faces]
+        points = np.concatenate([points, ring_points])
+        own, share = _influences(along, head, first)
+        indices, weights = np.concatenate([indices, own]), np.concatenate([weights, share])
+    stage = _layer_over(path, body_path)
+    skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_prim.GetPath()))
+    joints = list(rig.source.names) + names
+    bind = np.concatenate([rig.source.bind, binds])
+    rest = list(rig.source.rest)
+    for parent, matrix in zip(parents, binds):
+        rest.append(np.linalg.inv(bind[parent]) @ matrix)
+    skeleton.GetJointsAttr().Set(joints)
+    skeleton.GetBindTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in bind]))
+    skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in rest]))
+    mesh = UsdGeom.Mesh.Define(stage, skeleton_prim.GetPath().GetParentPath().AppendChild("Hair"))
+    world = (points + head_at).astype(np.float32)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(world))
+    mesh.CreateFaceVertexCountsAttr([len(f) for f in faces])
+    mesh.CreateFaceVertexIndicesAttr([i for f in faces for i in f])
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr([Gf.Vec3f(*map(float, world.min(0))), Gf.Vec3f(*map(float, world.max(0)))])
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(0.35, 0.16, 0.10)])
+    mesh.CreateDoubleSidedAttr(True)
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+    binding.CreateSkeletonRel().SetTargets([skeleton_prim.GetPath()])
+    binding.CreateJointIndicesPrimvar(False, 2).Set(Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel()))
+    binding.CreateJointWeightsPrimvar(False, 2).Set(Vt.FloatArray.FromNumpy(weights.astype(np.float32).ravel()))
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+    stage.GetRootLayer().Save()
+
+
+def make_shot(path: Path, character_path: Path) -> None:
+    """Six seconds that loop: a nod, a look aside, a shake, a bow and a hop."""
+    source = open_stage(character_path)
+    skeleton_prim = next(p for p in source.Traverse() if p.IsA(UsdSkel.Skeleton))
+    rig = read_rig(source, skeleton_prim, Border.of(source))
+    rate, seconds = 24, 8.0
+    puppet = Puppet(rig.character, np.arange(int(rate * seconds) + 1) / rate)
+    t = puppet.times
+
+    def bump(start, length):
+        x = np.clip((t - start) / length, 0, 1)
+        return np.sin(np.pi * x) ** 2
+
+    side, up, front = np.eye(3)
+    puppet.turn_neck(np.outer(0.5 * bump(0.2, 1.2), side))
+    puppet.turn_neck(np.outer(1.0 * bump(1.2, 1.8), up))
+    puppet.turn_neck(np.outer(0.55 * bump(2.9, 1.4) * np.sin(2 * np.pi * 2.5 * (t - 2.9)), up))
+    puppet.turn_neck(np.outer(0.35 * bump(4.0, 1.2), front))
+    puppet.bend_spine(np.outer(0.7 * bump(4.9, 1.6), side))
+    hop = np.clip((t - 6.6) / 0.5, 0, 1)
+    puppet.position[:, 1] += 4 * 0.25 * hop * (1 - hop) - 0.06 * (bump(6.2, 0.5) + bump(7.05, 0.5))
+    clip = puppet.clip()
+    stage = _layer_over(path, character_path)
+    animation = UsdSkel.Animation.Define(stage, skeleton_prim.GetPath().AppendChild("Motion"))
+    animation.CreateJointsAttr(list(rig.source.names))
+    for attribute in (
+        animation.CreateTranslationsAttr(),
+        animation.CreateRotationsAttr(),
+        animation.CreateScalesAttr(),
+    ):
+        attribute.SetVariability(Sdf.VariabilityVarying)
+    parents = rig.character.skeleton.parents
+    animation.GetScalesAttr().Set(Vt.Vec3hArray([Gf.Vec3h(1)] * len(parents)))
+    for frame, joints in enumerate(clip.joints):
+        local = [np.linalg.inv(joints[p]) @ m if p >= 0 else m for p, m in zip(parents, joints)]
+        local = np.stack(local)
+        turns = [Gf.Quatf(*map(float, q)) for q in to_quaternion(local[:, :3, :3])]
+        animation.GetRotationsAttr().Set(Vt.QuatfArray(turns), frame + 1)
+        animation.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(local[:, :3, 3].astype(np.float32)), frame + 1)
+    binding = UsdSkel.BindingAPI.Apply(stage.OverridePrim(skeleton_prim.GetPath()))
+    binding.CreateAnimationSourceRel().SetTargets([animation.GetPath()])
+    stage.SetStartTimeCode(1)
+    stage.SetEndTimeCode(len(clip.times))
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.GetRootLayer().Save()
+
+
+def _layer_over(path: Path, below: Path) -> Usd.Stage:
+    """A new layer that sublayers another by relative path and repeats its metadata."""
+    path.unlink(missing_ok=True)
+    stage = Usd.Stage.CreateNew(str(path))
+    stage.GetRootLayer().subLayerPaths = [os.path.relpath(below, path.parent).replace(os.sep, "/")]
+    lower = Usd.Stage.Open(str(below))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.GetStageUpAxis(lower))
+    UsdGeom.SetStageMetersPerUnit(stage, UsdGeom.GetStageMetersPerUnit(lower))
+    stage.GetRootLayer().defaultPrim = lower.GetRootLayer().defaultPrim
+    return stage
+
+
+def _curve(collider, degrees, height, length, half_width, half_thickness):
+    """Middle of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
+    angle = np.radians(degrees)
+    out = np.array([np.sin(angle), 0.0, np.cos(angle)])
+    clearance = half_thickness + CLEARANCE
+    # Down the skull on a slope, then free fall that keeps clear of neck and shoulders.
+    points, flats = [], []
+    place = np.array([0.0, 0.115, 0.015]) + 0.05 * out
+    step, travelled, falling = 0.004, 0.0, False
+    heading = out.copy()
+    while travelled < length:
+        distance, normal = collider.distance(place[None], limit=0.1)
+        place = place + normal[0] * max(0.0, clearance - distance[0]) if distance[0] < clearance else place
+        if not falling and distance[0] > clearance + 0.002:
+            place = place - normal[0] * (distance[0] - clearance) * 0.5
+        points.append(place)
+        flats.append(normal[0] if distance[0] < 0.06 and not falling else out)
+        falling |= place[1] < height
+        pull = np.array([0.0, -1.0, 0.0]) + (0.0 if falling else 0.6) * out
+        heading = heading + (0.25 if falling else 0.15) * (pull / np.linalg.norm(pull) - heading)
+        heading /= np.linalg.norm(heading)
+        place = place + step * heading
+        travelled += step if falling else 0.0
+    points, flats = np.array(points), np.array(flats)
+    for _ in range(60):  # smooth, then clear again
+        points[1:-1] += 0.5 * ((points[:-2] + points[2:]) / 2 - points[1:-1])
+        flats[1:-1] += 0.5 * ((flats[:-2] + flats[2:]) / 2 - flats[1:-1])
+    distance, normal = collider.distance(points, limit=0.1)
+    points = points + normal * np.maximum(0, clearance - distance)[:, None]
+    points[1:-1] = (points[:-2] + 2 * points[1:-1] + points[2:]) / 4
+    start = int(np.argmax(points[:, 1] < height))
+    arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return (points, arc - arc[start]), flats / np.linalg.norm(flats, axis=1, keepdims=True)
+
+
+def _at(curve, arc):
+    points, arcs = curve
+    return np.stack([np.interp(arc, arcs, points[:, i]) for i in range(3)], axis=-1)
+
+
+def _bone(curve, i):
+    """Begin and end of bone i; arc zero is where the lock leaves the head."""
+    length = curve[1][-1]
+    return _at(curve, length * i / JOINTS), _at(curve, length * (i + 1) / JOINTS)
+
+
+def _bone_frame(begin, end, head_at):
+    """Bind transform (4, 4) of a joint whose own Y runs along its bone, as modelling tools have it."""
+    y = (end - begin) / np.linalg.norm(end - begin)
+    x = np.cross(y, [0.0, 0.0, 1.0] if abs(y[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.stack([x, y, np.cross(x, y)], axis=1)
+    frame[:3, 3] = begin + head_at
+    return frame
+
+
+def _tube(curve, flats, half_width, half_thickness):
+    """A flat tapered tube: points (n, 3), faces, and arc length over the chain's per point (n,)."""
+    arcs = np.concatenate([np.linspace(curve[1][0], 0, 4, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
+    middle = _at(curve, arcs)
+    tangent = np.gradient(middle, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    thick = np.stack([np.interp(arcs, curve[1], flats[:, i]) for i in range(3)], axis=-1)
+    thick -= (thick * tangent).sum(axis=1, keepdims=True) * tangent
+    thick /= np.linalg.norm(thick, axis=1, keepdims=True)
+    wide = np.cross(tangent, thick)
+    share = (arcs - arcs[0]) / (arcs[-1] - arcs[0])
+    size = np.minimum(1, 0.45 + 2.2 * share) * np.sqrt(np.clip(1 - share**3, 0, 1)) + 0.02
+    angle = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
+    rings = (
+        middle[:, None]
+        + (size * half_width)[:, None, None] * np.cos(angle)[:, None] * wide[:, None]
+        + (size * half_thickness)[:, None, None] * np.sin(angle)[:, None] * thick[:, None]
+    )
+    faces = []
+    for ring in range(len(arcs) - 1):
+        for i in range(SIDES):
+            a, b = ring * SIDES + i, ring * SIDES + (i + 1) % SIDES
+            faces.append([a, b, b + SIDES, a + SIDES])
+    faces.append(list(range(SIDES))[::-1])
+    faces.append([(len(arcs) - 1) * SIDES + i for i in range(SIDES)])
+    return rings.reshape(-1, 3), faces, np.repeat(np.clip(arcs / curve[1][-1], -1, 1), SIDES)
+
+
+def _influences(along, head, first):
+    """Joints and weights (n, 2): each joint fades into the next over the third of a bone around their meeting."""
+    place = along * JOINTS
+    bone = np.clip(np.round(place).astype(int), 0, JOINTS - 1)  # the meeting that is nearest
+    second = np.clip((place - bone) * 1.5 + 0.5, 0, 1)
+    before = np.where(bone == 0, head, first + bone - 1)
+    after = first + bone
+    return np.stack([before, after], axis=1), np.stack([1 - second, second], axis=1)
+
+
+def _cap(stage, character, head_at):
+    """The scalp, a little larger, tied to the head."""
+    mesh = next(p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh))
+    subset = UsdGeom.Subset(next(p for p in mesh.GetChildren() if p.GetName() == "scalp"))
+    counts = np.asarray(UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Get())
+    corners = np.asarray(UsdGeom.Mesh(mesh).GetFaceVertexIndicesAttr().Get())
+    starts = np.cumsum(counts) - counts
+    faces = [corners[starts[f] : starts[f] + counts[f]] for f in subset.GetIndicesAttr().Get()]
+    used = np.unique(np.concatenate(faces))
+    place = {int(v): i for i, v in enumerate(used)}
+    normals = np.zeros((len(character.body.points), 3))
+    a, b, c = (character.body.points[character.body.triangles[:, i]] for i in range(3))
+    for i in range(3):
+        np.add.at(normals, character.body.triangles[:, i], np.cross(b - a, c - a))
+    normals = normals[used] / np.linalg.norm(normals[used], axis=1, keepdims=True)
+    points = character.body.points[used] - head_at + 0.009 * normals
+    count = len(points)
+    indices = np.stack([np.full(count, character.head), np.full(count, character.head)], axis=1)
+    return points, [[place[int(v)] for v in f] for f in faces], indices, np.tile([1.0, 0.0], (count, 1))
+
+
+if __name__ == "__main__":
+    main()
