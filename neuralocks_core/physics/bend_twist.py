@@ -19,9 +19,11 @@ class Cosserat(Enum):
     """How edge orientations are found."""
 
     EXACT = "exact"
-    """Parallel transport along every edge, as a scan."""
+    """Parallel transport along every edge; on a CPU as a loop, elsewhere as a scan."""
+    SCAN = "scan"
+    """The same, always as a scan of few and large operations."""
     LOOP = "loop"
-    """The same, edge after edge."""
+    """The same, always edge after edge."""
     DIRECT = "direct"
     """The paper's fast transport, straight from the root edge."""
     CONSTANT = "constant"
@@ -70,7 +72,8 @@ def unit_edges(x: Tensor) -> Tensor:
 
 
 def _turns(x: Tensor, form: Cosserat) -> Tensor:
-    frames = {Cosserat.EXACT: scan_frames, Cosserat.LOOP: loop_frames, Cosserat.DIRECT: direct_frames}[form](
-        unit_edges(x)
-    )
+    if form is Cosserat.EXACT:
+        form = Cosserat.LOOP if x.device.type == "cpu" else Cosserat.SCAN
+    transport = {Cosserat.SCAN: scan_frames, Cosserat.LOOP: loop_frames, Cosserat.DIRECT: direct_frames}[form]
+    frames = transport(unit_edges(x))
     return product(conjugate(frames[..., :-1, :]), frames[..., 1:, :])
