@@ -89,8 +89,8 @@ def _arms(puppet, times, walking, phase, crouch):
         hinge = np.cross(elbow - shoulder, hand - elbow)
         hinge /= np.linalg.norm(hinge)
         arm = walking * 0.4 * np.cos(phase) * sign
-        puppet.turn(f"{side}_upper_arm", (arm + 0.6 * back - 1.0 * up)[:, None] * SIDE)
-        puppet.turn(f"{side}_upper_arm", (0.12 * up * sign)[:, None] * FRONT)
+        puppet.turn_further(f"{side}_upper_arm", (arm + 0.6 * back - 1.3 * up)[:, None] * SIDE)
+        puppet.turn_further(f"{side}_upper_arm", (0.15 * up * sign)[:, None] * FRONT)
         # The bind pose bends the elbow more than a hanging arm does.
         bend = -0.42 + walking * (0.15 - 0.45 * arm) + 0.3 * back + 0.3 * up
         puppet.turn(f"{side}_lower_arm", bend[:, None] * hinge)

@@ -41,6 +41,15 @@ class Puppet:
             return
         self._turns[joint] = self._turns.get(joint, 0.0) + vectors
 
+    def turn_further(self, joint: str, vectors: np.ndarray) -> None:
+        """Turn a joint by rotation vectors (T, 3) [rad] after what it does already, about its parent's axes.
+
+        Needed where a joint is turned far, as hanging arms are: rotation vectors add up only while they are small.
+        """
+        if joint in self.character.humanoid:
+            before = self._turns.get(joint, 0.0) + np.zeros_like(vectors)
+            self._turns[joint] = rotation.to_vector(rotation.from_vector(vectors) @ rotation.from_vector(before))
+
     def turn_neck(self, vectors: np.ndarray) -> None:
         """A turn of the head (T, 3) [rad], a third of it in the neck as people do."""
         share = 1 / 3 if "neck" in self.character.humanoid else 0.0

@@ -102,8 +102,7 @@ def _posture(puppet: Puppet, rng) -> None:
             lift = ease(puppet.times, rng.uniform(0.3, 2.0), rng.uniform(0.3, 1.0)) * rng.uniform(0.3, 2.2)
             out = FRONT if side == "left" else -FRONT
             axis = out * rng.uniform(0.2, 1.0) - SIDE * rng.uniform(0.0, 1.0)
-            # Raising: about the axis through the shoulder, before the arm's own hanging turn.
-            puppet.turn(f"{side}_upper_arm", lift[:, None] * axis)
+            puppet.turn_further(f"{side}_upper_arm", lift[:, None] * axis)
             puppet.turn(f"{side}_shoulder", 0.15 * lift[:, None] * out)
 
 
@@ -203,7 +202,7 @@ def _walk(puppet: Puppet, dice: _Dice) -> None:
         leg = stride * np.sin(phase) * sign
         puppet.turn(f"{side}_upper_leg", -leg[:, None] * SIDE)
         puppet.turn(f"{side}_lower_leg", (stride * np.maximum(0, np.cos(phase) * sign))[:, None] * SIDE * 1.3)
-        puppet.turn(f"{side}_upper_arm", 0.7 * leg[:, None] * SIDE)
+        puppet.turn_further(f"{side}_upper_arm", 0.7 * leg[:, None] * SIDE)
 
 
 def _fall_and_stop(puppet: Puppet, dice: _Dice) -> None:
