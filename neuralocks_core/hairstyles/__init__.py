@@ -13,7 +13,7 @@ from . import loose, tied
 from .growth import Site, evenly, march
 from .obstacle import Obstacle
 from .scalp import Scalp, from_head
-from .shaping import Shape, shaped
+from .shaping import shaped
 
 STYLES = (*loose.STYLES, *tied.STYLES)
 """Names of the styles that `grow` knows."""
@@ -91,13 +91,16 @@ def _site(
         roots = type(roots)(many.place[kept], many.normal[kept], many.border[kept])
     clumps = int(np.clip(scalp.area / (style.shape.clump_spacing * size) ** 2, 1, count))
     guides = np.arange(clumps)  # roots come in random order: the first ones are as good as any
-    nearest = cKDTree(roots.place[guides]).query(
-        roots.place + 0.15 * style.shape.clump_spacing * size * random.normal(size=(count, 3))
-    )[1]
+    ragged = 0.15 * style.shape.clump_spacing * size * random.normal(size=(count, 3))
+    seen = (roots.place - scalp.head_centre) / scalp.radius
+    zone = getattr(style, "zone", None)
+    apart = np.zeros(count) if zone is None else 10.0 * zone(seen)  # metres no search will cross
+    tree = cKDTree(np.column_stack([roots.place[guides], apart[guides]]))
+    nearest = tree.query(np.column_stack([roots.place + ragged, apart]))[1]
     nearest[guides] = guides
     return Site(
         roots=roots,
-        seen=(roots.place - scalp.head_centre) / scalp.radius,
+        seen=seen,
         clump=nearest,
         guide=guides[nearest],
         of_clump=random.random((clumps, 4))[nearest],

@@ -71,11 +71,17 @@ def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) 
     points = np.empty((len(length), steps, 3), np.float32)
     points[:, 0] = site.roots.place
     at, direction = site.roots.place.astype(np.float64), plan.first
+    near = np.zeros(len(at), bool)
+    front = np.where(site.seen[:, 2] > 0.30 + 0.25 * site.of_clump[:, 2], 1.0, -1.0)
     for vertex in range(1, steps):
         grown = step * vertex
         falls = smooth(grown / (plan.comb_reach * size))[:, None]
         target = unit(plan.comb * (1 - falls) + plan.fall * falls)
         rate = np.minimum(plan.turn * step / size, 1.0)[:, None]
+        # Hair that stands straight up has no way to fall until its comb gives it one.
+        stands = (direction * target).sum(axis=1, keepdims=True) < -0.6
+        target = np.where(stands, unit(target + plan.comb), target)
+        target = _past_shoulders(target, at, front, near, scalp)
         direction = unit(direction + rate * (target - direction))
         # Skin is soft-edged at the root, where the strand leaves it.
         margin = plan.margin * size * smooth(grown / (0.045 * size)) + 0.0015 * size * smooth(
@@ -86,6 +92,7 @@ def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) 
         for _ in range(2):
             ahead = obstacle.push_out(ahead, margin)
             ahead = at + step[:, None] * unit(ahead - at)
+        near = obstacle.distance(ahead)[0] < 0.35 * scalp.radius
         direction = unit(ahead - at)
         at = ahead
         points[:, vertex] = at
@@ -96,10 +103,21 @@ def _beside_face(points: np.ndarray, side: np.ndarray, grown: np.ndarray, scalp:
     """Points pushed sideways out of an egg in front of the face, the more the farther they have grown."""
     seen = (points - scalp.head_centre) / scalp.radius
     inside = 1.0 - ((seen[:, 1] + 0.55) / 1.25) ** 2 - ((seen[:, 2] - 1.15) / 0.95) ** 2
-    half_width = 0.80 * np.sqrt(np.maximum(inside, 0.0)) * smooth((grown - 0.01) / 0.07)
+    half_width = 0.72 * np.sqrt(np.maximum(inside, 0.0)) * smooth((grown - 0.01) / 0.07)
     wanted = np.maximum(seen[:, 0] * side, half_width) * side
-    seen[:, 0] = np.where(side != 0, wanted, seen[:, 0])
+    seen[:, 0] = np.where((side != 0) & (half_width > 0), wanted, seen[:, 0])
     return scalp.head_centre + scalp.radius * seen
+
+
+def _past_shoulders(
+    target: np.ndarray, at: np.ndarray, front: np.ndarray, near: np.ndarray, scalp: Scalp
+) -> np.ndarray:
+    """Directions (S, 3) that lead long hair before or behind the shoulders instead of out over the arms."""
+    seen = (at - scalp.head_centre) / scalp.radius
+    low = smooth((-seen[:, 1] - 0.7) / 0.8)
+    inward = -0.45 * np.sign(seen[:, 0]) * smooth((np.abs(seen[:, 0]) - 0.6) / 0.5)
+    aside = 0.6 * front * near * smooth((np.abs(seen[:, 0]) - 0.3) / 0.3)
+    return unit(target + low[:, None] * np.stack([inward, 0 * low, aside], axis=1))
 
 
 def _cut(points: np.ndarray, height: np.ndarray) -> np.ndarray:

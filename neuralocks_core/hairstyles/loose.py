@@ -20,26 +20,43 @@ class Loose:
     shape: Shape
     density: Callable[[np.ndarray], np.ndarray] | None = None
     """(S, 3) `Site.seen` to chances (S,) 0..1 that hair grows there; None everywhere."""
+    zone: Callable[[np.ndarray], np.ndarray] | None = None
+    """(S, 3) `Site.seen` to numbers (S,): no clump reaches from one zone into another."""
 
 
 def _falling(
-    site: Site, length: float, parting: float = 0.0, volume: float = 0.012, lift: float = 0.45
+    site: Site,
+    length: float,
+    parting: float = 0.0,
+    volume: float = 0.012,
+    lift: float = 0.45,
+    back: float = 1.0,
+    soft: float = 0.0,
 ) -> Plan:
-    """Hair that parts at `parting` head radii to the left, lies over the head to both sides and hangs."""
+    """Hair that parts at `parting` head radii to the left, lies over the head to both sides and hangs.
+
+    `back` combs it off the face, `soft` blurs the parting.
+    """
     count = len(site.seen)
     x, y, z = site.seen.T
     # The parting ends behind the crown: from there on hair falls back.
-    to_side = np.tanh((x - parting * smooth((z + 0.6) / 0.8)) / 0.05)
     behind = smooth((0.1 - z) / 0.7)
+    to_side = np.tanh((x - _parting(site.seen, parting)) / (0.04 + soft + 0.5 * behind))
     top = smooth((y - 0.2) / 0.6)
     comb = np.stack(
-        [to_side * (1.0 - 0.65 * behind), -0.35 - 0.5 * (1 - top), -0.30 - 0.35 * behind - 0.25 * smooth(z)],
+        [
+            to_side * (1.0 - 0.65 * behind),
+            -0.35 - 0.5 * (1 - top),
+            -0.35 * behind - back * (0.30 + 0.25 * smooth(z)),
+        ],
         axis=1,
     )
     comb = site.along_scalp(comb + 0.10 * (site.of_clump[:, :3] - 0.5))
     keeps = np.where(np.abs(x) < 0.02, np.sign(to_side), np.sign(x + 1e-6))
     keeps = np.where((z > 0.2) & (y > 0.2), np.sign(to_side), keeps)
-    fall = DOWN + np.stack([0.10 * np.sign(to_side) * smooth(z + 0.3), 0 * x, -0.12 * np.ones(count)], axis=1)
+    fall = DOWN + np.stack(
+        [-0.03 * np.sign(to_side) * smooth(z + 0.3), 0 * x, -0.12 * np.ones(count)], axis=1
+    )
     # Hair from above lies over hair from below.
     layer = 0.15 + 0.65 * smooth((y + 0.7) / 1.6) + 0.2 * site.own[:, 3]
     return Plan(
@@ -55,29 +72,47 @@ def _falling(
     )
 
 
+def _parting(seen: np.ndarray, parting: float) -> np.ndarray:
+    """(S,) where the parting runs: straight over the top, back to the middle at the crown."""
+    return parting * smooth((seen[:, 2] + 0.6) / 0.8)
+
+
+def _sides(parting: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Zones left and right of a parting, one zone behind it."""
+    return lambda seen: np.where(
+        seen[:, 2] < -0.45, 0.0, np.where(seen[:, 0] > _parting(seen, parting), 1.0, -1.0)
+    )
+
+
 def _long_straight(site: Site) -> Plan:
-    plan = _falling(site, 0.50, volume=0.011)
+    plan = _falling(site, 0.50, volume=0.009, back=0.6)
     plan.cut = -3.9 - 0.5 * site.of_clump[:, 0] ** 2 - 0.25 * site.own[:, 1]
     return plan
 
 
 def _wavy(site: Site) -> Plan:
-    return _falling(site, 0.40, parting=0.28, volume=0.018, lift=0.7)
+    return _falling(site, 0.40, parting=0.28, volume=0.015, lift=0.6, back=0.8)
 
 
 def _bob(site: Site) -> Plan:
-    plan = _falling(site, 0.34, parting=0.25, volume=0.016, lift=0.6)
+    plan = _falling(site, 0.34, parting=0.25, volume=0.011, lift=0.5, back=0.4)
     # Cut straight at the jaw, a little longer in front, the tips turned in.
     plan.cut = -1.25 - 0.12 * smooth(site.seen[:, 2]) - 0.05 * site.own[:, 1]
     plan.fall = unit(plan.fall - 0.28 * np.stack([site.seen[:, 0], 0 * plan.side, 0 * plan.side], axis=1))
     return plan
 
 
+def _bangs(seen: np.ndarray) -> np.ndarray:
+    """(S,) bool: a triangle of the top and the whole forehead."""
+    x, y, z = seen.T
+    return (z > 0.25 + 0.5 * np.abs(x)) & (np.abs(x) < 0.75) & (y > 0.25)
+
+
 def _fringe(site: Site) -> Plan:
-    plan = _falling(site, 0.36, volume=0.013)
+    plan = _falling(site, 0.36, volume=0.011, back=0.1)
     plan.cut = -2.4 - 0.25 * site.of_clump[:, 0] - 0.1 * site.own[:, 1]
     x, y, z = site.seen.T
-    front = (z > 0.30 + 0.25 * np.abs(x)) & (np.abs(x) < 0.62) & (y > 0.3)
+    front = _bangs(site.seen)
     forward = site.along_scalp(
         np.stack([0.25 * x, 0 * x, 1 + 0 * x], axis=1) + 0.06 * (site.of_clump[:, :3] - 0.5)
     )
@@ -103,32 +138,31 @@ def _pixie(site: Site) -> Plan:
     # Away from the whorl at the back of the crown; swept to one side in front.
     away = site.seen - [0.1, 0.85, -0.45]
     away = away + np.stack([0.8 * smooth((z - 0.2) / 0.6), 0 * x, 0 * x], axis=1)
-    comb = site.along_scalp(unit(away) + 0.30 * (site.of_clump[:, :3] - 0.5))
-    top = smooth((y - 0.1) / 0.6)
+    comb = site.along_scalp(unit(away) + 0.55 * (site.of_clump[:, :3] - 0.5))
+    top = smooth((y + 0.35) / 1.2)
     return Plan(
-        length=(0.028 + 0.050 * top) * (0.8 + 0.3 * site.of_clump[:, 3] + 0.15 * site.own[:, 0]),
-        first=unit(comb + (0.5 + 0.5 * top[:, None]) * site.roots.normal),
+        length=(0.022 + 0.043 * top) * (0.7 + 0.45 * site.of_clump[:, 3] + 0.12 * site.own[:, 0]),
+        first=unit(comb + (0.35 + 0.6 * top[:, None] * site.of_clump[:, 1:2]) * site.roots.normal),
         comb=comb,
         comb_reach=np.full(len(x), 0.10),
         fall=np.broadcast_to(DOWN, comb.shape),
         turn=np.full(len(x), 38.0),
-        margin=0.004 + 0.010 * top * (0.4 + 0.6 * site.own[:, 3]),
+        margin=0.003 + 0.008 * top * (0.4 + 0.6 * site.own[:, 3]),
         side=np.zeros(len(x)),
-        cut=np.where(z > 0.4, 0.05 - 0.1 * site.own[:, 1], -np.inf),
+        cut=np.where(z > 0.4, 0.42 - 0.40 * site.of_clump[:, 2] - 0.05 * site.own[:, 1], -np.inf),
     )
 
 
 def _tight_curls(site: Site) -> Plan:
-    plan = _falling(site, 0.24, parting=-0.2, volume=0.030, lift=1.4)
+    plan = _falling(site, 0.24, parting=-0.2, volume=0.030, lift=1.2, soft=0.25)
     plan.turn = np.full(len(plan.side), 18.0)
     plan.length = plan.length * (0.85 + 0.15 * site.of_clump[:, 0])
     return plan
 
 
 def _coils(site: Site) -> Plan:
-    plan = _falling(site, 0.15, volume=0.035, lift=2.5)
-    plan.turn = np.full(len(plan.side), 14.0)
-    plan.side = np.where(site.seen[:, 2] > 0.5, plan.side, 0)
+    plan = _falling(site, 0.13, volume=0.028, lift=1.2, soft=0.45)
+    plan.turn = np.full(len(plan.side), 20.0)
     return plan
 
 
@@ -161,8 +195,8 @@ def _afro(site: Site) -> Plan:
 def _mohawk(site: Site) -> Plan:
     x, y, z = site.seen.T
     crest = smooth((0.30 - np.abs(x)) / 0.06)
-    fan = np.stack([-0.25 * x, np.ones(len(x)), 0.55 * z + 0.1], axis=1)
-    stray = 0.16 * (site.of_clump[:, :3] - 0.5) + 0.05 * (site.own[:, :3] - 0.5)
+    fan = np.stack([-0.9 * x, np.ones(len(x)), 0.55 * z + 0.1], axis=1)
+    stray = 0.28 * (site.of_clump[:, :3] - 0.5) + 0.05 * (site.own[:, :3] - 0.5)
     length = (
         0.095
         * (0.8 + 0.15 * site.of_clump[:, 3] + 0.12 * site.own[:, 0])
@@ -171,7 +205,7 @@ def _mohawk(site: Site) -> Plan:
     stubble = unit(site.roots.normal + 0.6 * site.along_scalp([0.0, -0.5, -1.0]))
     tall = crest[:, None] > 0.5
     direction = np.where(tall, unit(unit(fan) + 0.8 * site.roots.normal * [0.2, 1, 1] + stray), stubble)
-    return _standing(site, np.where(tall[:, 0], length, 0.006 + 0.002 * site.own[:, 0]), direction)
+    return _standing(site, np.where(tall[:, 0], length, 0.004 + 0.002 * site.own[:, 0]), direction)
 
 
 def _mohawk_density(seen: np.ndarray) -> np.ndarray:
@@ -179,48 +213,38 @@ def _mohawk_density(seen: np.ndarray) -> np.ndarray:
 
 
 STYLES = {
-    "long_straight": Loose(_long_straight, Shape(clumping=0.55, frizz=0.0007)),
+    "long_straight": Loose(_long_straight, Shape(clumping=0.55, frizz=0.0007), zone=_sides(0.0)),
     "wavy": Loose(
-        _wavy, Shape(vertices=32, clump_spacing=0.011, clumping=0.7, wave=0.007, pitch=0.075, curl_from=0.14)
+        _wavy,
+        Shape(32, clump_spacing=0.014, clumping=0.8, wave=0.008, pitch=0.085, curl_from=0.12, unison=0.7),
+        zone=_sides(0.28),
     ),
-    "bob": Loose(_bob, Shape(clump_spacing=0.008, clumping=0.45, frizz=0.0006)),
-    "fringe": Loose(_fringe, Shape(clump_spacing=0.008, clumping=0.5, frizz=0.0006)),
-    "pixie": Loose(_pixie, Shape(clump_spacing=0.010, clumping=0.75, frizz=0.0008)),
+    "bob": Loose(_bob, Shape(clump_spacing=0.008, clumping=0.45, frizz=0.0006), zone=_sides(0.25)),
+    "fringe": Loose(
+        _fringe,
+        Shape(clump_spacing=0.008, clumping=0.5, frizz=0.0006),
+        zone=lambda seen: np.where(_bangs(seen), 2.0, _sides(0.0)(seen)),
+    ),
+    "pixie": Loose(_pixie, Shape(clump_spacing=0.011, clumping=0.85, frizz=0.0008)),
     "tight_curls": Loose(
         _tight_curls,
-        Shape(
-            vertices=64,
-            clump_spacing=0.012,
-            clumping=0.85,
-            curl=0.0065,
-            pitch=0.026,
-            curl_from=0.05,
-            frizz=0.0008,
-        ),
+        Shape(64, clump_spacing=0.012, clumping=0.85, curl=0.0065, pitch=0.026, curl_from=0.05, frizz=0.0008),
     ),
     "coils": Loose(
         _coils,
         Shape(
-            vertices=96,
-            clump_spacing=0.009,
-            clumping=0.9,
-            curl=0.0035,
-            pitch=0.0095,
-            curl_from=0.015,
-            frizz=0.0007,
+            96, clump_spacing=0.009, clumping=0.9, curl=0.0035, pitch=0.0095, curl_from=0.015, frizz=0.0007
         ),
+        zone=_sides(0.0),
     ),
     "afro": Loose(
         _afro,
-        Shape(
-            vertices=72,
-            clump_spacing=0.006,
-            clumping=0.5,
-            curl=0.0024,
-            pitch=0.007,
-            curl_from=0.01,
-            scatter=1.0,
-        ),
+        Shape(72, clump_spacing=0.006, clumping=0.5, curl=0.0024, pitch=0.007, curl_from=0.01, scatter=1.0),
     ),
-    "mohawk": Loose(_mohawk, Shape(clump_spacing=0.007, clumping=0.55, frizz=0.0006), _mohawk_density),
+    "mohawk": Loose(
+        _mohawk,
+        Shape(clump_spacing=0.011, clumping=0.85, frizz=0.0006),
+        density=_mohawk_density,
+        zone=lambda seen: np.where(np.abs(seen[:, 0]) < 0.27, 1.0, 0.0),
+    ),
 }

@@ -87,10 +87,11 @@ class Scalp:
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         weight = np.stack([1 - u - v, u, v], axis=1)
         place = np.einsum("nc,nci->ni", weight, corners[triangle])
-        # A real hairline is ragged: hair thins out over its last centimetre.
+        # A real hairline is soft: hair thins out over its last centimetre, and does not show the mesh's
+        # corners.
         border = self._border_distance(place) / (0.1 * self.radius)
-        chance = np.clip(0.12 + border, 0.0, 1.0)
-        order = np.argsort(random.random(len(place)) / chance, kind="stable")[:count]
+        chance = np.clip(0.15 + border, 0.0, 1.0) * self._surrounded(place)
+        order = np.argsort(random.random(len(place)) / np.maximum(chance, 1e-6), kind="stable")[:count]
         order.sort()
         order = random.permutation(order)
         normals = self._normals()[self.triangles[triangle[order]]]
@@ -110,6 +111,17 @@ class Scalp:
         share = np.linspace(0.0, 1.0, 8)[:, None, None]
         line = (self.points[edge[:, 0]] * (1 - share) + self.points[edge[:, 1]] * share).reshape(-1, 3)
         return cKDTree(line).query(places)[0]
+
+    def _surrounded(self, places: np.ndarray) -> np.ndarray:
+        """(N,) 0..1: less where scalp fills less than half of the neighbourhood, as on the corners of its
+        edge."""
+        every = places[:: max(1, len(places) // 5000)]
+        if len(every) < 500:
+            return np.ones(len(places))
+        reach = 0.13 * self.radius
+        near = cKDTree(every).query_ball_point(places, reach, return_length=True)
+        filled = near * self.area / len(every) / (np.pi * reach**2)
+        return np.clip((filled - 0.38) / 0.2, 0.0, 1.0)
 
     def _normals(self) -> np.ndarray:
         """(V, 3) unit normals of the points; zero off the scalp."""

@@ -32,6 +32,8 @@ class Shape:
     """Axis length over which wave or curl grows to its full size."""
     scatter: float = 0.15
     """Share of a turn by which strands of one clump differ."""
+    unison: float = 0.0
+    """0 to 1: how far neighbouring clumps wave together."""
     frizz: float = 0.0006
     """How far single strands stray."""
 
@@ -47,7 +49,7 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
         size: head radius in units of 0.1 m.
     """
     count, steps = axis.shape[:2]
-    points = _clumped(axis, site, shape.clumping)
+    points = _clumped(axis, site, shape.clumping, size)
     if shape.vertices != steps:
         place = np.linspace(0.0, steps - 1, shape.vertices)
         points = _rounded(points, np.broadcast_to(place, (count, shape.vertices)))
@@ -57,9 +59,11 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
     across, up = _frame(points)
     grown = smooth(arc / (shape.curl_from * size))
     # One phase for a clump: its strands swing together, else curls become a haze.
-    turns = site.of_clump[:, :1] + shape.scatter * (site.own[:, :1] - 0.5)
-    handed = np.where(site.of_clump[:, 1:2] < 0.5, -1.0, 1.0)
-    pitch = shape.pitch * size * (0.8 + 0.4 * site.of_clump[:, 2:3])
+    together = site.seen @ np.array([[0.5], [-0.9], [0.7]])
+    turns = (1 - shape.unison) * site.of_clump[:, :1] + shape.unison * together
+    turns = turns + shape.scatter * (site.own[:, :1] - 0.5)
+    handed = np.where(site.of_clump[:, 1:2] < 0.5 * (1 - shape.unison), -1.0, 1.0)
+    pitch = shape.pitch * size * (1 + 0.4 * (1 - shape.unison) * (site.of_clump[:, 2:3] - 0.5))
     angle = 2 * np.pi * (handed * arc / pitch + turns)
     start = angle[:, :1]
     if shape.wave:
@@ -75,12 +79,15 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
     return _clear(points.astype(np.float32), arc, obstacle, size, axis[:, 0])
 
 
-def _clumped(points: np.ndarray, site: Site, strength: float) -> np.ndarray:
+def _clumped(points: np.ndarray, site: Site, strength: float, size: float) -> np.ndarray:
     """Strands drawn to their clump's leader, little near the root and most at the tip."""
     if strength <= 0:
         return points
     share = np.linspace(0.0, 1.0, points.shape[1], dtype=np.float32)[:, None]
     own = (0.55 + 0.45 * site.of_clump[:, 3] - 0.25 * site.own[:, 2]).astype(np.float32)[:, None, None]
+    # Stubble stands on its own.
+    reach = np.linalg.norm(points[:, -1] - points[:, 0], axis=1)[:, None, None]
+    own = own * smooth(reach / (0.02 * size))
     pull = np.clip(strength * own, 0.0, 0.95) * smooth(share / 0.7)
     return points + pull * (points[site.guide] - points)
 

@@ -76,9 +76,14 @@ def _over_head(site: Site, ring: np.ndarray, scalp: Scalp, obstacle: Obstacle) -
     a, b = unit(start), unit(end)
     angle = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))[:, None]
     share = np.linspace(0.0, 1.0, _ON_HEAD)
+    # From far round the head the shortest way is any way, and over the face: those go by the temples.
+    far_round = smooth((angle - 1.2) / 0.7)[..., None] * np.sin(np.pi * share)[None, :, None]
+    x = site.seen[:, :1]
+    temple = np.concatenate([0.9 * np.tanh(x / 0.06), 0.55 + 0 * x, 0 * x], axis=1)[:, None]
     way = (
         np.sin((1 - share) * angle)[..., None] * a[:, None] + np.sin(share * angle)[..., None] * b[:, None]
     ) / np.maximum(np.sin(angle), 1e-4)[..., None]
+    way = unit(way + 0.9 * far_round * temple)
     radius = high[:, None] * (1 - share) + far[:, None] * share
     points = scalp.head_centre + way * radius[..., None]
     size = scalp.radius / 0.1
@@ -112,7 +117,7 @@ def _ponytail(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.nd
     radius = scalp.radius
     spine, left, up = _spine(knot, scalp, obstacle, knot.out + [0, 0.35, 0], 0.36, 20.0, 0.025)
     # Strands end at different places: the tail tapers.
-    share = np.linspace(0.0, 1.0, _TAIL) * (1 - 0.35 * site.own[:, 1:2] ** 2 - 0.08 * site.of_clump[:, 3:])
+    share = np.linspace(0.0, 1.0, _TAIL) * (1 - 0.40 * site.own[:, 1:2] ** 1.5 - 0.10 * site.of_clump[:, 3:])
     at = share * (_TAIL - 1)
     low = np.minimum(at.astype(int), _TAIL - 2)
     part = (at - low)[..., None]
@@ -147,10 +152,10 @@ def _bun(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.ndarray
     bearing = np.arctan2(knot.disc[:, 1], knot.disc[:, 0])[:, None]
     # Wound around the tie in rings that close over it; deeper strands run inside.
     around = bearing + 2 * np.pi * (1.6 + 0.5 * site.of_clump[:, :1]) * share
-    shell = radius * (0.12 + 0.13 * np.sqrt(site.own[:, 1:2]))
-    rolls = 2 * np.pi * (site.of_clump[:, 1:2] + 0.08 * site.own[:, 2:3] + 0.35 * share)
+    shell = radius * (0.10 + 0.18 * np.sqrt(site.own[:, 1:2]))
+    rolls = 2 * np.pi * (site.of_clump[:, 1:2] + 0.15 * site.own[:, 2:3] + 0.35 * share)
     begin = smooth(share / 0.15)
-    ring = radius * 0.11 * (1 - begin) + begin * (0.27 * radius + shell * np.cos(rolls))
+    ring = radius * 0.11 * (1 - begin) + begin * (0.22 * radius + shell * np.cos(rolls))
     high = begin * (0.20 * radius + shell * np.sin(rolls))
     flat = ring[..., None] * (np.cos(around)[..., None] * e1 + np.sin(around)[..., None] * e2)
     return knot.place + flat + high[..., None] * knot.out
@@ -164,5 +169,5 @@ def unit_disc(turns: np.ndarray) -> np.ndarray:
 STYLES = {
     "ponytail": Tied((0.0, 0.50, -1.0), _ponytail, Shape(clumping=0.35, frizz=0.0007)),
     "braid": Tied((0.0, -0.55, -1.0), _braid, Shape(vertices=48, clumping=0.0, frizz=0.0004)),
-    "bun": Tied((0.0, 0.55, -1.0), _bun, Shape(vertices=40, clumping=0.0, frizz=0.0005)),
+    "bun": Tied((0.0, 0.55, -1.0), _bun, Shape(vertices=40, clumping=0.0, frizz=0.0010)),
 }
