@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all commands share: expected errors become one line on stderr and an exit status."""
+
+import functools
+import json
+import sys
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+INTERRUPTED = 130
+
+
+def command_of(app: typer.Typer):
+    """A decorator like `app.command(name)` for functions that raise NeuralocksError."""
+
+    def command(name: str):
+        def wrap(function):
+            @app.command(name)
+            @functools.wraps(function)
+            def run(*args, **kwargs):
+                try:
+                    return function(*args, **kwargs)
+                except NeuralocksError as error:
+                    one_line(f"error: {error}")
+                    raise typer.Exit(1) from None
+                except KeyboardInterrupt:
+                    one_line("stopped")
+                    raise typer.Exit(INTERRUPTED) from None
+                except MemoryError:
+                    one_line("error: not enough memory; work on fewer strands at a time, or on a larger machine")
+                    raise typer.Exit(1) from None
+
+            return run
+
+        return wrap
+
+    return command
+
+
+def one_line(text) -> None:
+    """Print to stderr, without line breaks."""
+    print(" ".join(str(text).split()), file=sys.stderr)
+
+
+def note(notes) -> None:
+    """Print what a user should know."""
+    for text in notes:
+        one_line(f"note: {text}")
+
+
+def print_json(value) -> None:
+    """Print a plain value for a machine to read."""
+    typer.echo(json.dumps(value, indent=1, default=str))

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write grooms as USD BasisCurves with the attributes that other tools read, and import them from any file."""
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+
+from .border import Border, first_line, open_stage
+from .curves import find_curves, read_groom
+from .placement import Placement
+from .spool import cannot_write
+
+USD = (".usd", ".usda", ".usdc", ".usdz")
+
+
+@dataclass(frozen=True)
+class Spline:
+    """How a renderer interpolates the vertices: the tokens of UsdGeomBasisCurves."""
+
+    type: str = "linear"
+    basis: str = "bezier"
+    wrap: str = "nonperiodic"
+
+
+def import_groom(source, out, unit: str | float | None = None, up: str | None = None) -> tuple[list[Groom], list[str]]:
+    """Read a hair file (TressFX, .hair, .data, .bin, USD curves) and write it as a USD groom in metres, Y up.
+
+    Args:
+        source: the hair file.
+        out: USD file to write.
+        unit: "mm", "cm", "m" or metres per unit of the source; what the file says, or suits a head, if left out.
+        up: "Y" or "Z", the source's upward axis.
+
+    Returns:
+        The grooms, and what a user should know.
+
+    Raises:
+        NeuralocksError: the source cannot be read or the target not be written.
+    """
+    source = Path(source)
+    if source.suffix.lower() in USD:
+        found, notes = _read_usd(source, unit, up)
+    else:
+        from neuralocks_core import formats
+
+        groom, notes = formats.read_with_notes(source, unit, up)
+        found = [(groom, Spline())]
+    write_grooms(out, found)
+    return [groom for groom, _ in found], notes
+
+
+def write_groom(path, groom: Groom, spline: Spline = Spline()) -> Path:
+    """Write one groom; see `write_grooms`."""
+    return write_grooms(path, [(groom, spline)])
+
+
+def write_grooms(path, grooms: list[tuple[Groom, Spline]]) -> Path:
+    """Write grooms below one root prim `/Groom`: metres, Y up, at once under the final name.
+
+    Raises:
+        NeuralocksError: the path has another ending or cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in USD[:3]:
+        raise NeuralocksError(f"{path}: a groom is written as USD; end its name with .usd, .usda or .usdc")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".groom-") as folder:
+            part = Path(folder) / path.name
+            stage = Usd.Stage.CreateNew(str(part))
+            UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+            UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+            root = UsdGeom.Xform.Define(stage, "/Groom")
+            Usd.ModelAPI(root).SetKind("component")
+            stage.SetDefaultPrim(root.GetPrim())
+            for groom, spline in grooms:
+                author_groom(stage, _free_path(stage, groom.name), groom, spline)
+            stage.GetRootLayer().Save()
+            del stage
+            os.replace(part, path)
+    except Tf.ErrorException as error:
+        raise NeuralocksError(f"{path}: cannot be written ({first_line(error)}); choose another folder") from None
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    return path
+
+
+def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()) -> UsdGeom.BasisCurves:
+    """Define a BasisCurves prim for a groom in a stage of metres, Y up.
+
+    The `groom_*` primvars are those that Unreal and other groom readers know.
+    """
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr(spline.type)
+    if spline.type == "cubic":
+        curves.CreateBasisAttr(spline.basis)
+    curves.CreateWrapAttr(spline.wrap)
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(groom.points)))
+    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(groom.counts)))
+    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(groom.widths)))
+    each = {1: UsdGeom.Tokens.constant, groom.strand_count: UsdGeom.Tokens.uniform}
+    curves.SetWidthsInterpolation(each.get(len(groom.widths), UsdGeom.Tokens.vertex))
+    pad = np.float32(groom.widths.max() / 2)
+    extent = np.stack([groom.points.min(axis=0) - pad, groom.points.max(axis=0) + pad])
+    curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent))
+    api = UsdGeom.PrimvarsAPI(curves)
+    names, uniform = Sdf.ValueTypeNames, UsdGeom.Tokens.uniform
+
+    def per_strand(name: str, kind, values) -> None:
+        api.CreatePrimvar(name, kind, uniform).Set(values)
+
+    per_strand("groom_id", names.IntArray, Vt.IntArray.FromNumpy(np.arange(groom.strand_count, dtype=np.int32)))
+    if groom.guides is not None:
+        per_strand("groom_guide", names.IntArray, Vt.IntArray.FromNumpy(groom.guides.astype(np.int32)))
+    if groom.group is not None:
+        per_strand("groom_group_id", names.IntArray, Vt.IntArray.FromNumpy(np.ascontiguousarray(groom.group)))
+    if groom.root_uv is not None:
+        uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(groom.root_uv))
+        per_strand("groom_root_uv", names.Float2Array, uv)
+        per_strand("st", names.TexCoord2fArray, uv)
+    for name, kind, value in (
+        ("groom_version_major", names.Int, 1),
+        ("groom_version_minor", names.Int, 4),
+        ("groom_tool", names.String, "neuralocks"),
+    ):
+        api.CreatePrimvar(name, kind, UsdGeom.Tokens.constant).Set(value)
+    return curves
+
+
+def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[str]]:
+    stage = open_stage(source)
+    border = Border.of(stage)
+    if up is not None and str(up).upper() not in ("Y", "Z"):
+        raise NeuralocksError(f"--up {up}: is not an axis; give Y or Z")
+    border = Border(_metres(unit, border), (up or border.up_axis).upper(), border.rate)
+    found, notes = [], []
+    for prim in find_curves(stage):
+        curves = UsdGeom.BasisCurves(prim)
+        groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
+        tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
+        found.append((groom, Spline(*tokens)))
+    if not found:
+        raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
+    return found, notes
+
+
+def _metres(unit, border: Border) -> float:
+    if unit is None:
+        return border.metres_per_unit
+    known = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+    try:
+        value = known.get(str(unit).lower()) or float(unit)
+    except ValueError:
+        value = -1.0
+    if not 1e-7 < value < 1e7:
+        raise NeuralocksError(f"--unit {unit}: is not mm, cm, m or a number of metres")
+    return value
+
+
+def _free_path(stage: Usd.Stage, name: str) -> str:
+    """A prim path below /Groom for a groom's name, which may be a file or a prim path."""
+    base = Tf.MakeValidIdentifier(Path(name.rsplit("/", 1)[-1]).stem or "Hair")
+    path, number = f"/Groom/{base}", 1
+    while stage.GetPrimAtPath(path):
+        number += 1
+        path = f"/Groom/{base}_{number}"
+    return path

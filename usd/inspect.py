@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a file holds, and what would stop or spoil a bake of it."""
+
+from pathlib import Path
+
+import numpy as np
+from pxr import UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+
+from .attach import attach, rig_joint
+from .border import Border, open_stage
+from .curves import find_curves, read_groom
+from .groom import USD
+from .placement import Placement
+from .rig_source import read_rig
+from .stage import _composition, _groom_notes, _rig_notes, find_skeletons, frame_range, head_width
+
+
+def inspect(path, head: str | None = None) -> dict:
+    """Facts about a USD stage, a hair file, a model or a motion file, as plain values.
+
+    Args:
+        path: the file.
+        head: the joint that would be given with `--head`.
+
+    Returns:
+        `file`, `kind`, facts by kind, `stops` (what would stop a bake) and `spoils` (what a user should know).
+
+    Raises:
+        NeuralocksError: the file cannot be read at all.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind in USD:
+        return {"file": str(path), "kind": "stage", **_stage(path, head)}
+    if not path.is_file():
+        raise NeuralocksError(f"{path}: no such file; check the path")
+    if kind == ".neuralocks":
+        return {"file": str(path), "kind": "model", **_model(path)}
+    if kind == ".bvh":
+        return {"file": str(path), "kind": "motion", **_motion(path)}
+    from neuralocks_core import formats
+
+    groom, notes = formats.read_with_notes(path)
+    return {"file": str(path), "kind": "hair", "grooms": [_groom(groom)], "stops": [], "spoils": notes}
+
+
+def _stage(path: Path, head: str | None) -> dict:
+    stage = open_stage(path)
+    stops: list[str] = []
+    spoils = [f"{path.name}: {_composition(error)}" for error in stage.GetCompositionErrors()]
+    border = Border.of(stage)
+    facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
+    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+        spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
+    rigs = []
+    for prim in find_skeletons(stage):
+        try:
+            rigs.append(read_rig(stage, prim, border, head, all_shapes=True))
+        except NeuralocksError as error:
+            stops.append(str(error))
+    skeletons = [_rig(rig) for rig in rigs]
+    for rig in rigs:
+        spoils += rig.notes + _rig_notes(rig)
+    moving = [rig for rig in rigs if rig.source.animated]
+    if moving:
+        facts["frames"] = list(frame_range(stage, moving))
+    if not rigs and not stops:
+        stops.append(f"{path.name}: holds no UsdSkel skeleton; export the character with its armature")
+    elif rigs and not moving:
+        stops.append(
+            f"{rigs[0].path}: the skeleton has no animation; bind a SkelAnimation to it (skel:animationSource)"
+        )
+    grooms = []
+    for prim in find_curves(stage):
+        try:
+            grooms.append(_curves(prim, rigs, border, head, spoils, stops))
+        except NeuralocksError as error:
+            stops.append(str(error))
+    if not grooms and not any("groom" in s for s in stops):
+        stops.append(f"{path.name}: holds no groom (no BasisCurves prim); add one, or import a hair file")
+    return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
+
+
+def _rig(rig) -> dict:
+    humanoid = rig.character.humanoid
+    found = {name: rig.source.names[joint] for name, joint in humanoid.items()}
+    body = rig.character.body
+    width = head_width(rig)
+    return {
+        "path": rig.path,
+        "joints": len(rig.source.names),
+        "animated": rig.source.animated,
+        "samples": len(rig.source.samples),
+        "head": found.get("head"),
+        "head found by": humanoid.reasons.get("head"),
+        "head width [m]": None if width is None else round(width, 3),
+        "head height over ground [m]": _height(rig),
+        "meshes": [str(m.prim.GetPath()) for m in rig.meshes],
+        "body vertices": 0 if body is None else len(body.points),
+        "blend shapes": [] if body is None else list(body.shapes),
+        "mapping": found,
+    }
+
+
+def _height(rig) -> float | None:
+    if "head" not in rig.character.humanoid:
+        return None
+    return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
+
+
+def _curves(prim, rigs, border, head, spoils, stops) -> dict:
+    placement = Placement(prim)
+    curves = UsdGeom.BasisCurves(prim)
+    facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
+    to_bind, joint = border.to_core @ placement.reference, {}
+    item = None
+    if rigs:
+        try:
+            found = attach(prim, rigs, placement, head, spoils)
+            to_bind = found.to_bind
+            joint = {"joint": rig_joint(found), "carried by": found.how}
+            item = found
+        except NeuralocksError as error:
+            stops.append(str(error))
+    groom = read_groom(prim, to_bind, spoils)
+    if item is not None:
+        from .stage import StageGroom
+
+        spoils += _groom_notes(StageGroom(str(prim.GetPath()), prim, groom, item, placement))
+    return facts | joint | _groom(groom)
+
+
+def _groom(groom: Groom) -> dict:
+    step = np.linalg.norm(np.diff(groom.points.astype(float), axis=0), axis=1)
+    inside = groom.strand_of_point[1:] == groom.strand_of_point[:-1]
+    lengths = np.bincount(groom.strand_of_point[1:][inside], step[inside], groom.strand_count)
+    return {
+        "name": groom.name,
+        "strands": groom.strand_count,
+        "vertices": len(groom.points),
+        "vertices per strand": sorted({int(groom.counts.min()), int(groom.counts.max())}),
+        "strand length [m]": {
+            "shortest": round(float(lengths.min()), 4),
+            "median": round(float(np.median(lengths)), 4),
+            "longest": round(float(lengths.max()), 4),
+        },
+        "without two distinct points": int((lengths <= 1e-7).sum()),
+    }
+
+
+def _model(path: Path) -> dict:
+    from neuralocks_core import model
+
+    file = model.read(path)
+    keep = ("format", "kind", "output", "anchored", "static", "training", "report", "credits")
+    facts = {"model": {key: file.meta.get(key) for key in keep if key in file.meta}}
+    if file.kind == "strands":
+        from neuralocks_core.runtime import StrandModel
+
+        facts["inputs of the body"] = StrandModel(file, threads=1).spec.size
+    return facts | {"stops": [], "spoils": []}
+
+
+def _motion(path: Path) -> dict:
+    from neuralocks_core.formats.bvh import read_bvh
+
+    motion = read_bvh(path)
+    clip = motion.clip
+    facts = {
+        "joints": len(motion.skeleton.names),
+        "frames": len(clip.times),
+        "seconds": round(clip.end - clip.start, 3),
+        "unit [m]": motion.unit,
+    }
+    return facts | {"stops": [], "spoils": []}
+
+
+def as_text(facts: dict, indent: int = 0) -> str:
+    """The facts for a person to read."""
+    lines = []
+    pad = "  " * indent
+    for name, value in facts.items():
+        if name in ("stops", "spoils"):
+            continue
+        if isinstance(value, dict):
+            lines += [f"{pad}{name}:", as_text(value, indent + 1)]
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            for entry in value:
+                lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
+        elif isinstance(value, list):
+            lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
+        else:
+            lines.append(
+                f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
+            )
+    if indent == 0:
+        lines += [f"would stop a bake: {line}" for line in facts.get("stops", [])]
+        lines += [f"note: {line}" for line in facts.get("spoils", [])]
+    return "\n".join(line for line in lines if line)

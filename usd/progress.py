@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A progress bar with the time left, for what takes more than two seconds, on a terminal only."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+QUIET_FOR = 2.0
+"""[s] Work that is done by then shows no bar."""
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator:
+    """A callback (done, total, message) that draws on stderr."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[message]}"),
+    )
+    bar = Progress(*columns, console=console, transient=True)
+    began, shown = time.monotonic(), None
+    drawn = sys.stderr.isatty()
+
+    def callback(done: int, total: int, message: str = "") -> None:
+        nonlocal shown
+        if not drawn or (shown is None and time.monotonic() - began < QUIET_FOR):
+            return
+        if shown is None:
+            bar.start()
+            shown = bar.add_task(title, total=total, message="")
+        bar.update(shown, completed=done, total=total, message=message)
+
+    try:
+        yield callback
+    finally:
+        if shown is not None:
+            bar.stop()
