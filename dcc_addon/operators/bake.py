@@ -214,8 +214,9 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
 def _card(path: str) -> list[str]:
     from usd.evaluate import evaluate
 
-    card = evaluate(path)
-    return [str(line) for line in card.lines()]
+    from ..services.card import lines_of
+
+    return lines_of(evaluate(path))
 
 
 CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)

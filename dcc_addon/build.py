@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Build the Blender extension: `python dcc_addon/build.py [--platform linux-x64] [-o dist]`.
+
+One zip a platform with the wheels for the Python of every supported Blender, so that Blender installs them without
+network, and for Blender before 4.2 a zip with a folder in which everything lies unpacked.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+PLATFORMS = {
+    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64", "manylinux_2_17_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": ["macosx_14_0_arm64", "macosx_11_0_arm64", "macosx_10_15_universal2"],
+}
+PYTHONS = ("3.11", "3.13")
+"""Of Blender 4.2 to 5.0, and of 5.1 and later."""
+COMPILED = ("onnxruntime==1.31.1", "usd-core==26.11", "scipy==1.15.3")
+"""scipy: the newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons. numpy is Blender's
+own.
+"""
+LEGACY = ("linux-x64", "3.11")
+"""What the zip for Blender before 4.2 is built for: Linux distributions, which still carry it."""
+NOT_SHIPPED = ("build.py", "__pycache__")
+
+
+def main() -> int:
+    """Build what is asked for; prints each file made."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--platform", choices=[*PLATFORMS, "all"], default="all")
+    parser.add_argument("--python", choices=PYTHONS, action="append", help="default: all")
+    parser.add_argument("--no-legacy", action="store_true", help="leave out the zip for Blender before 4.2")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist")
+    parser.add_argument(
+        "--cache", type=Path, default=ROOT / "build" / "wheels", help="where downloaded wheels are kept"
+    )
+    args = parser.parse_args()
+    args.output.mkdir(parents=True, exist_ok=True)
+    pythons = args.python or PYTHONS
+    own = own_wheel(args.cache / "own")
+    for platform in PLATFORMS if args.platform == "all" else [args.platform]:
+        wheels = [own]
+        for python in pythons:
+            wheels += download(args.cache / platform / python, COMPILED, platform, python)
+        print(extension(args.output, platform, wheels))
+    if not args.no_legacy:
+        platform, python = LEGACY
+        wheels = [own, *download(args.cache / platform / python, COMPILED, platform, python)]
+        print(legacy(args.output, wheels))
+    return 0
+
+
+def own_wheel(folder: Path) -> Path:
+    """The wheel of `neuralocks_core` and `usd`."""
+    shutil.rmtree(folder, ignore_errors=True)
+    pip("wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(ROOT))
+    return next(folder.glob("neuralocks-*.whl"))
+
+
+def download(folder: Path, requirements, platform: str, python: str) -> list[Path]:
+    """Wheels of these requirements, fetched once."""
+    folder.mkdir(parents=True, exist_ok=True)
+    found = []
+    for requirement in requirements:
+        name, version = requirement.split("==")
+        pattern = f"{name.replace('-', '_')}-{version}-*.whl"
+        if not list(folder.glob(pattern)):
+            tags = [t for tag in PLATFORMS[platform] for t in ("--platform", tag)] + ["--python-version", python]
+            pip("download", "--no-deps", "--only-binary", ":all:", *tags, "-d", str(folder), requirement)
+        found.append(next(folder.glob(pattern)))
+    return found
+
+
+def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
+    """The zip that Blender 4.2 and later installs."""
+    lines = [f'platforms = ["{platform}"]', "wheels = ["]
+    lines += [f'  "./wheels/{wheel.name}",' for wheel in sorted(wheels)] + ["]", ""]
+    manifest = (HERE / "blender_manifest.toml").read_text()
+    # Top-level keys must come before the first table.
+    head, table, tail = manifest.partition("[permissions]")
+    out = output / f"neuralocks-{version(manifest)}-{platform}.zip"
+    with Written(out) as archive:
+        archive.writestr("blender_manifest.toml", head + "\n".join(lines) + "\n" + table + tail)
+        for path in sources():
+            archive.write(path, path.relative_to(HERE).as_posix())
+        for wheel in sorted(wheels):
+            archive.write(wheel, f"wheels/{wheel.name}", compress_type=zipfile.ZIP_STORED)
+    return out
+
+
+def legacy(output: Path, wheels: list[Path]) -> Path:
+    """The zip for Blender before 4.2: a folder, with the packages unpacked in it."""
+    out = output / f"neuralocks-{version((HERE / 'blender_manifest.toml').read_text())}-legacy-{LEGACY[0]}.zip"
+    with Written(out) as archive:
+        for path in sources():
+            archive.write(path, f"neuralocks/{path.relative_to(HERE).as_posix()}")
+        for wheel in sorted(wheels):
+            with zipfile.ZipFile(wheel) as packed:
+                for name in packed.namelist():
+                    if not name.endswith("/") and "/tests/" not in name:
+                        archive.writestr(f"neuralocks/packages/{name}", packed.read(name))
+    return out
+
+
+def sources() -> list[Path]:
+    """Files of the add-on itself; the manifest is written with the wheels in it."""
+    files = [
+        p for p in sorted(HERE.rglob("*")) if p.is_file() and not set(p.relative_to(HERE).parts) & set(NOT_SHIPPED)
+    ]
+    return [p for p in files if p.name != "blender_manifest.toml" and p.suffix != ".pyc"]
+
+
+def version(manifest: str) -> str:
+    """The version that the manifest gives."""
+    line = next(line for line in manifest.splitlines() if line.startswith("version"))
+    return line.split('"')[1]
+
+
+def pip(*arguments: str) -> None:
+    """Run pip of this Python."""
+    subprocess.run([sys.executable, "-m", "pip", "--disable-pip-version-check", "-q", *arguments], check=True)
+
+
+class Written:
+    """A zip that appears under its name only when it is complete."""
+
+    def __init__(self, path: Path):
+        self._path = path
+
+    def __enter__(self) -> zipfile.ZipFile:
+        self._folder = tempfile.TemporaryDirectory(dir=self._path.parent, prefix=".zip-")
+        self._part = Path(self._folder.name) / self._path.name
+        self._archive = zipfile.ZipFile(self._part, "w", zipfile.ZIP_DEFLATED, compresslevel=6)
+        return self._archive
+
+    def __exit__(self, kind, *_):
+        self._archive.close()
+        if kind is None:
+            self._part.replace(self._path)
+        self._folder.cleanup()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
