@@ -20,7 +20,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 
 from .behind import Behind
-from .override import OverrideWriter, to_text, used_files
+from .override import OverrideWriter, reload_open, to_text, used_files
 from .posing import GroomPoser
 from .spool import Spool, fingerprint
 from .stage import Shot, StageGroom, read_shot
@@ -150,6 +150,7 @@ def _write(shot, model, material, strength, resolve, velocities, jobs, codes, sp
         to_text(spool.layer_path, text, spool.out)
         os.replace(text, spool.layer_path)
     spool.finish()
+    reload_open(spool.out)
     return resumed
 
 

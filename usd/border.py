@@ -2,6 +2,7 @@
 """Where a stage's unit, up axis and rate are converted to metres, Y up and seconds: once, here."""
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,14 +91,9 @@ def open_stage(path) -> Usd.Stage:
 
 def first_line(error: Exception) -> str:
     """The message of a USD error without USD's own source positions."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = next(
-        (line for line in lines if ":" in line and not line.startswith("Error in")),
-        lines[-1] if lines else "unknown error",
-    )
-    if " -- " in text:
-        text = text.split(" -- ", 1)[1]
-    return text.split("' at line")[0].strip().rstrip(".")[:200]
+    found = re.search(r" : '(.*?)'\s*$", str(error), re.MULTILINE | re.DOTALL)
+    lines = (found.group(1) if found else str(error)).strip().splitlines() or ["unknown error"]
+    return lines[0].strip().rstrip(".")[:200]
 
 
 def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:

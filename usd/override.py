@@ -114,6 +114,13 @@ def to_text(crate: Path, text: Path, out: Path) -> None:
         layer.Export(str(text))
 
 
+def reload_open(path: Path) -> None:
+    """Let stages that this process has open see the file that has just been replaced."""
+    layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
+    if layer:
+        layer.Reload(force=True)
+
+
 def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
     return layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
 

@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import shutil
+import uuid
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,9 @@ except ImportError:  # Windows: two bakes of one output at a time are then not t
 
 class Spool:
     """A folder `.NAME.baking` next to the output, valid for one set of inputs.
+
+    Attributes:
+        layer_path: where the output is assembled.
 
     Args:
         out: the output file.
@@ -51,11 +55,8 @@ class Spool:
             mark.write_text(fingerprint)
         for stray in self.folder.glob("*.part*"):
             stray.unlink()
-
-    @property
-    def layer_path(self) -> Path:
-        """Where the output is assembled."""
-        return self.folder / "assembled.part.usdc"
+        # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
+        self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
 
     def read(self, groom: int, time_code: float, arrays: int, points: int) -> list[np.ndarray] | None:
         """The arrays (points, 3) of a finished frame, or None."""

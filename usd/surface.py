@@ -54,11 +54,18 @@ def bound_meshes(stage: Usd.Stage, source: JointSource, notes: list[str]) -> lis
 
 
 def bound_skeleton(prim: Usd.Prim) -> str | None:
-    """Path of the skeleton that skins this prim by its own or an inherited binding."""
+    """Path of the skeleton that skins this prim by its own or an inherited binding, or did before a bake unbound it."""
     if influences(prim)[0] is None:
         return None
     skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
-    return str(skeleton.GetPath()) if skeleton else None
+    if skeleton:
+        return str(skeleton.GetPath())
+    relation = prim.GetRelationship("skel:skeleton")
+    for spec in relation.GetPropertyStack() if relation else ():
+        for target in spec.targetPathList.GetAddedOrExplicitItems():
+            if UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(target)):
+                return str(target)
+    return None
 
 
 def influences(prim: Usd.Prim) -> tuple[UsdGeom.Primvar | None, UsdGeom.Primvar | None]:
