@@ -8,6 +8,7 @@ were put, and the legs follow from both.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import BPoly
 
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
@@ -55,7 +56,7 @@ def act(character: Character, rate: float = 24.0) -> Clip:
     # The root turns about its own joint on the floor, below the hips only at rest.
     sway = walking * 0.022 * np.cos(phase - 0.4)
     puppet.position += sway[:, None] * (SIDE[None] * np.cos(yaw)[:, None] - FRONT[None] * np.sin(yaw)[:, None])
-    crouch = np.clip(-rise, 0, None)
+    crouch = 0.5 * (np.sqrt(rise**2 + 0.08**2) - rise) - 0.04  # no kink as the feet leave
     twist = walking * 0.1 * np.cos(phase + np.pi)
     pelvis = twist[:, None] * UP + (0.9 * crouch)[:, None] * SIDE + (walking * 0.03 * np.sin(phase))[:, None] * FRONT
     puppet.turn("hips", pelvis)
@@ -76,13 +77,13 @@ def _head(puppet, times, twist, lag, crouch):
     puppet.turn_neck(swing(times, SHAKE, 2.5, 2.1)[:, None] * UP * 0.6)
     puppet.bend_spine(swing(times, SHAKE, 2.5, 2.1)[:, None] * UP * -0.06)
     # At the end she looks aside, a little down, and holds it.
-    end = ease(times, JUMP + 1.05, 0.45)[:, None]
+    end = ease(times, JUMP + 1.2, 0.45)[:, None]
     puppet.turn_neck(end * (UP * 0.22 + SIDE * 0.06 + FRONT * 0.12))
 
 
 def _arms(puppet, times, walking, phase, crouch):
     back = pulse(times, JUMP - 0.1, 0.4, 0.0, 0.16)
-    up = pulse(times, JUMP + 0.3, 0.24, 0.12, 0.5)
+    up = pulse(times, JUMP + 0.36, 0.24, 0.12, 0.5)
     bind, humanoid = puppet.character.skeleton.bind[:, :3, 3], puppet.character.humanoid
     for side, sign in (("left", 1.0), ("right", -1.0)):
         shoulder, elbow, hand = (bind[humanoid[f"{side}_{part}"]] for part in ("upper_arm", "lower_arm", "hand"))
@@ -97,15 +98,18 @@ def _arms(puppet, times, walking, phase, crouch):
 
 
 def _rise(times: np.ndarray) -> np.ndarray:
-    """Height of the hips over their stance (T,) [m] through the jump: crouch, flight, landing, recovery."""
-    down, push = 0.38, 0.2
-    flight = np.sqrt(8 * HEIGHT / 9.81)
-    off = JUMP + down + push
-    t = np.clip(times - off, 0, flight)
-    air = 4 * HEIGHT * (t / flight) * (1 - t / flight)
-    crouch = -0.2 * (ease(times, JUMP, down) - ease(times, JUMP + down - 0.03, push + 0.06))
-    landing = -0.16 * pulse(times, off + flight - 0.04, 0.17, 0.03, 0.55)
-    return air + crouch + landing
+    """Height of the hips over their stance (T,) [m] through the jump: crouch, push, flight, landing, recovery."""
+    deep, soft, gravity = 0.2, 0.17, 9.81
+    speed = np.sqrt(2 * gravity * HEIGHT)
+    down, push, land, recover = 0.4, 2.2 * deep / speed, 2.2 * soft / speed, 0.6
+    flight = 2 * speed / gravity
+    knots = JUMP + np.cumsum([0, down, push, flight, land, 0.04, recover])
+    states = [  # height, speed, acceleration at each knot
+        *[(0, 0, 0), (-deep, 0, 0), (0, speed, -gravity)],
+        *[(0, -speed, -gravity), (-soft, 0, 0), (-soft, 0, 0), (0, 0, 0)],
+    ]
+    # Quintic from knot to knot: smooth to the second derivative, and exactly a throw while in the air.
+    return BPoly.from_derivatives(knots, [list(state) for state in states])(np.clip(times, knots[0], knots[-1]))
 
 
 def _footprints(times, character):
