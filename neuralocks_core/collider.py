@@ -11,6 +11,12 @@ from neuralocks_core.errors import NeuralocksError
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
 
+BAND = 0.01
+"""Points farther from the surface than this [m] are not looked for by `near`. A strand that enters the body passes
+nearer with some vertex: it is half of the longest segment that hair of half a metre has."""
+CURVED = 0.003
+"""How far a surface may bend away from the plane of its nearest sample [m]."""
+
 
 class Collider:
     """A mesh in one pose, asked for distances.
@@ -42,13 +48,17 @@ class Collider:
         samples, self._owner, self._reach = _spread(a[kept], b[kept], c[kept])
         self._tree = cKDTree(samples)
 
-    def distance(self, points: np.ndarray, limit: float = 0.03) -> tuple[np.ndarray, np.ndarray]:
+    def distance(
+        self, points: np.ndarray, limit: float = 0.03, proven: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest.
 
         Args:
             points: (..., 3) [m].
             limit: farther than this from the surface [m], the distance is that to the nearest surface sample instead
                 of the exact one (a few millimetres too large), which saves most of the work.
+            proven: go on until no other triangle can be nearer; else only those around the nearest four samples are
+                looked at, which may miss the nearest one by a fraction of a millimetre.
         """
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
@@ -59,13 +69,13 @@ class Collider:
         normal = self._normals[triangle]
         near = np.flatnonzero(rough <= limit + self._reach)
         closest, normal = closest.copy(), normal.copy()
-        pending, k = near, 6
+        pending, k = near, 8 if proven else 4
         while len(pending):
             count = min(k, self._tree.n)
             far, found = self._tree.query(points[pending], k=np.arange(1, count + 1), workers=-1)
             closest[pending], normal[pending], best = self._nearest(points[pending], self._owner[found])
-            proven = (far[:, -1] >= best + self._reach) | (count == self._tree.n)
-            pending, k = pending[~proven], 4 * k
+            done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
+            pending, k = pending[~done], 4 * k
         offset = points - closest
         length = np.linalg.norm(offset, axis=1)
         sign = np.where((offset * normal).sum(axis=1) < 0, -1.0, 1.0)
@@ -75,9 +85,15 @@ class Collider:
         return (sign * length).reshape(shape), direction.reshape(*shape, 3)
 
     def near(self, points: np.ndarray, reach: float) -> np.ndarray:
-        """Indices (n,) of the points (N, 3) that may lie within `reach` [m] of the surface: a cheap first sieve."""
-        found, _ = self._tree.query(points, distance_upper_bound=reach + self._reach, workers=-1)
-        return np.flatnonzero(np.isfinite(found))
+        """Indices (n,) of the points (N, 3) that may lie less than `reach` [m] outside, or inside: a cheap first sieve.
+
+        Each point is judged by the plane of its nearest surface sample, with room for the surface's curvature.
+        """
+        far, sample = self._tree.query(points, distance_upper_bound=BAND + self._reach, workers=-1)
+        close = np.flatnonzero(np.isfinite(far))
+        sample = sample[close]
+        height = ((points[close] - self._tree.data[sample]) * self._normals[self._owner[sample]]).sum(axis=1)
+        return close[height < reach + CURVED]
 
     def _nearest(self, points, candidates):
         """Closest point, pseudonormal there and distance, over candidate triangles (N, k) for points (N, 3)."""
@@ -96,16 +112,19 @@ class Collider:
         result[:, 0] = self._normals
         corners = self.points[self.triangles]
         at_corner = np.zeros_like(self.points)
+
+        def gather(into, values, count):
+            return np.stack([np.bincount(into, values[:, axis], count) for axis in range(3)], axis=1)
+
         for i in range(3):
             u, v = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
             angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
-            np.add.at(at_corner, self.triangles[:, i], angle[:, None] * self._normals)
+            at_corner += gather(self.triangles[:, i], angle[:, None] * self._normals, len(self.points))
         result[:, 1:4] = at_corner[self.triangles]
         edges = np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
         key = edges[:, 0] * len(self.points) + edges[:, 1]
         _, which = np.unique(key, return_inverse=True)
-        at_edge = np.zeros((which.max() + 1, 3))
-        np.add.at(at_edge, which, np.repeat(self._normals, 3, axis=0))
+        at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
         result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
         return result
 

@@ -9,12 +9,12 @@ from neuralocks_core.strands import StrandSet
 
 MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
-ITERATIONS = 6
+ROUNDS = 5
+"""Of finding the planes under a strand and laying it over them."""
 CLAMPED = 2
 """Vertices at the root that never move."""
-BAND = 0.01
-"""A strand that enters the body passes within this of its surface with some vertex [m]: half of the longest segment
-that hair of half a metre has."""
+NEAR = 0.02
+"""Distance [m] within which a vertex of a strand in trouble minds the surface."""
 
 
 class Resolver:
@@ -24,27 +24,33 @@ class Resolver:
         character: whose body the hair must stay out of; without a body nothing is done.
         strands: the groom at rest.
         shape: blend shape weights (B,) of the pose in which the groom rests.
+
+    Attributes:
+        body: the part of the body that the hair can reach, or None.
+        at_rest: the collider in bind pose, if there is a body.
     """
 
     def __init__(self, character: Character, strands: StrandSet, shape: np.ndarray | None = None):
         self.character, self.strands = character, strands
-        self._body = None if character.body is None else _within_reach(character, strands)
-        if self._body is not None:
+        self.body = None if character.body is None else _within_reach(character, strands)
+        self.at_rest: Collider | None = None
+        if self.body is not None:
             to_canonical = np.linalg.inv(character.canonical_to_bind)
-            points = self._body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-            self.rest_distance = Collider(points, self._body.triangles).distance(strands.rest)[0]
+            points = self.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+            self.at_rest = Collider(points, self.body.triangles)
+            self.rest_distance = self.at_rest.distance(strands.rest)[0]
 
     def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
         """The body that the hair can reach, posed by world joint transforms (J, 4, 4), in canonical space."""
-        if self._body is None:
+        if self.body is None:
             return None
         to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
         skinning = to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
-        return Collider(self._body.posed(skinning, shape), self._body.triangles)
+        return Collider(self.body.posed(skinning, shape), self.body.triangles)
 
     def displacement(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:
         """The network's displacement (S, 24, 3) [m] for a pose, changed where it leaves hair inside the body."""
-        if self._body is None:
+        if self.body is None:
             return displacement
         points = self.strands.rest + displacement
         resolved = resolve(points, self.collider(joints, shape), self.rest_distance)
@@ -59,9 +65,9 @@ class Resolver:
 def resolve(points: np.ndarray, collider: Collider, rest_distance: np.ndarray, margin: float = MARGIN) -> np.ndarray:
     """Strands without vertices inside the body.
 
-    Strands that touch nothing come back bit for bit. In the others each vertex, from the root on, aims at where the
-    network put it, at its rest length from the one before, and slides around that one until it is clear. So a strand
-    depends on itself and on the body only: neither the order of strands nor their division into chunks matters.
+    Strands that touch nothing come back bit for bit. The others are laid over the planes of the surface under them, from
+    the root on and with every length kept, until nothing is inside any more. A strand depends on itself and on the
+    body only: neither the order of strands nor their division into chunks matters.
 
     Args:
         points: deformed strands (S, K, 3) [m], in the collider's space.
@@ -75,43 +81,72 @@ def resolve(points: np.ndarray, collider: Collider, rest_distance: np.ndarray, m
     """
     clear = np.minimum(rest_distance, margin, dtype=float)
     clear[:, :CLAMPED] = -np.inf
-    free = np.flatnonzero(np.isfinite(clear).ravel())
-    flat = points.reshape(-1, 3)
-    near = free[collider.near(flat[free], BAND)]
-    deep = np.zeros(clear.shape, bool)
     # A vertex that may rest inside must not count as a violation by the float32 rounding of the network's output.
-    deep.ravel()[near] = collider.distance(flat[near], limit=margin)[0] < clear.ravel()[near] - 1e-5
-    hit = np.flatnonzero(deep.any(axis=1))
+    low = clear - 1e-5
+    hit = np.flatnonzero(_violates(points, collider, low, margin))
     if not len(hit):
         return points
     result = np.array(points)
-    result[hit] = _untangle(np.asarray(points[hit], float), collider, clear[hit], deep[hit])
-    return result
-
-
-def _untangle(wanted: np.ndarray, collider: Collider, clear: np.ndarray, deep: np.ndarray) -> np.ndarray:
+    wanted, clear = np.asarray(points[hit], float), clear[hit]
     lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2)
-    result = wanted.copy()
-    moved = np.zeros(len(wanted), bool)
-    for i in range(CLAMPED, wanted.shape[1]):
-        before, length = result[:, i - 1], lengths[:, i - 1, None]
-        active = np.flatnonzero(moved | deep[:, i])
-        # A vertex that had to give way drags the next ones along only as far as the lengths ask for.
-        here = before[active] + length[active] * _unit(wanted[active, i] - before[active])
-        todo = np.arange(len(active))
-        for _ in range(ITERATIONS):
-            rows = active[todo]
-            distance, normal = collider.distance(here[todo])
-            short = clear[rows, i] - distance
-            still = short > 0
-            if not still.any():
-                break
-            todo, rows = todo[still], rows[still]
-            pushed = here[todo] + (1.05 * short[still] + 1e-5)[:, None] * normal[still]
-            here[todo] = before[rows] + length[rows] * _unit(pushed - before[rows])
-        result[active, i] = here
-        moved[active] = True
+    planes = _Planes(wanted.shape[:2])
+    now, todo = wanted.copy(), np.arange(len(hit))
+    for _ in range(ROUNDS):
+        planes.look(collider, now, clear, todo)
+        now[todo] = _laid(wanted[todo], lengths[todo], planes.normal[todo], planes.height[todo])
+        todo = todo[_violates(now[todo], collider, clear[todo] - 0.5 * margin, margin)]
+        if not len(todo):
+            break
+    result[hit] = now
     return result
+
+
+class _Planes:
+    """A plane under each vertex, n . x >= height, the latest one found."""
+
+    def __init__(self, shape):
+        self.normal, self.height = np.zeros((*shape, 3)), np.full(shape, -np.inf)
+
+    def look(self, collider: Collider, points: np.ndarray, clear: np.ndarray, rows: np.ndarray) -> None:
+        """Find the planes of these strands anew."""
+        inside = points[rows, CLAMPED:]
+        distance, normal = collider.distance(inside, limit=NEAR, proven=False)
+        surface = (inside * normal).sum(axis=-1) - distance
+        height = np.where(distance < NEAR, surface + clear[rows, CLAMPED:] * 1.02 + 2e-5, -np.inf)
+        self.normal[rows, CLAMPED:], self.height[rows, CLAMPED:] = normal, height
+
+
+def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """Strands (n, K, 3) as near to where they are wanted as their lengths and the planes under them let them be.
+
+    From the root on, each segment aims at its wanted end. If that is under its plane, it takes the direction nearest to
+    that which ends on the plane; straight away from the body if not even that reaches.
+    """
+    result = wanted.copy()
+    free = np.ones(len(wanted), bool)
+    for i in range(CLAMPED, wanted.shape[1]):
+        before, length, n = result[:, i - 1], lengths[:, i - 1, None], normal[:, i]
+        along = _unit(wanted[:, i] - before)
+        up = ((height[:, i] - (n * before).sum(axis=1)) / np.maximum(length[:, 0], 1e-9))[:, None]
+        rise = (along * n).sum(axis=1, keepdims=True)
+        low = (rise < up)[:, 0]
+        slope = np.clip(up, -1, 1)
+        lifted = slope * n + np.sqrt(1 - slope**2) * _unit(along - rise * n)
+        moved = before + length * np.where(low[:, None], lifted, along)
+        free &= ~low
+        # Up to the first vertex that must give way, a strand stays bit for bit.
+        result[:, i] = np.where(free[:, None], wanted[:, i], moved)
+    return result
+
+
+def _violates(points: np.ndarray, collider: Collider, low: np.ndarray, margin: float) -> np.ndarray:
+    """Which strands (S,) have a vertex nearer than `low` (S, K), or deeper inside."""
+    flat, low = points.reshape(-1, 3), low.ravel()
+    free = np.flatnonzero(np.isfinite(low))
+    near = free[collider.near(flat[free], margin)]
+    deep = np.zeros(low.shape, bool)
+    deep[near] = collider.distance(flat[near], limit=margin, proven=False)[0] < low[near]
+    return deep.reshape(points.shape[:2]).any(axis=1)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair beside a trusted simulation of the same strands: the second half of the report card."""
+
+import numpy as np
+
+from neuralocks_core import metrics
+from neuralocks_core.character import Character
+from neuralocks_core.collider import Collider
+from neuralocks_core.locks import lock_mates
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import Clip
+from neuralocks_core.resolve import Resolver
+from neuralocks_core.strands import StrandSet
+
+STEP = 1 / 30
+"""Time step of the reference [s]: the one that models are trained on."""
+
+
+def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray) -> dict[str, float]:
+    """All measures of an answer against the reference.
+
+    Args:
+        answer, reference: displacements from rest (T, S, 24, 3) [m], canonical.
+        length: of the strands (S,) [m].
+        times: (T,) [s].
+    """
+    error = metrics.motion_error(answer, reference, length)
+    return {
+        "position_percent": metrics.position_error(answer, reference, length),
+        "motion_error_median": error["median"],
+        "motion_error_rms": error["rms"],
+        "velocity_error": metrics.velocity_error(answer, reference, times),
+        "motion_ratio": metrics.motion_ratio(answer, reference, times),
+        "dynamic_frames": metrics.dynamic_frames(answer, reference, times),
+        "tip_correlation": _correlation(metrics.tip_curves(answer), metrics.tip_curves(reference)),
+    }
+
+
+def simulated(
+    character: Character,
+    strands: StrandSet,
+    clip: Clip,
+    times: np.ndarray,
+    material: Material | None = None,
+    *,
+    substeps: int = 1,
+    resolver: Resolver | None = None,
+    progress=None,
+) -> np.ndarray:
+    """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
+
+    It runs at its own step from the first time on and is interpolated in between.
+
+    Args:
+        character: with its body.
+        strands: all valid.
+        clip: the motion.
+        times: (T,) [s].
+        material: of the hair.
+        substeps: of each step; more mean less numerical damping than models are trained with.
+        resolver: of the same character, for the part of its body that the hair can reach.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the solver is not installed.
+    """
+    from neuralocks_core.reference import simulate
+
+    clock = times[0] + STEP * np.arange(int(np.ceil((times[-1] - times[0]) / STEP - 1e-9)) + 1)
+    joints, shapes = clip.at(clock), clip.shape_at(clock)
+    resolver = resolver or Resolver(character, strands)
+    body = triangles = bind = None
+    if resolver.at_rest is not None:
+        part = resolver.body
+        body = np.stack([part.posed(j @ character.inverse_bind, s) for j, s in zip(joints, shapes, strict=True)])
+        triangles, bind = part.triangles, resolver.at_rest.points
+    rollout = simulate(
+        strands.rest,
+        character.canonical_to_world(joints),
+        body,
+        triangles,
+        material or Material(),
+        dt=STEP,
+        substeps=substeps,
+        neighbours=lock_mates(strands.rest, strands.lock),
+        bind_body=bind,
+        progress=progress,
+    )
+    place = np.clip((times - times[0]) / STEP, 0, len(clock) - 1)
+    low = np.minimum(place.astype(int), max(len(clock) - 2, 0))
+    part = (place - low)[:, None, None, None].astype(np.float32)
+    high = np.minimum(low + 1, len(clock) - 1)
+    return (1 - part) * rollout.points[low] + part * rollout.points[high] - strands.rest
+
+
+def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
+    """Indices of about `count` valid strands in whole locks, spread over the scalp by chance."""
+    usable = np.flatnonzero(strands.valid)
+    if len(usable) <= count:
+        return usable
+    order = np.random.default_rng(seed).permutation(int(strands.lock.max()) + 1)
+    rank = np.empty(len(order), int)
+    rank[order] = np.arange(len(order))
+    by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]
+    return np.sort(by_lock[:count])
+
+
+def penetration_of(points: np.ndarray, rest_distance: np.ndarray, colliders: list[Collider]) -> dict[str, float]:
+    """Penetration of points (T, N, 3) [m] in canonical space, one collider a frame."""
+    distance = np.stack([c.distance(p, limit=0.005)[0] for c, p in zip(colliders, points, strict=True)])
+    return metrics.penetration(distance, rest_distance)
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    """Of two curves (T, 3) about their means."""
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    both = np.sqrt(np.square(a).sum() * np.square(b).sum())
+    return float((a * b).sum() / both) if both > 1e-12 else float("nan")

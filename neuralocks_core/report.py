@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report card: what hair was measured at, as text, numbers and curves."""
+
+import io
+import json
+import math
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+LABELS = {
+    "stretch_percent": ("length error, mean", "%", "of a strand's rest length"),
+    "stretch_percent_max": ("length error, largest", "%", ""),
+    "stretch_cm": ("stretch violation", "cm", "mean over strands"),
+    "penetration_percent": ("vertices in the body", "%", "deeper than at rest"),
+    "penetration_3mm_percent": ("deeper than 3 mm", "%", ""),
+    "penetration_worst_mm": ("worst depth", "mm", ""),
+    "inside_at_rest_percent": ("inside already at rest", "%", "as the groom was made"),
+    "droop_cm": ("droop", "cm", "tips below the rigid groom's, mean"),
+    "speed_cm_s": ("speed against the head", "cm/s", "mean; rigid hair has 0"),
+    "swing_percent": ("swing of the tips", "%", "of strand length, rms about the mean"),
+    "settling_s": ("settling after a stop", "s", "until 10 % of the tip speed"),
+    "jitter_mm": ("jitter in a held pose", "mm", "largest step of a vertex, 2 s after the stop"),
+    "energy_gravity": ("gravity energy", "J/kg", "against the rigid groom; below 0 it hangs lower"),
+    "energy_bend": ("bend energy", "J/kg", ""),
+    "energy_stretch": ("stretch energy", "J/kg", ""),
+    "position_percent": ("position error", "% L", ""),
+    "motion_error_median": ("motion error, median strand", "", "rigid = 1"),
+    "motion_error_rms": ("motion error, rms", "", "rigid = 1"),
+    "velocity_error": ("velocity error", "", "rigid = 1"),
+    "motion_ratio": ("motion ratio", "", "1 = as lively as the reference"),
+    "dynamic_frames": ("consecutive dynamic frames", "", "at 35 % of the reference's motion"),
+    "tip_correlation": ("tip curve correlation", "", ""),
+}
+"""Name of a measure -> what a person reads, unit, remark."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """What was measured.
+
+    Attributes:
+        title: of what.
+        grooms: groom -> measures, plain numbers (NaN where there is nothing to measure) and facts in words.
+        compared: groom -> whose answer ("network", "held pose", "rigid") -> measures; empty without reference.
+        curves: groom -> {"times": (T,), answer: mean tip displacement (T, 3) [m]}.
+        notes: what a reader should know, one line each.
+    """
+
+    title: str
+    grooms: dict[str, dict]
+    compared: dict[str, dict[str, dict]] = field(default_factory=dict)
+    curves: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> str:
+        """The numbers, for machines; what could not be measured is null."""
+        body = {"title": self.title, "grooms": self.grooms, "compared": self.compared, "notes": list(self.notes)}
+        return json.dumps(_plain(body), indent=2, sort_keys=False)
+
+    def text(self, width: int = 100) -> str:
+        """For people."""
+        from rich.console import Console
+
+        console = Console(file=io.StringIO(), width=width, force_terminal=False, highlight=False)
+        for name, values in self.grooms.items():
+            console.print(self._measures(name, values))
+            if self.compared.get(name):
+                console.print(self._comparison(name))
+        for note in self.notes:
+            console.print(f"- {note}", markup=False)
+        return console.file.getvalue().rstrip() + "\n"
+
+    def plot(self, path: str | os.PathLike) -> Path:
+        """Draw the tip curves, one row a groom: sideways, up and forward over time.
+
+        Raises:
+            NeuralocksError: matplotlib is missing or the file cannot be written.
+        """
+        path = Path(path)
+        try:
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+            from matplotlib.figure import Figure
+        except ImportError:
+            raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[preview]'") from None
+        rows = max(len(self.curves), 1)
+        figure = Figure(figsize=(12, 2.9 * rows), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(rows, 3, squeeze=False, sharex="row")
+        style = {
+            "reference": {"color": "black", "lw": 2.2},
+            "network": {"color": "tab:red", "lw": 1.6},
+            "held pose": {"color": "tab:blue", "lw": 1, "ls": "--"},
+            "rigid": {"color": "0.6", "lw": 1, "ls": ":"},
+        }
+        for row, (name, curves) in zip(axes, self.curves.items(), strict=False):
+            for axis, (panel, direction) in enumerate(zip(row, ("sideways", "up", "forward"), strict=True)):
+                for who, curve in curves.items():
+                    if who != "times":
+                        panel.plot(curves["times"], 100 * curve[:, axis], label=who, **style.get(who, {}))
+                panel.set_title(f"{name}: tips, {direction}", fontsize=9)
+                panel.set_xlabel("s")
+                panel.set_ylabel("cm against the head")
+            row[0].legend(fontsize=8)
+        write_whole(path, lambda part: figure.savefig(part, dpi=110, format=path.suffix.lstrip(".") or "png"))
+        return path
+
+    def _measures(self, name, values):
+        from rich.table import Table
+
+        facts = ", ".join(f"{key} {value}" for key, value in values.items() if key not in LABELS)
+        table = Table(title=f"{name}  ({facts})" if facts else name, title_justify="left", show_header=False)
+        for key, value in values.items():
+            if key in LABELS:
+                label, unit, remark = LABELS[key]
+                table.add_row(label, _number(value), unit, remark)
+        return table
+
+    def _comparison(self, name):
+        from rich.table import Table
+
+        rows = self.compared[name]
+        table = Table(title=f"{name}, against the reference", title_justify="left")
+        table.add_column("")
+        for who in rows:
+            table.add_column(who, justify="right")
+        table.add_column("")
+        for key, (label, unit, remark) in LABELS.items():
+            if any(key in values for values in rows.values()):
+                cells = [_number(values[key]) if key in values else "" for values in rows.values()]
+                table.add_row(f"{label} {unit}".strip(), *cells, remark)
+        return table
+
+
+def write_whole(path: Path, write) -> None:
+    """Let `write(part)` make a file beside the target, then put it in its place.
+
+    Raises:
+        NeuralocksError: the folder is missing, not writable or full.
+    """
+    if not path.parent.is_dir():
+        raise NeuralocksError(f"{path.parent}: no such folder; make it first")
+    part = None
+    try:
+        handle, part = tempfile.mkstemp(suffix=path.suffix, prefix=".part-", dir=path.parent)
+        os.close(handle)
+        write(part)
+        os.chmod(part, 0o644)
+        os.replace(part, path)
+    except OSError as error:
+        fact = error.strerror or str(error)
+        raise NeuralocksError(f"{path}: cannot be written ({fact}); choose a writable folder with space") from None
+    finally:
+        if part and os.path.exists(part):
+            os.unlink(part)
+
+
+def _number(value) -> str:
+    if not isinstance(value, (int, float, np.integer, np.floating)):
+        return str(value)
+    if not math.isfinite(value):
+        return "-"
+    if isinstance(value, (int, np.integer)) or value == 0:
+        return str(int(value))
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.integer, np.floating)):
+        value = value.item()
+    if isinstance(value, float):
+        return round(value, 6) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Colours for hair and body in a preview: light along the tangent, and shadow by how much hair lies in front."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+KEY = np.array([0.55, 0.75, 0.65]) / np.linalg.norm([0.55, 0.75, 0.65])
+FILL = np.array([-0.8, 0.25, 0.6]) / np.linalg.norm([-0.8, 0.25, 0.6])
+RIM = np.array([-0.35, 0.55, -0.9]) / np.linalg.norm([-0.35, 0.55, -0.9])
+CELL = 0.006
+"""Width of a cell of the shadow map [m]."""
+MOST_CELLS = 120
+"""Along each side of the shadow map."""
+COVER = 2.2
+"""Width of all strands side by side [m]: what dims the light, whatever number of strands is drawn."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours, linear RGB."""
+
+    root: tuple[float, float, float] = (0.040, 0.016, 0.008)
+    tip: tuple[float, float, float] = (0.170, 0.068, 0.027)
+    gloss: tuple[float, float, float] = (0.62, 0.50, 0.40)
+    skin: tuple[float, float, float] = (0.56, 0.40, 0.33)
+    cloth: tuple[float, float, float] = (0.055, 0.075, 0.10)
+
+
+def hair_colours(
+    points: np.ndarray, counts: np.ndarray, to_eye: np.ndarray, centre: np.ndarray, axes: np.ndarray, look: Look
+) -> tuple[np.ndarray, "ShadowMap"]:
+    """Linear colours (P, 3) of strand vertices, and the shadow that the hair throws.
+
+    Diffuse light and two highlights along the tangent (Kajiya and Kay 1989; the second one shifted and tinted as in
+    Marschner et al. 2003), dimmed by the hair in front.
+
+    Args:
+        points: (P, 3) [m] world, all strands with the same number of vertices.
+        counts: vertices of each strand (S,), all alike.
+        to_eye: unit vector towards the camera (3,).
+        centre: middle of the head (3,) [m].
+        axes: light axes, columns right, up, front (3, 3).
+        look: colours.
+    """
+    strands, vertices = len(counts), int(counts[0])
+    x = points.reshape(strands, vertices, 3)
+    tangent = np.gradient(x, axis=1)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-9)
+    outward = x - centre
+    outward -= (outward * tangent).sum(axis=2, keepdims=True) * tangent
+    outward /= np.maximum(np.linalg.norm(outward, axis=2, keepdims=True), 1e-9)
+    length = np.linalg.norm(np.diff(x, axis=1), axis=2).mean(axis=1)
+    shadow = ShadowMap(points, np.repeat(length * COVER / strands, vertices))
+
+    rng = np.random.default_rng(7)
+    along = np.linspace(0, 1, vertices)[None, :, None] ** 1.3
+    base = (np.array(look.root) * (1 - along) + np.array(look.tip) * along)
+    shift = rng.normal(0, 0.05, (strands, 1, 1))
+    light = np.zeros_like(x)
+    for direction, power, dim in ((KEY, 2.6, 1.0), (FILL, 0.55, 0.6), (RIM, 2.2, 1.0)):
+        towards = axes @ direction
+        clear = np.exp(-dim * shadow.depth(points, towards)).reshape(strands, vertices, 1)
+        clear = _smoothed(clear)
+        cosine = (tangent @ towards)[..., None]
+        wrap = np.clip(0.55 + 0.45 * (outward @ towards)[..., None], 0, 1)
+        diffuse = np.sqrt(np.clip(1 - cosine**2, 0, 1)) * wrap
+        half = towards + to_eye
+        half /= np.linalg.norm(half)
+        bright = 0.30 * _highlight(tangent, outward, half, shift - 0.10, 90)
+        tinted = 0.9 * _highlight(tangent, outward, half, shift + 0.14, 22)
+        light += power * clear * (base * (diffuse + tinted) + wrap * bright * np.array(look.gloss) * 0.5)
+    sky = np.exp(-0.5 * shadow.depth(points, axes @ np.array([0, 0.8, 0.6]))).reshape(strands, vertices, 1)
+    light += 0.30 * _smoothed(sky) * base
+    return light.reshape(-1, 3), shadow
+
+
+def body_colours(
+    points: np.ndarray, normals: np.ndarray, albedo: np.ndarray, shadow: "ShadowMap | None", to_eye, axes: np.ndarray
+) -> np.ndarray:
+    """sRGB colours (V, 3) float32 of skin: soft light from three sides, dimmed by the hair in front.
+
+    Args:
+        points: (V, 3) [m].
+        normals: outward unit normals (V, 3).
+        albedo: linear RGB (V, 3).
+        shadow: of the hair.
+        to_eye: unit vector towards the camera (3,).
+        axes: light axes as in `hair_colours`.
+    """
+    light = np.zeros_like(points)
+    tints = ((KEY, 1.15, (1.0, 0.95, 0.88)), (FILL, 0.32, (0.80, 0.90, 1.0)), (RIM, 0.6, (0.95, 0.97, 1.0)))
+    for direction, power, tint in tints:
+        towards = axes @ direction
+        clear = 1.0 if shadow is None else np.exp(-0.8 * shadow.depth(points + 0.004 * normals, towards))[:, None]
+        facing = (normals @ towards)[:, None]
+        # Light that scatters under the skin reaches round the edge of the shadow, reddish.
+        soft = np.clip((facing + 0.25) / 1.25, 0, 1) ** 1.5 * np.array([1, 0.92, 0.88]) + 0.04
+        light += power * clear * soft * np.array(tint)
+    sky = np.clip(0.5 + 0.5 * (normals @ (axes @ np.array([0, 1.0, 0])))[:, None], 0, 1)
+    if shadow is not None:
+        sky = sky * np.exp(-0.5 * shadow.depth(points + 0.004 * normals, axes @ np.array([0, 0.8, 0.6])))[:, None]
+    edge = (1 - np.clip(normals @ to_eye, 0, 1)[:, None]) ** 3
+    return srgb(albedo * (light + 0.28 * sky * np.array([0.85, 0.92, 1.0])) + 0.05 * edge * sky)
+
+
+class ShadowMap:
+    """How much hair lies between a point and a light far away.
+
+    Seen from each light, strand vertices fall into the cells of a box, and each column is summed from the light on.
+
+    Args:
+        points: (P, 3) [m].
+        area: what each vertex covers [m^2].
+    """
+
+    def __init__(self, points: np.ndarray, area: np.ndarray):
+        self.points, self.area = points, area
+        self._columns: dict[bytes, tuple] = {}
+
+    def depth(self, queries: np.ndarray, towards: np.ndarray) -> np.ndarray:
+        """Optical depth (Q,) of the hair in front of each query (Q, 3) [m]; light comes from `towards`."""
+        axes, low, cell, summed = self._seen_from(towards)
+        place = (queries @ axes - low) / cell
+        # Half a cell towards the light, or a vertex would lie in its own shadow.
+        place[:, 2] += 0.5
+        last = np.array(summed.shape) - 1
+        outside = ((place[:, :2] < 0) | (place[:, :2] > last[:2])).any(axis=1)
+        place = np.clip(place, 0, last - 1e-6)
+        corner = place.astype(np.int32)
+        part = place - corner
+        strides = np.array([summed.shape[1] * summed.shape[2], summed.shape[2], 1])
+        index, flat = corner @ strides, summed.ravel()
+        result = np.zeros(len(queries))
+        for i in (0, 1):
+            for j in (0, 1):
+                for k in (0, 1):
+                    share = np.ones(len(queries))
+                    for axis, bit in enumerate((i, j, k)):
+                        share *= part[:, axis] if bit else 1 - part[:, axis]
+                    result += share * flat[index + (i * strides[0] + j * strides[1] + k)]
+        result[outside] = 0
+        return result
+
+    def _seen_from(self, towards):
+        """Light axes, the box's low corner, its cell [m], and the hair from each cell on towards the light."""
+        key = np.asarray(towards).tobytes()
+        if key not in self._columns:
+            side = np.cross(towards, [0.0, 1.0, 0.0] if abs(towards[1]) < 0.9 else [1.0, 0.0, 0.0])
+            side /= np.linalg.norm(side)
+            axes = np.stack([side, np.cross(towards, side), towards], axis=1)
+            seen = self.points @ axes
+            low, high = seen.min(axis=0), seen.max(axis=0)
+            cell = max(CELL, float((high - low).max()) / MOST_CELLS)
+            shape = ((high - low) / cell).astype(int) + 4
+            low = low - 1.5 * cell
+            index = np.ravel_multi_index(((seen - low) / cell + 0.5).astype(int).T, shape)
+            grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape)
+            self._columns[key] = axes, low, cell, np.cumsum(grid[:, :, ::-1], axis=2)[:, :, ::-1]
+        return self._columns[key]
+
+
+def srgb(linear: np.ndarray) -> np.ndarray:
+    """Linear light to display values in 0..1, with soft shoulders instead of clipped highlights."""
+    toned = 1 - np.exp(-1.25 * np.maximum(linear, 0).astype(np.float32))
+    return np.clip(np.where(toned < 0.0031308, 12.92 * toned, 1.055 * toned ** (1 / 2.4) - 0.055), 0, 1)
+
+
+def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area-weighted unit normals (V, 3)."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a)
+    result = np.stack([np.bincount(triangles.ravel(), np.repeat(face[:, i], 3), len(points)) for i in range(3)], axis=1)
+    return result / np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-12)
+
+
+def _highlight(tangent, outward, half, shift, sharpness):
+    bent = tangent + shift * outward
+    bent /= np.maximum(np.linalg.norm(bent, axis=2, keepdims=True), 1e-9)
+    return np.clip(1 - (bent @ half)[..., None] ** 2, 0, 1) ** sharpness
+
+
+def _smoothed(values):
+    result = values.copy()
+    result[:, 1:-1] = 0.25 * values[:, :-2] + 0.5 * values[:, 1:-1] + 0.25 * values[:, 2:]
+    return result

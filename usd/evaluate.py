@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks evaluate`: the report card of a bake."""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core import comparison, metrics
+from neuralocks_core.arclength import arc_lengths
+from neuralocks_core.energy import energies
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import GRAVITY
+from neuralocks_core.report import Card
+from neuralocks_core.resolve import CLAMPED, Resolver
+from neuralocks_core.strands import K, StrandSet, strand_set
+
+from .baked import Baked, read_baked
+from .stage import StageGroom
+
+STRANDS = 600
+"""Strands measured of each groom, in whole locks; lengths are measured on all."""
+REFERENCE_STRANDS = 200
+COLLISION_FRAMES = 48
+"""Frames in which distances to the body are measured, evenly over the bake."""
+SETTLED = 2.0
+"""A pose held for so long [s] should have still hair."""
+
+
+def evaluate(
+    baked,
+    reference: bool = False,
+    *,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    model=None,
+    material: Material | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Card:
+    """Measure a bake, whatever made it.
+
+    Args:
+        baked: path of the bake, or a `Baked` already read.
+        reference: simulate the same strands and compare.
+        grooms, skeleton, head: as for `bake`.
+        model: with `reference`, the model whose held-pose answer is shown beside; the shipped one if left out.
+        material: what the hair is made of, for energies and reference.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the file is no bake, or the reference is not installed.
+    """
+    if not isinstance(baked, Baked):
+        baked = read_baked(baked, grooms, skeleton, head)
+    material = material or Material()
+    say = progress or (lambda done, total, message: None)
+    measured, compared, curves = {}, {}, {}
+    notes = list(baked.shot.notes)
+    if len(baked.codes) < 3:
+        notes.append("fewer than three frames: nothing is said about motion")
+    for item in baked.shot.grooms:
+        subject = _Subject(baked, item, say)
+        measured[item.path] = subject.measures(material)
+        curves[item.path] = {"times": baked.times, "network": metrics.tip_curves(subject.moved)}
+        curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["network"])
+        if reference and len(baked.codes) >= 3:
+            rows, tips = subject.compared(material, model)
+            compared[item.path] = rows
+            curves[item.path] |= tips
+    return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
+
+
+class _Subject:
+    """One groom of a bake, read once: lengths of all strands, displacements of some."""
+
+    def __init__(self, baked: Baked, item: StageGroom, say):
+        self.baked, self.item, self.say = baked, item, say
+        self.character, groom = item.attachment.character, item.groom
+        canonical = self.character.canonical_to_bind
+        every = strand_set(groom, canonical[:3, 3], self.character.head_centre, self.character.facing)
+        self.chosen = comparison.whole_locks(every, STRANDS)
+        self.strands: StrandSet = every.subset(self.chosen)
+        self.valid = int(every.valid.sum())
+        self._within(groom)
+        rest = (groom.points.astype(float) - canonical[:3, 3]) @ self.character.facing.T
+        rest_lengths = metrics.strand_lengths(rest, groom.counts)
+        count, total = len(self.chosen), len(baked.codes)
+        self.moved = np.zeros((total, count, K, 3), np.float32)
+        self.collision_frames = np.unique(np.linspace(0, total - 1, min(total, COLLISION_FRAMES)).round().astype(int))
+        self.own_rest = rest[self._own]
+        self.own = np.zeros((len(self.collision_frames), len(self._own), 3), np.float32)
+        sums = []
+        for frame, code in enumerate(baked.codes):
+            points = baked.canonical(item, code)
+            sums.append(metrics.stretch(metrics.strand_lengths(points, groom.counts)[None], rest_lengths))
+            offset = points - rest
+            self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
+            where = np.flatnonzero(self.collision_frames == frame)
+            if len(where):
+                self.own[where[0]] = points[self._own]
+            say(frame + 1, total, f"reading {item.path}")
+        self.stretch = {
+            key: float(max(s[key] for s in sums) if key.endswith("max") else np.mean([s[key] for s in sums]))
+            for key in sums[0]
+        }
+
+    def _within(self, groom) -> None:
+        """Where the chosen strands' network vertices lie between own vertices, and which own vertices can move."""
+        arc, length = arc_lengths(groom)
+        self._low = np.zeros((len(self.chosen), K), int)
+        self._part = np.zeros((len(self.chosen), K, 1))
+        own = []
+        for row, strand in enumerate(self.chosen):
+            start, count = int(groom.starts[strand]), int(groom.counts[strand])
+            mine = arc[start : start + count]
+            wanted = np.linspace(0, length[strand], K)
+            low = np.clip(np.searchsorted(mine, wanted, side="right") - 1, 0, count - 2)
+            span = np.maximum(mine[low + 1] - mine[low], 1e-12)
+            self._low[row] = start + low
+            self._part[row, :, 0] = np.clip((wanted - mine[low]) / span, 0, 1)
+            free = mine > length[strand] * (CLAMPED - 1) / (K - 1) * 1.001
+            own.append(start + np.flatnonzero(free))
+        self._own = np.concatenate(own) if own else np.zeros(0, int)
+
+    def measures(self, material: Material) -> dict:
+        """Everything that needs no reference."""
+        baked, times = self.baked, self.baked.times
+        strands, length = self.strands, np.maximum(self.strands.length, 1e-6)
+        rig = self.item.attachment.rig
+        joints = np.stack([rig.joints_at(code) for code in baked.codes])
+        turn = self.character.canonical_to_world(joints)[:, :3, :3]
+        down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / 9.81)
+        result = {
+            "strands": self.item.groom.strand_count,
+            "measured": len(self.chosen),
+            "frames": len(baked.codes),
+            **self.stretch,
+            **self._penetration(),
+            "droop_cm": metrics.droop(self.moved, down),
+        }
+        if len(times) >= 3 and len(self.chosen):
+            tips = self.moved[:, :, -1] - self.moved[:, :, -1].mean(axis=0)
+            swing = np.sqrt(np.square(tips).sum(axis=2).mean(axis=0)) / length
+            result["speed_cm_s"] = 100 * float(metrics.speed(self.moved, times).mean())
+            result["swing_percent"] = 100 * float(swing.mean())
+            result |= self._stops(joints)
+        sums = energies(strands.rest + self.moved, strands.rest, down, material)
+        return result | {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
+
+    def _penetration(self) -> dict:
+        resolver = self._resolver
+        if resolver.at_rest is None or not len(self._own):
+            return {}
+        rig, baked = self.item.attachment.rig, self.baked
+        colliders = []
+        for done, frame in enumerate(self.collision_frames):
+            shape = rig.clip.shape_at(baked.times[frame : frame + 1])[0]
+            colliders.append(resolver.collider(rig.joints_at(baked.codes[frame]), shape))
+            self.say(done + 1, len(self.collision_frames), "measuring distances to the body")
+        rest_distance = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
+        return comparison.penetration_of(self.own, rest_distance, colliders)
+
+    def _stops(self, joints) -> dict:
+        """Settling after the longest stop, and what still moves once it should be over."""
+        times = self.baked.times
+        still = metrics.held(joints)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+        runs = [(a - 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        runs = [(a, b) for a, b in runs if times[b] - times[a] >= 0.5]
+        if not runs:
+            return {"settling_s": float("nan"), "jitter_mm": float("nan")}
+        moved_before = [(a, b) for a, b in runs if a > 0] or runs
+        a, b = max(moved_before, key=lambda run: times[run[1]] - times[run[0]])
+        quiet = [np.flatnonzero((times >= times[a] + SETTLED) & (times <= times[b])) for a, b in runs]
+        quiet = [frames for frames in quiet if len(frames) > 1]
+        return {
+            "settling_s": metrics.settling_time(self.moved[a : b + 1], times[a : b + 1], times[a]),
+            "jitter_mm": max(metrics.jitter(self.moved[frames]) for frames in quiet) if quiet else float("nan"),
+        }
+
+    def compared(self, material: Material, model) -> tuple[dict, dict]:
+        """Rows and tip curves beside the reference."""
+        strands, times = self.strands, self.baked.times
+        few = comparison.whole_locks(strands, REFERENCE_STRANDS)
+        some = strands.subset(few)
+        rig = self.item.attachment.rig
+        true = comparison.simulated(self.character, some, rig.clip, times, material, progress=self.say)
+        answers = {"network": self.moved[:, few], "held pose": self._held(material, model, few)}
+        answers["rigid"] = np.zeros_like(true)
+        rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
+        tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}
+        return rows, tips | {"reference": metrics.tip_curves(true)}
+
+    def _held(self, material: Material, model, few) -> np.ndarray | None:
+        """The model's answer for each pose as if it were held, if there is a model."""
+        from neuralocks_core.errors import NeuralocksError
+        from neuralocks_core.runtime import StrandModel
+
+        rig = self.item.attachment.rig
+        try:
+            model = model if isinstance(model, StrandModel) else StrandModel.load(model)
+        except NeuralocksError:
+            if model is not None:
+                raise
+            return None
+        session = model.prepare(self.strands)
+        sampler = model.sampler(self.character, rig.clip)
+        ratios = material.log_ratios()
+        session.anchor(sampler.held_bind(ratios))
+        vectors = sampler.vectors(self.baked.times, ratios, 0.0)
+        return np.stack([session.displacement(vector)[few] for vector in vectors])
+
+    @cached_property
+    def _resolver(self) -> Resolver:
+        return Resolver(self.character, self.strands)
