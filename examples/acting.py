@@ -8,12 +8,11 @@ were put, and the legs follow from both.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
-from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, pulse, swing
+from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, leap, pulse, swing
 
 SECONDS = 8.5
 STEP = 0.54
@@ -50,7 +49,7 @@ def act(character: Character, rate: float = 24.0) -> Clip:
     yaw = HEADING * (1 - ease(times, TURN, 0.75))
     phase = np.pi * times / STEP  # a stride (two steps) is one period; left heel strikes at even steps
     puppet.turn("root", yaw[:, None] * UP)
-    rise = _rise(times)
+    rise, _ = leap(times, JUMP, HEIGHT, 0.2, 0.17)
     bob = walking * (0.018 * np.cos(2 * phase + np.pi - 0.7) - 0.014)
     puppet.position += path + (bob + rise - 0.012)[:, None] * UP
     # The root turns about its own joint on the floor, below the hips only at rest.
@@ -95,21 +94,6 @@ def _arms(puppet, times, walking, phase, crouch):
         # The bind pose bends the elbow more than a hanging arm does.
         bend = -0.42 + walking * (0.15 - 0.45 * arm) + 0.3 * back + 0.3 * up
         puppet.turn(f"{side}_lower_arm", bend[:, None] * hinge)
-
-
-def _rise(times: np.ndarray) -> np.ndarray:
-    """Height of the hips over their stance (T,) [m] through the jump: crouch, push, flight, landing, recovery."""
-    deep, soft, gravity = 0.2, 0.17, 9.81
-    speed = np.sqrt(2 * gravity * HEIGHT)
-    down, push, land, recover = 0.4, 2.2 * deep / speed, 2.2 * soft / speed, 0.6
-    flight = 2 * speed / gravity
-    knots = JUMP + np.cumsum([0, down, push, flight, land, 0.04, recover])
-    states = [  # height, speed, acceleration at each knot
-        *[(0, 0, 0), (-deep, 0, 0), (0, speed, -gravity)],
-        *[(0, -speed, -gravity), (-soft, 0, 0), (-soft, 0, 0), (0, 0, 0)],
-    ]
-    # Quintic from knot to knot: smooth to the second derivative, and exactly a throw while in the air.
-    return BPoly.from_derivatives(knots, [list(state) for state in states])(np.clip(times, knots[0], knots[-1]))
 
 
 def _footprints(times, character):

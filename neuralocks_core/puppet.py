@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import BPoly
 
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
@@ -114,6 +115,32 @@ def swing(times: np.ndarray, start: float, cycles: float, rate: float) -> np.nda
     end = start + cycles / rate
     fade = ease(times, start, 0.5 / rate) - ease(times, end - 0.5 / rate, 0.5 / rate)
     return fade * np.sin(2 * np.pi * rate * (times - start))
+
+
+def leap(
+    times: np.ndarray, start: float, height: float, deep: float, soft: float, down: float = 0.4, recover: float = 0.6
+) -> tuple[np.ndarray, float]:
+    """Height of the hips (T,) [m] through a jump, from crouch to standing again, and when it is over [s].
+
+    Quintic from phase to phase, so smooth to the second derivative, and exactly a throw while in the air.
+
+    Args:
+        times: (T,) [s].
+        start: when the crouch begins [s].
+        height: of the flight [m].
+        deep: how far the hips go down before the push [m].
+        soft: how far they give way at landing [m].
+        down: time of the crouch [s].
+        recover: time to stand up again [s].
+    """
+    speed = np.sqrt(2 * 9.81 * height)
+    phases = [down, 2.2 * deep / speed, 2 * speed / 9.81, 2.2 * soft / speed, 0.04, recover]
+    knots = start + np.cumsum([0, *phases])
+    states = [  # height, speed, acceleration at each knot
+        *[[0, 0, 0], [-deep, 0, 0], [0, speed, -9.81]],
+        *[[0, -speed, -9.81], [-soft, 0, 0], [-soft, 0, 0], [0, 0, 0]],
+    ]
+    return BPoly.from_derivatives(knots, states)(np.clip(times, knots[0], knots[-1])), float(knots[-1])
 
 
 def noise(times: np.ndarray, rng: np.random.Generator, highest: float, columns: int = 3) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
-from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, noise, pulse, swing
+from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing
 
 KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
 REST = 0.3
@@ -167,21 +167,13 @@ def _translate(puppet: Puppet, dice: _Dice) -> None:
 
 
 def _jump(puppet: Puppet, dice: _Dice) -> None:
-    times, start = puppet.times, dice.start(0.3)
+    start = dice.start(0.3)
     for _ in range(dice.repeats()):
-        height, crouch = dice.between(0.08, 0.4), dice.between(0.08, 0.2)
-        flight = np.sqrt(8 * height / 9.81)
-        push = 4 * crouch / (9.81 * flight / 2)  # so that the speed at take-off is the flight's
-        down = dice.between(0.25, 0.45)
-        depth = -crouch * (ease(times, start, down) - ease(times, start + down, push))
-        off = start + down + 0.6 * push
-        t = np.clip(times - off, 0, flight)
-        landing = off + flight
-        depth += 4 * height * (t / flight) * (1 - t / flight)
-        depth -= 0.6 * crouch * pulse(times, landing - 0.03, 0.12, 0.02, 0.35)
-        puppet.position += depth[:, None] * UP
-        puppet.bend_spine(pulse(times, start, down, 0.0, push)[:, None] * SIDE * 0.3)
-        start = landing + 0.5 + dice.between(0.0, 0.5)
+        height, deep, down = dice.between(0.08, 0.4), dice.between(0.08, 0.2), dice.between(0.25, 0.45)
+        rise, over = leap(puppet.times, start, height, deep, dice.between(0.5, 0.9) * deep, down, 0.45)
+        puppet.position += rise[:, None] * UP
+        puppet.bend_spine(pulse(puppet.times, start, down, 0.0, 0.3)[:, None] * SIDE * 0.3)
+        start = over + dice.between(-0.2, 0.5)
 
 
 def _walk(puppet: Puppet, dice: _Dice) -> None:
