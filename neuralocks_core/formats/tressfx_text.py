@@ -56,8 +56,11 @@ def read(content: bytes, subject: str) -> RawGroom:
         raise bad_file(subject, "holds no strands", "export one with hair in it")
 
     notes = []
-    declared = keys.get(b"numStrands", [len(counts)])[0]
-    if declared != len(counts):
+    declared = (keys.get(b"numStrands") or [len(counts)])[0]
+    if declared > len(counts):
+        fact = f"its header says {declared:g} strands, it holds {len(counts)}"
+        raise bad_file(subject, fact, "it is truncated: export it again")
+    if declared < len(counts):
         notes.append(f"{subject}: its header says {declared:g} strands, it holds {len(counts)}")
     root_uv = np.frombuffer(uv, np.float32).reshape(-1, 2)
     if not root_uv.any() or np.isnan(root_uv).any():

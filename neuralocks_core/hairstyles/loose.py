@@ -110,7 +110,7 @@ def _bangs(seen: np.ndarray) -> np.ndarray:
 
 def _fringe(site: Site) -> Plan:
     plan = _falling(site, 0.36, volume=0.011, back=0.1)
-    plan.cut = -2.4 - 0.25 * site.of_clump[:, 0] - 0.1 * site.own[:, 1]
+    plan.cut = -1.95 - 0.2 * site.of_clump[:, 0] - 0.1 * site.own[:, 1]
     x, y, z = site.seen.T
     front = _bangs(site.seen)
     forward = site.along_scalp(
@@ -161,7 +161,7 @@ def _tight_curls(site: Site) -> Plan:
 
 
 def _coils(site: Site) -> Plan:
-    plan = _falling(site, 0.13, volume=0.028, lift=1.2, soft=0.45)
+    plan = _falling(site, 0.13, volume=0.028, lift=1.2, soft=1.0, back=1.3)
     plan.turn = np.full(len(plan.side), 20.0)
     return plan
 

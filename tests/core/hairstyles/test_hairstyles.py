@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The library grows every style on any scalp: the right number of strands, from the skin and out of the
+body."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.collider import Collider
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.hairstyles import MOST_STRANDS, STYLES, Obstacle, Scalp, from_head, grow
+from neuralocks_core.strands import strand_set
+
+CENTRE = np.array([0.0, 1.66, 0.03])
+
+
+def ball_scalp(radius=0.09, centre=CENTRE):
+    """A sphere's upper half and back, and the whole sphere as the body."""
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    middle = mesh.triangles_center / radius
+    hairy = (middle[:, 1] > 0.5) | ((middle[:, 2] < 0.0) & (middle[:, 1] > -0.5))
+    points = np.asarray(mesh.vertices) + centre
+    return Scalp(points, mesh.faces[hairy], centre), (points, np.asarray(mesh.faces))
+
+
+SCALP, BODY = ball_scalp()
+OBSTACLE = Obstacle(SCALP, BODY)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_style_stands_on_the_scalp_and_clear_of_the_body(style):
+    groom = grow(style, SCALP, 400, seed=3, body=OBSTACLE)
+    assert groom.strand_count == 400
+    assert (groom.counts == groom.counts[0]).all()
+    points = groom.points.reshape(400, -1, 3)
+    collider = Collider(*BODY)
+    assert np.abs(collider.distance(points[:, 0])[0]).max() < 2e-4
+    distance = collider.distance(points[:, 1:].reshape(-1, 3))[0]
+    assert (distance < 0).mean() < 0.005
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    assert 0.002 < length.sum(axis=1).min()
+    assert length.sum(axis=1).max() < 0.8
+    assert strand_set(groom, CENTRE - [0, 0.06, 0], [0, 0.06, 0]).valid.all()
+    # Tips taper, and no strand is wider than a hair.
+    widths = groom.widths.reshape(400, -1)
+    assert (np.diff(widths, axis=1) < 0).all()
+    assert widths.max() < 1.01e-4
+    assert 1 <= groom.guides.sum() <= 400
+
+
+@pytest.mark.parametrize("style", ["long_straight", "coils", "braid"])
+def test_the_seed_decides(style):
+    first, again, other = (grow(style, SCALP, 50, seed, OBSTACLE).points for seed in (1, 1, 2))
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() != other.tobytes()
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_single_strand_grows(style):
+    assert np.isfinite(grow(style, SCALP, 1, body=OBSTACLE).points).all()
+
+
+def test_hair_grows_with_the_head():
+    """On a head three times as large and elsewhere every length is three times as large."""
+    scalp, _ = ball_scalp(0.27, np.array([4.0, -2.0, 1.0]))
+    small, large = grow("bob", SCALP, 200), grow("bob", scalp, 200)
+    small = (small.points - CENTRE) / 0.09
+    large = (large.points - [4.0, -2.0, 1.0]) / 0.27
+    np.testing.assert_allclose(large, small, atol=0.01)
+
+
+def test_styles_differ_as_their_names_say():
+    grooms = {style: grow(style, SCALP, 300, body=OBSTACLE) for style in STYLES}
+    points = {style: groom.points.reshape(300, -1, 3) for style, groom in grooms.items()}
+    low = {style: np.percentile(p[:, :, 1], 1) - CENTRE[1] for style, p in points.items()}
+    assert low["long_straight"] < low["wavy"] < low["bob"] < low["pixie"]
+    # Curls: how much longer a strand is than the way it covers in sixteen pieces.
+    coarse = {s: np.linalg.norm(np.diff(p[:, ::8], axis=1), axis=2).sum() for s, p in points.items()}
+    fine = {
+        s: np.linalg.norm(np.diff(p[:, : 1 + 8 * ((p.shape[1] - 1) // 8)], axis=1), axis=2).sum()
+        for s, p in points.items()
+    }
+    curl = {s: fine[s] / coarse[s] for s in STYLES}
+    assert curl["long_straight"] < 1.1
+    assert curl["tight_curls"] > 1.3
+    assert curl["coils"] > 1.5
+    # A mohawk's long strands stand in the middle; tied hair passes through one place.
+    tall = np.linalg.norm(points["mohawk"][:, -1] - points["mohawk"][:, 0], axis=1) > 0.03
+    assert np.abs(points["mohawk"][tall, 0, 0]).max() < 0.03
+    for style in ("ponytail", "bun"):
+        tie = CENTRE + 0.1 * np.array([0.0, 0.5, -1.0]) / np.linalg.norm([0.0, 0.5, -1.0])
+        assert (np.linalg.norm(points[style] - tie, axis=2).min(axis=1) < 0.025).mean() > 0.95
+
+
+def test_roots_cover_the_scalp_evenly():
+    roots = SCALP.roots(4000, np.random.default_rng(0))
+    inner = roots.border > 0.02
+    direction = (roots.place[inner] - CENTRE) / 0.09
+    top = direction[direction[:, 1] > 0.6]
+    # Equal areas of a sphere lie between equal steps of height.
+    count, _ = np.histogram(top[:, 1], bins=4, range=(0.6, 1.0))
+    assert count.std() / count.mean() < 0.15
+    np.testing.assert_allclose(np.linalg.norm(roots.normal, axis=1), 1.0, rtol=1e-6)
+    assert ((roots.normal * (roots.place - CENTRE)).sum(axis=1) > 0.08).all()
+
+
+def test_a_scalp_is_marked_on_a_bare_head():
+    _, (points, triangles) = ball_scalp()
+    scalp = from_head(points, triangles, CENTRE)
+    seen = (points[scalp.triangles].mean(axis=1) - CENTRE) / 0.09
+    assert 0.25 < scalp.area / (4 * np.pi * 0.09**2) < 0.6
+    assert (seen[:, 1] > 0.95).any()  # the crown
+    assert ((seen[:, 2] < -0.8) & (seen[:, 1] < -0.1)).any()  # the back
+    assert not ((seen[:, 2] > 0.7) & (seen[:, 1] < 0.3)).any()  # not the face
+    assert not (seen[:, 1] < -0.9).any()
+    mirrored = np.sort(-seen[:, 0])
+    np.testing.assert_allclose(mirrored, np.sort(seen[:, 0]), atol=0.05)
+
+
+def test_obstacle_agrees_with_exact_distance():
+    random = np.random.default_rng(0)
+    points = CENTRE + random.normal(size=(500, 3)) * 0.06
+    distance, out = OBSTACLE.distance(points)
+    exact = np.linalg.norm(points - CENTRE, axis=1) - 0.09
+    near = np.abs(exact) < 0.05
+    np.testing.assert_allclose(distance[near], exact[near], atol=0.0025)
+    assert ((out * (points - CENTRE)).sum(axis=1) / (exact + 0.09) > 0.95)[near].all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: grow("mullet", SCALP, 10), "style 'mullet': is unknown"),
+        (lambda: grow("bob", SCALP, 0), "give 1 to 150000"),
+        (lambda: grow("bob", SCALP, MOST_STRANDS + 1), "give 1 to 150000"),
+        (lambda: Scalp(np.zeros((3, 3)), [[0, 1, 2]], CENTRE), "its area is 0"),
+        (lambda: Scalp(np.zeros((3, 3)), [[0, 1, 7]], CENTRE), "not there"),
+        (lambda: Scalp(np.full((3, 3), np.nan), [[0, 1, 2]], CENTRE), "not finite"),
+        (lambda: grow("bob", SCALP, 10, body=(BODY[0] + 9, BODY[1])), "same space"),
+        (lambda: from_head(BODY[0] - [0, 5, 0], BODY[1], CENTRE), "by hand"),
+    ],
+)
+def test_bad_input_is_named(call, message):
+    with pytest.raises(NeuralocksError, match=message):
+        call()
