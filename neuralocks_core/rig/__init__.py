@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigged mesh hair: joint chains below the head, and the tiny network that turns them (paper section 4.4)."""
+
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.finding import SkinnedMesh, find_chains, split_meshes
+from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
+from neuralocks_core.rig.rigging import HairRig, assemble_rig
+
+__all__ = [
+    "HairChains",
+    "HairRig",
+    "RigModel",
+    "RigSampler",
+    "SkinnedMesh",
+    "assemble_rig",
+    "find_chains",
+    "rig_spec",
+    "split_meshes",
+]

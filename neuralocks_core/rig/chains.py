@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The hair joints of a rig: a forest of bones that hangs below the head.
+
+A *chain* is one tree of the forest; it may branch. Everything is kept in canonical space (origin at the head joint, Y up, +Z face, metres),
+where joint orients, units and up axes of the rig are gone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+
+@dataclass(frozen=True)
+class HairChains:
+    """Moving hair joints in bind pose, parents before children.
+
+    Attributes:
+        names: last path parts of the joints, (N).
+        joints: their indices in the skeleton, (N,).
+        parents: index of the moving joint that carries each one, -1 where the head does, (N,).
+        chain: which chain each belongs to, (N,).
+        origins: where each one turns, canonical, (N, 3) [m].
+        axes: bind axes of each one as columns, canonical, (N, 3, 3).
+        bone_joint: which joint moves each bone, (M,); a branching joint moves several.
+        bone_end: moving joint at a bone's far end, -1 for a free end, (M,).
+        bones: from a bone's joint to its far end, canonical, (M, 3) [m].
+    """
+
+    names: tuple[str, ...]
+    joints: np.ndarray
+    parents: np.ndarray
+    chain: np.ndarray
+    origins: np.ndarray
+    axes: np.ndarray
+    bone_joint: np.ndarray
+    bone_end: np.ndarray
+    bones: np.ndarray
+
+    def __post_init__(self):
+        object.__setattr__(self, "names", tuple(self.names))
+        for name in ("joints", "parents", "chain", "bone_joint", "bone_end"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), np.int32))
+        for name in ("origins", "axes", "bones"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), float))
+        count, bones = len(self.names), len(self.bone_joint)
+        shapes = {
+            "joints": (count,),
+            "parents": (count,),
+            "chain": (count,),
+            "origins": (count, 3),
+            "axes": (count, 3, 3),
+        }
+        shapes |= {"bone_end": (bones,), "bones": (bones, 3)}
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise NeuralocksError(
+                    f"hair chains: {name} is {getattr(self, name).shape}, not {shape}; get an undamaged model"
+                )
+        if not count:
+            raise NeuralocksError("hair chains: none given; a rig needs at least one hair joint that moves")
+        if (self.parents >= np.arange(count)).any() or self.parents.min() < -1:
+            raise NeuralocksError("hair chains: a joint comes before its parent; get an undamaged model")
+        if bones < 1 or not 0 <= self.bone_joint.min() <= self.bone_joint.max() < count or self.bone_end.max() >= count:
+            raise NeuralocksError("hair chains: a bone names a joint that is not there; get an undamaged model")
+        if not all(np.isfinite(getattr(self, name)).all() for name in ("origins", "axes", "bones")):
+            raise NeuralocksError("hair chains: NaN or infinity in the bind pose; repair the skeleton")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Length of every bone (M,) [m]."""
+        return np.linalg.norm(self.bones, axis=1)
+
+    @property
+    def roots(self) -> np.ndarray:
+        """First joint of every chain, (chains,)."""
+        return np.flatnonzero(self.parents < 0)
+
+    def chain_name(self, chain: int) -> str:
+        """A chain goes by its first joint."""
+        return self.names[self.roots[chain]]
+
+    def chain_length(self, chain: int) -> float:
+        """Longest way along the bones of a chain [m]."""
+        reach = np.zeros(len(self))
+        for bone in np.argsort(-self.bone_joint, kind="stable"):
+            end = reach[self.bone_end[bone]] if self.bone_end[bone] >= 0 else 0.0
+            joint = self.bone_joint[bone]
+            reach[joint] = max(reach[joint], self.lengths[bone] + end)
+        return float(reach[self.roots[chain]])
+
+    def levels(self) -> list[np.ndarray]:
+        """Joints by depth, so that each level can be posed at once."""
+        depth = np.zeros(len(self), int)
+        for joint, parent in enumerate(self.parents):
+            depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+        return [np.flatnonzero(depth == level) for level in range(depth.max() + 1)]
+
+    def match(self, names) -> np.ndarray:
+        """Indices (N,) of these joints among `names`, joint paths or their last parts.
+
+        Raises:
+            NeuralocksError: one is missing or ambiguous, that is, the model was trained for other chains.
+        """
+        places: dict[str, list[int]] = {}
+        for index, name in enumerate(names):
+            places.setdefault(name.rsplit("/", 1)[-1], []).append(index)
+        missing = [name for name in self.names if len(places.get(name, ())) != 1]
+        if missing:
+            raise NeuralocksError(
+                f"model: it moves {len(self)} joints in {len(self.roots)} chains, but this skeleton has no single joint "
+                f"'{missing[0]}' ({len(missing)} of them missing); train a model for this rig (neuralocks rig train)"
+            )
+        return np.array([places[name][0] for name in self.names], int)
+
+    def check_same(self, other: "HairChains") -> None:
+        """Refuse a model that was trained for chains of another shape: bones off by more than 2 % or a hierarchy that differs.
+
+        Raises:
+            NeuralocksError: names the joint.
+        """
+        order = {name: index for index, name in enumerate(other.names)}
+        for index, name in enumerate(self.names):
+            if name not in order:
+                raise NeuralocksError(
+                    f"model: it moves joint '{name}', which is no hair joint here; train a model for this rig"
+                )
+            there, parent = order[name], self.parents[index]
+            parent_there = other.parents[there]
+            if (self.names[parent] if parent >= 0 else "") != (other.names[parent_there] if parent_there >= 0 else ""):
+                raise NeuralocksError(
+                    f"model: joint '{name}' hangs from another joint here; train a model for this rig"
+                )
+            way = self.origins[index] - (self.origins[parent] if parent >= 0 else 0)
+            way_there = other.origins[there] - (other.origins[parent_there] if parent_there >= 0 else 0)
+            if np.linalg.norm(way - way_there) > 0.02 * np.linalg.norm(way) + 1e-4:
+                raise NeuralocksError(
+                    f"model: joint '{name}' lies {1e3 * np.linalg.norm(way - way_there):.1f} mm elsewhere than in the rig "
+                    "that the model was trained for; train a model for this rig"
+                )
+
+    def to_json(self) -> dict:
+        """Plain values for the model file."""
+        return {name: np.asarray(getattr(self, name)).tolist() for name in self.__dataclass_fields__}
+
+    @classmethod
+    def from_json(cls, values: dict) -> "HairChains":
+        """From what `to_json` gave.
+
+        Raises:
+            NeuralocksError: the values are not those of hair chains.
+        """
+        try:
+            if len(values["names"]) > 10000 or not all(isinstance(n, str) for n in values["names"]):
+                raise ValueError("names")
+            return cls(**{name: values[name] for name in cls.__dataclass_fields__})
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            if isinstance(error, NeuralocksError):
+                raise
+            raise NeuralocksError(f"model: unreadable hair chains ({error}); get an undamaged copy") from None

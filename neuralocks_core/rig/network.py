@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tiny network of rigged mesh hair: what it reads, what it gives, and its file (paper section 4.4: two layers of 16).
+
+It reads neck and upper chest relative to the head (the first two columns of each rotation), gravity in the head's frame and, in the dynamic
+variant, the history of effective gravity and angular velocity. It gives one bounded rotation per hair joint, in the joint's own bind
+axes, and exactly none for the bind pose at rest.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core import model as model_file
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.kinematics import half_turns
+
+DYNAMIC_BINS = (1,) * 6 + (2,) * 4 + (3,) * 4 + (4,) * 2 + (6,) * 2
+"""46 steps of 1/30 s: a second and a half, finest where it is newest."""
+_POSE = 15
+_CHUNK = 1024
+
+
+def rig_spec(dynamic: bool = False) -> BoundarySpec:
+    """What the network reads of the body."""
+    bins = DYNAMIC_BINS if dynamic else ()
+    return BoundarySpec(bins=bins, pose_joints=("neck", "upper_chest"), chest=False)
+
+
+def feature_columns(spec: BoundarySpec) -> np.ndarray:
+    """Which numbers of the boundary vector the network reads: pose 12, gravity 3, history 6 per bin."""
+    parts = spec.slices
+    return np.concatenate([np.arange(parts[n].start, parts[n].stop) for n in ("pose", "gravity", "history")])
+
+
+@dataclass(frozen=True)
+class RigModel:
+    """A trained network for the hair chains of one rig.
+
+    Attributes:
+        chains: the joints that it moves.
+        spec: what it reads of the body.
+        layers: weights (out, in) and biases (out,) float32 in SI units; ReLU between them.
+        limits: largest magnitude that is read of each input, (F,).
+        max_angle: largest turn of a joint [rad].
+        training, report, credits: the model card.
+    """
+
+    chains: HairChains
+    spec: BoundarySpec
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...] = field(repr=False)
+    limits: np.ndarray = field(repr=False)
+    max_angle: float = 2.4
+    training: dict = field(default_factory=dict)
+    report: dict = field(default_factory=dict)
+    credits: list = field(default_factory=list)
+
+    def __post_init__(self):
+        layers = tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in self.layers)
+        object.__setattr__(self, "layers", layers)
+        object.__setattr__(self, "limits", np.asarray(self.limits, np.float32))
+        size = self.inputs
+        if self.limits.shape != (size,) or not np.isfinite(self.limits).all() or not 0 < self.max_angle < 3.1:
+            raise NeuralocksError("model: its input limits do not fit its inputs; get an undamaged copy")
+        for weight, bias in layers:
+            if weight.ndim != 2 or weight.shape[1] != size or bias.shape != weight.shape[:1]:
+                raise NeuralocksError("model: its layers do not fit together; get an undamaged copy")
+            if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+                raise NeuralocksError("model: NaN or infinity in its weights; get an undamaged copy")
+            size = len(weight)
+        if size != 3 * len(self.chains):
+            raise NeuralocksError("model: it does not give three numbers per hair joint; get an undamaged copy")
+
+    @property
+    def inputs(self) -> int:
+        """Length of the feature vector."""
+        return len(feature_columns(self.spec))
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether it reads a history."""
+        return bool(self.spec.bins)
+
+    def evaluate(self, features: np.ndarray) -> np.ndarray:
+        """Turns of all hair joints, of one avatar (F,) or a batch (B, F).
+
+        Args:
+            features: as `RigSampler.features` or the exported header give them; anything finite is allowed.
+
+        Returns:
+            unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind local rotation * this.
+        """
+        features = np.asarray(features, np.float32)
+        if features.shape[-1:] != (self.inputs,):
+            raise NeuralocksError(f"features: shape {features.shape}; the model reads {self.inputs} numbers per avatar")
+        rows = np.atleast_2d(features)
+        result = np.empty((len(rows), len(self.chains), 4), np.float32)
+        for start in range(0, len(rows), _CHUNK):  # stays in the processor's cache
+            raw = self._raw(rows[start : start + _CHUNK]).reshape(-1, len(self.chains), 3)
+            _bounded(raw, np.float32(np.sin(self.max_angle / 2)), result[start : start + _CHUNK])
+        return result[0] if features.ndim == 1 else result
+
+    def _raw(self, rows: np.ndarray) -> np.ndarray:
+        value = np.clip(rows, -self.limits, self.limits)
+        for index, (weight, bias) in enumerate(self.layers):
+            value = value @ weight.T
+            value += bias
+            if index + 1 < len(self.layers):
+                np.maximum(value, 0, out=value)
+        return value
+
+    def canonical_turns(self, features: np.ndarray) -> np.ndarray:
+        """Turns (B, N, 4) wxyz float64 in canonical axes of features (B, F)."""
+        raw = self._raw(np.atleast_2d(np.asarray(features, np.float32))).reshape(-1, len(self.chains), 3).astype(float)
+        return half_turns(np.einsum("nij,bnj->bni", self.chains.axes, raw), self.max_angle)
+
+    def save(self, path) -> Path:
+        """Write the one-file model, with its ONNX graph."""
+        from neuralocks_core.rig.graph import rig_graph
+
+        meta = {
+            "kind": "rig",
+            "boundary": self.spec.to_json(),
+            "chains": self.chains.to_json(),
+            # The shortest text that reads back to the same float32.
+            "layers": [[_numbers(weight), _numbers(bias)] for weight, bias in self.layers],
+            "limits": _numbers(self.limits),
+            "max_angle": self.max_angle,
+            "training": self.training,
+            "report": self.report,
+            "credits": self.credits,
+        }
+        return model_file.write(path, meta, {"rig.onnx": rig_graph(self)})
+
+    @classmethod
+    def load(cls, path=None) -> "RigModel":
+        """Read a model file; the shipped one where none is named."""
+        path = model_file.shipped("rig") if path is None else path
+        meta = model_file.read(path, "rig").meta
+        try:
+            return cls(
+                HairChains.from_json(meta["chains"]),
+                BoundarySpec.from_json(meta["boundary"]),
+                tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in meta["layers"]),
+                np.asarray(meta["limits"], np.float32),
+                float(meta["max_angle"]),
+                *(meta.get(name, empty) for name, empty in (("training", {}), ("report", {}), ("credits", []))),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if isinstance(error, NeuralocksError):
+                raise NeuralocksError(f"{path}: {error}") from None
+            raise NeuralocksError(f"{path}: unreadable rig model ({error}); get an undamaged copy") from None
+
+
+class RigSampler:
+    """What a rig model reads of one character in one clip, at any time: the same whatever the clip's rate and the order of asking."""
+
+    def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
+        self._sampler = BoundarySampler(spec, character, clip)
+        self._columns = feature_columns(spec)
+
+    def features(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+        """Features (n, F) float32 at times (n,) [s]; the arguments are those of `BoundarySampler.vectors`."""
+        return self._sampler.vectors(times, strength=strength, joints=joints)[:, self._columns]
+
+
+def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    """Features (n, F) float32 of held poses.
+
+    Args:
+        relative: rotations of neck and upper chest relative to the head, since bind, canonical axes, (n, 2, 3, 3).
+        gravity: its direction in the head's frame, (n, 3).
+    """
+    result = np.zeros((len(relative), len(feature_columns(spec))), np.float32)
+    result[:, : _POSE - 3] = np.swapaxes(relative[..., :2], -1, -2).reshape(len(relative), -1)
+    result[:, _POSE - 3 : _POSE] = gravity
+    return result
+
+
+def input_limits(spec: BoundarySpec) -> np.ndarray:
+    """Largest sensible magnitude of each input (F,): what a damaged caller sends beyond is cut off."""
+    history = np.tile([6.0] * 3 + [25.0] * 3, len(spec.bins))
+    # The sampler lists the bins one after another, each with effective gravity [g], then angular velocity [rad/s].
+    return np.concatenate([np.full(_POSE, 1.25), history]).astype(np.float32)
+
+
+def _bounded(raw: np.ndarray, size: np.float32, out: np.ndarray) -> None:
+    """`half_turns` in float32, in place for speed."""
+    square = np.einsum("bni,bni->bn", raw, raw)
+    square += 1
+    np.multiply(raw, (size / np.sqrt(square))[..., None], out=out[..., 1:])
+    # 1 - |v|^2 without cancellation: |v|^2 = s^2 (1 - 1 / (1 + |raw|^2)).
+    out[..., 0] = np.sqrt((1 - size * size) + size * size / square)
+
+
+def _numbers(values: np.ndarray) -> list:
+    rounded = [float(str(v)) for v in np.asarray(values, np.float32).ravel()]
+    return np.asarray(rounded).reshape(np.shape(values)).tolist()

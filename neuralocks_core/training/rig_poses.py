@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random neck poses and body shapes for rigged mesh hair, with the body around the head of each (paper section 4.4)."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.rig.network import held_features
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rotation import from_vector
+
+RANGE = np.radians([60.0, 80.0, 45.0])
+"""Most nod, turn and tilt of the head against the chest that people have [rad]."""
+
+
+class PosePool:
+    """Posed bodies, prepared once: every training step draws from them.
+
+    Args:
+        rig: hair and body.
+        count: how many poses.
+        rng: decides all of them.
+        most_points: body vertices kept of each (nearest-vertex planes need no more).
+
+    Attributes:
+        relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
+        points, normals: body vertices around the head, canonical space of the head, (P, Vb, 3) float32 [m].
+        triangles: of the body around the head, into all its kept vertices (before thinning), for exact distances.
+    """
+
+    def __init__(self, rig: HairRig, count: int, rng: np.random.Generator, most_points: int = 2000):
+        self.rig, self.count, self._rng = rig, count, rng
+        character = rig.character
+        skinning = _random_skinning(character, count, rng)
+        facing, head = character.facing, character.head
+        to_head = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)
+        indices = [character.humanoid.nearest(name) for name in ("neck", "upper_chest")]
+        turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
+        self.relative = facing @ turns @ facing.T
+        self.points = self.normals = None
+        self.shapes = np.zeros((count, 0))
+        if character.body is not None and len(rig.points):
+            self._pose_bodies(to_head[:, None] @ skinning, rng, most_points)
+
+    def _pose_bodies(self, skinning, rng, most_points) -> None:
+        body, character = self.rig.character.body, self.rig.character
+        to_canonical = np.linalg.inv(character.canonical_to_bind)
+        canonical = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+        reach = np.linalg.norm(self.rig.points, axis=1).max() + 0.08
+        near = np.linalg.norm(canonical, axis=1) < reach
+        faces = body.triangles[near[body.triangles].all(axis=1)]
+        used = np.unique(faces)
+        place = np.zeros(len(body.points), int)
+        place[used] = np.arange(len(used))
+        self.triangles = place[faces]
+        shapes = list(body.shapes.values())
+        self.shapes = np.clip(rng.normal(0, 0.35, (self.count, len(shapes))), -0.8, 0.8)
+        offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
+        # The hair was fitted to its own head: other bodies vary below it.
+        on_head = np.sum(body.joint_weights[used] * (body.joint_indices[used] == character.head), axis=1)
+        mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
+        offsets = (offsets - mean) * (1 - on_head)[:, None]
+        points = np.empty((self.count, len(used), 3), np.float32)
+        for pose in range(self.count):
+            shaped = body.points[used] + np.tensordot(self.shapes[pose], offsets, 1)
+            blended = np.einsum("vi,vixy->vxy", body.joint_weights[used], skinning[pose][body.joint_indices[used], :3])
+            points[pose] = np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
+        self.points = points
+        self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        self.normals = np.stack([_normals(p, self.triangles)[self.kept] for p in points])
+        self._trees = [cKDTree(p[self.kept], balanced_tree=False, compact_nodes=False) for p in points]
+
+    def gravity(self, poses: np.ndarray) -> np.ndarray:
+        """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs upside down."""
+        count = len(poses)
+        lean = np.abs(self._rng.normal(0, np.radians(25), count))
+        lean = np.where(self._rng.random(count) < 0.08, self._rng.uniform(0, np.pi, count), lean)
+        around = self._rng.uniform(0, 2 * np.pi, count)
+        axis = np.stack([np.cos(around), 0 * around, np.sin(around)], axis=1)
+        trunk = np.einsum("nji,j->ni", from_vector(axis * lean[:, None]), [0.0, -1.0, 0.0])
+        return np.einsum("nij,nj->ni", self.relative[poses, 1], trunk)
+
+    def features(self, spec, poses: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        """What the network reads of these poses (n, F) float32."""
+        return held_features(spec, self.relative[poses], gravity)
+
+    def planes(self, poses: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Plane of the body vertex nearest to each point (n, V, 3): normals (n, V, 3) and offsets (n, V), distance = n.x - d."""
+        normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
+        for row, pose in enumerate(poses):
+            nearest = self._trees[pose].query(points[row])[1]
+            normals[row] = self.normals[pose][nearest]
+            offsets[row] = np.einsum("vi,vi->v", normals[row], self.points[pose][self.kept[nearest]])
+        return normals, offsets
+
+
+def _random_skinning(character, count, rng) -> np.ndarray:
+    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less; the first is the bind pose."""
+    turns = {}
+    # Evenly in an ellipsoid that is a tenth larger than what a neck can do; its corners no neck can reach.
+    direction = rng.normal(size=(count, 3))
+    direction *= (1.1 * rng.random(count) ** (1 / 3) / np.linalg.norm(direction, axis=1))[:, None]
+    total = RANGE * direction
+    share = rng.uniform(0.2, 0.6, (count, 1)) if "neck" in character.humanoid else np.zeros((count, 1))
+    wobble = rng.normal(0, 0.08, (count, 3))
+    turns[character.humanoid.nearest("neck")] = share * total + wobble
+    head = (1 - share) * total - wobble
+    if character.humanoid.nearest("neck") == character.head:
+        head = total
+    turns[character.head] = head
+    for side, sign in (("left", 1), ("right", -1)):
+        arm, elbow = character.humanoid.get(f"{side}_upper_arm"), character.humanoid.get(f"{side}_lower_arm")
+        if arm is not None and elbow is not None:
+            bone = character.facing @ (character.skeleton.bind[elbow, :3, 3] - character.skeleton.bind[arm, :3, 3])
+            down = np.arctan2(-bone[1], sign * bone[0])
+            turns[arm] = np.outer(rng.uniform(np.radians(15), np.radians(80), count) - down, [0, 0, -sign])
+    skinning = np.empty((count, len(character.skeleton.names), 4, 4))
+    for joint, parent in enumerate(character.skeleton.parents):
+        carrier = skinning[:, parent] if parent >= 0 else np.broadcast_to(np.eye(4), (count, 4, 4))
+        if joint not in turns:
+            skinning[:, joint] = carrier
+            continue
+        vectors = turns[joint].copy()
+        vectors[0] = 0
+        own = np.broadcast_to(np.eye(4), (count, 4, 4)).copy()
+        own[:, :3, :3] = character.facing.T @ from_vector(vectors) @ character.facing
+        origin = character.skeleton.bind[joint, :3, 3]
+        own[:, :3, 3] = origin - own[:, :3, :3] @ origin
+        skinning[:, joint] = carrier @ own
+    return skinning
+
+
+def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area-weighted unit vertex normals (V, 3) float32."""
+    a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
+    face = np.cross(b - a, c - a)
+    total = np.stack([np.bincount(triangles.ravel(), np.repeat(face[:, i], 3), len(points)) for i in range(3)], axis=1)
+    return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)).astype(np.float32)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.finding import SkinnedMesh
+from neuralocks_core.rig.rigging import HairRig, assemble_rig
+
+from .border import Border, open_stage, transformed
+from .rig_source import StageRig, read_rig
+
+
+@dataclass(frozen=True)
+class RiggedHair:
+    """One skeleton of a stage with hair chains.
+
+    Attributes:
+        stage: the shot.
+        border: its units.
+        source: skeleton, body and clip as read.
+        rig: hair and body apart.
+    """
+
+    stage: Usd.Stage = field(repr=False)
+    border: Border
+    source: StageRig = field(repr=False)
+    rig: HairRig = field(repr=False)
+
+
+def read_rigged_hair(
+    path: str | Path,
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    chains: list[str] | None = None,
+    all_shapes: bool = False,
+) -> RiggedHair:
+    """Read the rigged mesh hair of a stage.
+
+    Args:
+        path: USD file.
+        skeleton: path of the Skeleton prim; needed where several have hair chains.
+        head: joint that carries the hair, if it is not named like a head.
+        chains: name patterns of the chains' first joints, instead of finding them.
+        all_shapes: keep blend shapes that the animation does not use (training draws random ones).
+
+    Raises:
+        NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
+    """
+    stage = open_stage(path)
+    border = Border.of(stage)
+    prims = [p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdSkel.Skeleton)]
+    if skeleton:
+        prims = [p for p in prims if str(p.GetPath()) == skeleton or p.GetName() == skeleton]
+        if len(prims) != 1:
+            raise NeuralocksError(f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims")
+    if not prims:
+        raise NeuralocksError(f"{path}: it has no Skeleton; give a stage with a skinned character")
+    found, reasons = [], []
+    for prim in prims:
+        try:
+            _check_authored(prim)
+            source = read_rig(stage, prim, border, head, all_shapes=all_shapes)
+            rig = assemble_rig(source.character, core_meshes(source), chains)
+        except NeuralocksError as error:
+            if len(prims) == 1:
+                raise NeuralocksError(_with_path(prim, error)) from None
+            reasons.append(_with_path(prim, error))
+            continue
+        found.append(RiggedHair(stage, border, source, rig))
+    if not found:
+        raise NeuralocksError(reasons[0])
+    if len(found) > 1:
+        paths = ", ".join(f.source.path for f in found)
+        raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
+    _check_mirrored(found[0])
+    return found[0]
+
+
+def core_meshes(source: StageRig) -> list[SkinnedMesh]:
+    """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
+    result = []
+    for mesh in source.meshes:
+        matrix = source.to_bind @ mesh.geom_bind
+        flip = np.linalg.det(matrix[:3, :3]) < 0
+        faces = mesh.triangles[:, ::-1] if flip else mesh.triangles
+        result.append(
+            SkinnedMesh(str(mesh.prim.GetPath()), transformed(mesh.points, matrix), faces, mesh.indices, mesh.weights)
+        )
+    return result
+
+
+def weight_notes(source: StageRig) -> list[str]:
+    """What is wrong with authored weights: reading makes them sum to one, as renderers do."""
+    notes = []
+    for mesh in source.meshes:
+        primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
+        values = np.asarray(primvar.ComputeFlattened() if primvar and primvar.HasValue() else [], float)
+        size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
+        if len(values) % size or not len(values):
+            continue
+        off = np.abs(values.reshape(-1, size).sum(axis=1) - 1) > 0.01
+        if off.any():
+            notes.append(
+                f"{mesh.prim.GetPath()}: weights of {int(off.sum())} of {len(off)} vertices do not sum to one; "
+                "read as if they did, normalise them in the rig"
+            )
+    return notes
+
+
+def _check_authored(prim: Usd.Prim) -> None:
+    skeleton = UsdSkel.Skeleton(prim)
+    joints, bind = skeleton.GetJointsAttr().Get(), skeleton.GetBindTransformsAttr().Get()
+    if joints and not bind:
+        raise NeuralocksError(f"{prim.GetPath()}: it has no bindTransforms; export the skeleton with its bind pose")
+
+
+def _check_mirrored(hair: RiggedHair) -> None:
+    """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written without the latter."""
+    source = hair.source.source
+    below = hair.rig.chains.joints
+    involved = np.unique(np.concatenate([below, np.maximum(source.parents[below], 0)]))
+    for joint in involved:
+        linear = source.bind[joint, :3, :3]
+        name = source.names[joint].rsplit("/", 1)[-1]
+        if np.linalg.det(linear) * np.linalg.det(source.bind[hair.source.character.head, :3, :3]) < 0:
+            raise NeuralocksError(
+                f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
+            )
+        scale = np.linalg.norm(linear, axis=0)
+        if scale.max() > 1.01 * scale.min():
+            raise NeuralocksError(
+                f"{source.path}: hair joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
+            )
+
+
+def _with_path(prim: Usd.Prim, error: Exception) -> str:
+    text, path = str(error), str(prim.GetPath())
+    return text if text.startswith((path, "--", "model")) else f"{path}: {text.removeprefix('skeleton: ')}"
