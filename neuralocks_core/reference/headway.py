@@ -38,7 +38,9 @@ def headway(head: np.ndarray, substeps: int) -> Headway:
     volume = np.linalg.det(head[:, :3, :3])
     if np.abs(volume - 1.0).max() > 0.02:
         frame = int(np.argmax(np.abs(volume - 1.0)))
-        raise NeuralocksError(f"head: frame {frame} scales or mirrors (determinant {volume[frame]:.3g}); remove the scale")
+        raise NeuralocksError(
+            f"head: frame {frame} scales or mirrors (determinant {volume[frame]:.3g}); remove the scale"
+        )
     turns, origin = Rotation.from_matrix(head[:, :3, :3]), head[:, :3, 3]
     frames = len(head)
     if substeps == 1 or frames == 1:

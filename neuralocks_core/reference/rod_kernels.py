@@ -105,7 +105,9 @@ def energy(
             rest = wp.quat_rotate(q, rods.curl[i, s])
             frame[i, c] = rest
             # |bend - rest|^2, with |bend|^2 = sin^2(theta/2) in the form that is smooth up to the fold
-            square = half * (one - wp.dot(e, after)) + wp.dot(rest, rest) - wp.float64(2.0) * wp.dot(bend, rest)
+            square = (
+                half * (one - wp.dot(e, after)) + wp.dot(rest, rest) - wp.float64(2.0) * wp.dot(bend, rest)
+            )
             total += rods.bend[i, s] * square
             q = wp.normalize(wp.quatd(bend[0], bend[1], bend[2], wp.sqrt(half * wp.max(open, FOLD))) * q)
             e = after
@@ -114,7 +116,14 @@ def energy(
 
 @wp.func
 def add_row(
-    scratch: Scratch, c: int, i: int, before: wp.vec3d, after: wp.vec3d, twist: wp.float64, next: wp.float64, w: wp.float64
+    scratch: Scratch,
+    c: int,
+    i: int,
+    before: wp.vec3d,
+    after: wp.vec3d,
+    twist: wp.float64,
+    next: wp.float64,
+    w: wp.float64,
 ):
     """Add w times the outer square of a row over (edge i, edge i+1, twist i, twist i+1) to the Hessian."""
     zero = wp.float64(0.0)
@@ -384,7 +393,9 @@ def newton(
             search = bool(True)  # noqa: UP018
             while search:
                 turn_edges(rods, scratch, c, s, size)
-                value = energy(rods, scratch.trial, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+                value = energy(
+                    rods, scratch.trial, c, s, turn, target, pull, plane, margin, collision, scratch.frame
+                )
                 # rounding decides below 1e-13: a converged strand still wants its tension, so equal counts as better
                 if value <= best + wp.float64(1e-13) * wp.abs(best):
                     best = value
@@ -410,7 +421,9 @@ def newton(
                 for k in range(2, vertices):
                     scratch.now[k, c] = scratch.trial[k, c]
             else:
-                best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+                best = energy(
+                    rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame
+                )
             n += 1
     for k in range(2, vertices):
         x[k, s] = scratch.now[k, c]

@@ -101,7 +101,14 @@ def simulate(
     from neuralocks_core.reference.stepper import Stepper
 
     stepper = Stepper(
-        rods, material, check_neighbours(neighbours, strands), margin, collision, gravity, tolerance * gravity, device
+        rods,
+        material,
+        check_neighbours(neighbours, strands),
+        margin,
+        collision,
+        gravity,
+        tolerance * gravity,
+        device,
     )
     if body is not None:
         first, faces = check_body(body, triangles, frames)
@@ -139,7 +146,9 @@ def _material(material: Any, strands: int) -> dict[str, np.ndarray]:
             value = getattr(material, name, default)
         value = np.asarray(value, np.float64)
         if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
-            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
+            raise NeuralocksError(
+                f"material {name}: give a number of at least 0, or one for each of {strands} strands"
+            )
         found[name] = np.broadcast_to(value, (strands,)).copy()
     return found
 

@@ -38,6 +38,13 @@ def predict(
 
 
 @wp.kernel(enable_backward=False)
+def carry_along(carry: wp.quatd, origin: wp.vec3d, last: array_vec, x: array_vec):
+    """Where the last state lies when the head takes it along: next to the body as it was, so on its right side."""
+    k, s = wp.tid()
+    x[k, s] = wp.quat_rotate(carry, last[k, s]) + origin
+
+
+@wp.kernel(enable_backward=False)
 def forces(
     mass: array_real,
     rest: array_vec,

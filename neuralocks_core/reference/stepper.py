@@ -79,7 +79,9 @@ class Stepper:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
         wp = self.wp
         self.body = wp.array(self._body_points(bind), dtype=wp.vec3, device=self.device)
-        faces = wp.array(np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device)
+        faces = wp.array(
+            np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device
+        )
         self.mesh = wp.Mesh(points=self.body, indices=faces)
         self._look(self.rest, 1)
         self._run(self.kernels.rest_margin, (self.rest, self.plane, self.widest, self.margin))
@@ -100,6 +102,8 @@ class Stepper:
     def settle(self, dt: float, iterations: int) -> None:
         """One step of a gradient flow towards the equilibrium of the pose."""
         self.wp.copy(self.last, self.x)
+        if self.mesh is not None:
+            self._look(self.x, 1)
         self._solve(dt, iterations, settling=1)
 
     def start_moving(self, before: np.ndarray) -> None:
@@ -120,6 +124,10 @@ class Stepper:
         else:
             self.last, self.x = self.x, self.last
             self._moving = True
+        if self.mesh is not None:
+            # not at the predicted state, which may lie behind the body's far side
+            self._run(self.kernels.carry_along, (self.carry, self.carry_origin, self.last, self.x))
+            self._look(self.x, 1)
         args = (self.turn, self.origin, self.rest, self.constants.length, self.last, self.before, self.x)
         wp.launch(self.kernels.predict, dim=self.strands, inputs=list(args), device=self.device)
         self.used.zero_()
@@ -142,8 +150,8 @@ class Stepper:
                 break
             if self.mesh is None and not self.clumped:
                 take = iterations
-            if self.mesh is not None:
-                self._look(self.x, int(spent == 0))
+            if self.mesh is not None and spent > 0:
+                self._look(self.x, 0)
             if spent == 0 or self.clumped:
                 self._gather(1.0 / dt, settling)
             self._newton(take)
@@ -178,7 +186,9 @@ class Stepper:
     def _body_points(self, points: np.ndarray) -> np.ndarray:
         points = np.ascontiguousarray(points, np.float32)
         if self.mesh is not None and points.shape != self.body.shape + (3,):
-            raise NeuralocksError(f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}")
+            raise NeuralocksError(
+                f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}"
+            )
         if not np.isfinite(points).all():
             raise NeuralocksError("body: holds values that are not finite; check its skinning")
         return points
@@ -187,7 +197,9 @@ class Stepper:
         return self.wp.zeros(shape, dtype=dtype, device=self.device)
 
     def _vectors(self, values: np.ndarray) -> object:
-        return self.wp.array(np.ascontiguousarray(np.swapaxes(values, 0, 1)), dtype=self.wp.vec3d, device=self.device)
+        return self.wp.array(
+            np.ascontiguousarray(np.swapaxes(values, 0, 1)), dtype=self.wp.vec3d, device=self.device
+        )
 
     def _reals(self, values: np.ndarray) -> object:
         return self.wp.array(np.ascontiguousarray(values.T), dtype=self.wp.float64, device=self.device)

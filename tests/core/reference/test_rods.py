@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the reference promises whatever it is given: exact lengths, rest at rest, no order, no NaN, a clear word."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("warp", reason="the reference needs warp")
+from scipy.spatial.transform import Rotation
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.reference import simulate
+
+K = 24
+
+
+def sphere(radius=0.098):
+    """A closed ball (V, 3), (F, 3), by hand: 24 x 12 quads and two fans."""
+    rows, columns = 12, 24
+    up = np.linspace(0, np.pi, rows + 1)[1:-1]
+    around = np.arange(columns) * 2 * np.pi / columns
+    ring = np.stack(
+        [
+            np.outer(np.sin(up), np.cos(around)),
+            np.outer(np.cos(up), np.ones(columns)),
+            np.outer(np.sin(up), np.sin(around)),
+        ],
+        -1,
+    )
+    points = radius * np.concatenate([ring.reshape(-1, 3), [[0, 1, 0], [0, -1, 0]]])
+    top, bottom = len(points) - 2, len(points) - 1
+    faces = []
+    for c in range(columns):
+        d = (c + 1) % columns
+        faces += [[top, d, c], [bottom, (rows - 2) * columns + c, (rows - 2) * columns + d]]
+        for r in range(rows - 2):
+            a, b, e, f = r * columns + c, r * columns + d, (r + 1) * columns + c, (r + 1) * columns + d
+            faces += [[a, b, e], [b, f, e]]
+    return points, np.array(faces)
+
+
+def groom(strands=12, curl=0.4, seed=0):
+    """Strands that leave a head of 10 cm, fall, and curl."""
+    rng = np.random.default_rng(seed)
+    out = rng.normal(size=(strands, 3))
+    out[:, 1] = 0.4 + np.abs(out[:, 1])
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    s = np.linspace(0, 1, K - 1)[None, :, None]
+    bow = np.clip(6 * s, 0, 1) * np.pi / 2
+    side = np.cross(out, [0.0, 1.0, 0.0])[:, None]
+    phase = s * 2 * np.pi / 0.3
+    edges = out[:, None] * np.cos(bow) + np.array([0, -1.0, 0]) * np.sin(bow)
+    edges = edges + curl * (np.cos(phase) * side + np.sin(phase) * out[:, None])
+    edges *= 0.25 / (K - 1) / np.linalg.norm(edges, axis=-1, keepdims=True)
+    return 0.101 * out[:, None] + np.concatenate([np.zeros((strands, 1, 3)), np.cumsum(edges, 1)], 1)
+
+
+def heads(turns, origin):
+    head = np.tile(np.eye(4), (len(turns), 1, 1))
+    head[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
+    head[:, :3, 3] = origin
+    return head
+
+
+def shaken(frames=20, size=0.6):
+    t = np.arange(frames) / 30
+    turns = size * np.sin(2 * np.pi * 1.5 * t)[:, None] * np.array([0.2, 1.0, 0.3])
+    return heads(turns, 0.1 * np.sin(2 * np.pi * t)[:, None] * np.array([1.0, 0.5, 0]))
+
+
+def carried(head, points):
+    return (np.einsum("tij,vj->tvi", head[:, :3, :3], points) + head[:, None, :3, 3]).astype(np.float32)
+
+
+def edge_lengths(points):
+    return np.linalg.norm(np.diff(points, axis=-2), axis=-1)
+
+
+def test_bind_pose_stays_put():
+    """Rest support, rest curvature, rest distances and rest offsets: every energy is at rest in the bind pose."""
+    rest = groom()
+    points, faces = sphere(0.1005)
+    head = np.tile(np.eye(4), (8, 1, 1))
+    ties = (np.arange(12)[:, None] + [1, 2]) % 12
+    result = simulate(rest, head, carried(head, points), faces, neighbours=ties, bind_body=points)
+    assert np.abs(result.points - rest).max() < 2e-6
+    assert result.residual.max() < 1e-3
+
+
+def test_constant_velocity_is_rest():
+    rest = groom(4)
+    t = np.arange(10)[:, None] / 30
+    result = simulate(rest, heads(np.zeros((10, 3)), t * [2.0, 0.5, -1.0]))
+    assert np.abs(result.points - rest).max() < 1e-5
+
+
+def test_without_support_hair_droops():
+    rest = groom(4, curl=0)
+    drooped = simulate(rest, np.eye(4)[None], rest_support=False).points[0]
+    assert (drooped[:, -1, 1] < rest[:, -1, 1] - 0.005).all()
+
+
+def test_lengths_are_exact():
+    rest = groom()
+    result = simulate(rest, shaken())
+    np.testing.assert_allclose(
+        edge_lengths(result.points.astype(float)), edge_lengths(rest)[None] * np.ones((20, 1, 1)), rtol=3e-5
+    )
+
+
+def test_order_of_strands_does_not_matter():
+    rest, head = groom(), shaken()
+    points, faces = sphere()
+    body = carried(head, points)
+    order = np.random.default_rng(1).permutation(len(rest))
+    straight = simulate(rest, head, body, faces).points
+    mixed = simulate(rest[order], head, body, faces).points
+    np.testing.assert_array_equal(straight[:, order], mixed)
+
+
+def test_any_motion_stays_finite():
+    """Teleports, half turns in a frame and fast spins, with a body and ties."""
+    rest = groom(6, curl=0.8)
+    rng = np.random.default_rng(3)
+    head = heads(
+        rng.normal(size=(24, 3)) * 2,
+        rng.normal(size=(24, 3)) * np.where(np.arange(24) % 6 == 0, 5, 0.05)[:, None],
+    )
+    points, faces = sphere()
+    ties = (np.arange(6)[:, None] + [1, 2]) % 6
+    result = simulate(rest, head, carried(head, points), faces, neighbours=ties)
+    assert np.isfinite(result.points).all() and np.isfinite(result.residual).all()
+    np.testing.assert_allclose(
+        edge_lengths(result.points.astype(float)), edge_lengths(rest)[None] * np.ones((24, 1, 1)), rtol=1e-4
+    )
+
+
+def test_hair_stays_out_of_a_turning_head():
+    rest = groom(60, curl=0)
+    rest = rest[np.linalg.norm(rest, axis=-1).min(1) > 0.1]
+    assert len(rest) > 5
+    head = shaken(40, 1.0)
+    points, faces = sphere()
+    result = simulate(rest, head, carried(head, points), faces, bind_body=points)
+    assert np.linalg.norm(result.points, axis=-1)[:, :, 2:].min() > 0.098 * np.cos(np.pi / 24) - 0.003
+    assert np.median(result.residual) < 2e-3
+
+
+def test_planes_say_where_the_body_is():
+    rest = groom(8)
+    head = shaken(6)
+    points, faces = sphere()
+    result = simulate(rest, head, carried(head, points), faces, bind_body=points)
+    near = result.planes[..., 3] > -100
+    assert near[:, :, 2:6].any()
+    gap = (result.planes[..., :3] * result.points).sum(-1) - result.planes[..., 3]
+    radial = np.linalg.norm(result.points, axis=-1) - 0.098
+    assert np.abs(gap - radial)[near].max() < 2.5e-3
+    np.testing.assert_allclose(np.linalg.norm(result.planes[..., :3], axis=-1)[near], 1, atol=1e-5)
+
+
+def test_ties_hold_neighbours_together():
+    rest = groom(2, curl=0)
+    rest[1] = rest[0] + [0.003, 0, 0]
+    head = shaken(30, 1.0)
+    material = {"bend": np.array([1e-3, 2e-4]), "clumping": 240.0}
+    apart = [
+        simulate(rest, head, material=material, neighbours=ties).points
+        for ties in (None, np.array([[1], [0]]))
+    ]
+    drift = [np.abs((p[:, 0] - p[:, 1]) - (rest[0] - rest[1])).max() for p in apart]
+    assert drift[1] < 0.6 * drift[0]
+
+
+def test_stiffness_and_damping_act():
+    rest, head = groom(6, curl=0), shaken(30)
+    moved = {}
+    for name, values in {"bend": (2e-4, 1e-3, 5e-3), "damping": (4.0, 10.0, 20.0)}.items():
+        moved[name] = [np.abs(simulate(rest, head, material={name: v}).points - rest).mean() for v in values]
+    for sizes in moved.values():
+        assert sizes[0] > sizes[1] > sizes[2]
+
+
+def test_substeps_follow_the_same_motion():
+    rest, head = groom(4, curl=0), shaken(30)
+    once, twice, more = (simulate(rest, head, substeps=n, tolerance=1e-5).points for n in (1, 4, 8))
+    assert np.abs(twice - more).mean() < 0.5 * np.abs(once - more).mean()
+
+
+@pytest.mark.parametrize(
+    "change, word",
+    [
+        ({"rest": np.zeros((2, 24, 3))}, "without length"),
+        ({"rest": np.full((2, 24, 3), np.nan)}, "not finite"),
+        ({"head": np.diag([2.0, 2, 2, 1])[None]}, "scale"),
+        ({"neighbours": np.array([[9]] * 4)}, "outside"),
+        ({"material": {"bend": -1.0}}, "bend"),
+        ({"device": "tpu"}, "device"),
+    ],
+)
+def test_errors_name_the_argument(change, word):
+    arguments = {"rest": groom(4), "head": np.eye(4)[None]} | change
+    with pytest.raises(NeuralocksError, match=word):
+        simulate(arguments.pop("rest"), arguments.pop("head"), **arguments)
