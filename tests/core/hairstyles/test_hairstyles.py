@@ -96,9 +96,9 @@ def test_roots_cover_the_scalp_evenly():
     roots = SCALP.roots(4000, np.random.default_rng(0))
     inner = roots.border > 0.02
     direction = (roots.place[inner] - CENTRE) / 0.09
-    top = direction[direction[:, 1] > 0.6]
+    top = direction[direction[:, 1] > 0.8]
     # Equal areas of a sphere lie between equal steps of height.
-    count, _ = np.histogram(top[:, 1], bins=4, range=(0.6, 1.0))
+    count, _ = np.histogram(top[:, 1], bins=4, range=(0.8, 1.0))
     assert count.std() / count.mean() < 0.15
     np.testing.assert_allclose(np.linalg.norm(roots.normal, axis=1), 1.0, rtol=1e-6)
     assert ((roots.normal * (roots.place - CENTRE)).sum(axis=1) > 0.08).all()
