@@ -112,11 +112,18 @@ def read_rig(
 
 
 def _time_codes(source: JointSource) -> np.ndarray:
-    """Every whole time code between the first and the last authored sample, and the authored ones between."""
+    """Every whole time code of the shot, or between the first and the last authored sample, and the authored ones."""
     samples = source.samples
     if not samples:
         return np.zeros(1)
     first, last = samples[0], samples[-1]
+    stage = source.prim.GetStage()
+    if stage.HasAuthoredTimeCodeRange():
+        # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
+        start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+        if start <= first <= last <= end and (end - start + len(samples)) * len(source.names) <= LARGEST_CLIP:
+            samples = [start, *samples, end]
+            first, last = start, end
     count = last - first + len(samples)
     if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
         raise NeuralocksError(

@@ -23,11 +23,13 @@ class SkinArrays:
     """A skinned mesh in bind world space.
 
     Attributes:
+        name: a valid identifier.
         points: (V, 3); triangles: (F, 3).
         joint_indices, joint_weights: (V, I).
         shapes: blend shape name (a valid identifier) -> offsets (V, 3).
     """
 
+    name: str
     points: np.ndarray
     triangles: np.ndarray
     joint_indices: np.ndarray
@@ -66,7 +68,7 @@ class SceneArrays:
         joints: joint paths, parents first, (J); bind: their bind transforms in the world, (J, 4, 4).
         rest: local rest transforms, (J, 4, 4).
         translation, rotation, scale: (T, J, 3), (T, J, 4) wxyz, (T, J, 3), local.
-        skin: the body, or None; shape: blend shape weights (T, B).
+        skins: skinned meshes; shape: weights (T, B) of their blend shapes, mesh after mesh.
         hair: grooms.
     """
 
@@ -79,7 +81,7 @@ class SceneArrays:
     translation: np.ndarray
     rotation: np.ndarray
     scale: np.ndarray
-    skin: SkinArrays | None
+    skins: list[SkinArrays]
     shape: np.ndarray
     hair: list[HairArrays]
 
@@ -129,8 +131,8 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray([row_matrix(m) for m in scene.rest]))
     animation = _animation(stage, scene)
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
-    if scene.skin is not None:
-        _skin(stage, scene.skin, skeleton)
+    for skin in scene.skins:
+        _skin(stage, skin, skeleton)
     for hair in scene.hair:
         _hair(stage, hair, scene.frames, skeleton)
 
@@ -143,7 +145,7 @@ def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
         animation.CreateRotationsAttr(),
         animation.CreateScalesAttr(),
     )
-    shapes = list(scene.skin.shapes) if scene.skin else []
+    shapes = [name for skin in scene.skins for name in skin.shapes]
     if shapes:
         animation.CreateBlendShapesAttr(shapes)
         weights = animation.CreateBlendShapeWeightsAttr()
@@ -157,7 +159,7 @@ def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
 
 
 def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> None:
-    mesh = UsdGeom.Mesh.Define(stage, f"{ROOT}/Body")
+    mesh = UsdGeom.Mesh.Define(stage, f"{ROOT}/{skin.name}")
     points = np.ascontiguousarray(skin.points, np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))

@@ -6,14 +6,16 @@ import numpy as np
 from ..services.rig import BodyArrays
 
 
-def find(armature, objects):
-    """The mesh that this armature deforms, the largest one, or None."""
+def find(armature, objects) -> list:
+    """The visible meshes that this armature deforms, by name."""
     deformed = [
         o
         for o in objects
-        if o.type == "MESH" and any(m.type == "ARMATURE" and m.object == armature for m in o.modifiers)
+        if o.type == "MESH"
+        and not o.hide_render
+        and any(m.type == "ARMATURE" and m.object == armature for m in o.modifiers)
     ]
-    return max(deformed, key=lambda o: len(o.data.vertices), default=None)
+    return sorted(deformed, key=lambda o: o.name)
 
 
 def read(mesh_object) -> BodyArrays:
@@ -44,7 +46,7 @@ def read(mesh_object) -> BodyArrays:
 
 def shape_values(mesh_object) -> np.ndarray:
     """Values (B,) of the shape keys as they are now, in the order of `BodyArrays.shapes`."""
-    keys = mesh_object.data.shape_keys if mesh_object is not None else None
+    keys = mesh_object.data.shape_keys
     if not keys or len(keys.key_blocks) < 2:
         return np.zeros(0)
     return np.array([0.0 if b.mute else b.value for b in keys.key_blocks if b != keys.reference_key])

@@ -7,11 +7,11 @@ import numpy as np
 
 from ..services import names
 from ..services.motion import Motion
-from ..services.rig import joint_weights
+from ..services.rig import joint_weights, shape_names
 from . import body as body_reader
 from . import curves
 from .placing import bind_place
-from .sampling import body_of, hairs_of
+from .sampling import bodies_of, hairs_of
 
 
 def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str]:
@@ -50,17 +50,16 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
                 sampled.character.head,
             )
         )
-    body, skin, shape = body_of(armature, scene), None, motion.shape
-    if body is not None and body.name in motion.places:
-        arrays = body_reader.read(body)
-        place = motion.places[body.name][0]
-        shapes = {
-            n: o @ place[:3, :3].T
-            for n, o in zip(names.unique(list(arrays.shapes)), arrays.shapes.values(), strict=True)
-        }
+    bodies = [body_reader.read(body) for body in bodies_of(armature, scene) if body.name in motion.places]
+    labels_of_shapes = iter(shape_names(bodies))
+    skins = []
+    for arrays, label in zip(bodies, names.unique([f"Body_{b.name}" for b in bodies]), strict=True):
+        place = motion.places[arrays.name][0]
+        shapes = {next(labels_of_shapes): offsets @ place[:3, :3].T for offsets in arrays.shapes.values()}
         indices, weights = joint_weights(arrays, rig.bones)
         triangles = arrays.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else arrays.triangles
-        skin = SkinArrays(arrays.points @ place[:3, :3].T + place[:3, 3], triangles, indices, weights, shapes)
+        points = arrays.points @ place[:3, :3].T + place[:3, 3]
+        skins.append(SkinArrays(label, points, triangles, indices, weights, shapes))
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
@@ -77,8 +76,8 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
             motion.translation,
             motion.rotation,
             motion.scale,
-            skin,
-            shape,
+            skins,
+            motion.shape,
             prims,
         ),
     )

@@ -21,24 +21,24 @@ def hairs_of(armature, scene) -> list:
     return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.armature == armature]
 
 
-def body_of(armature, scene):
-    """The body mesh chosen by the artist, else the one found."""
+def bodies_of(armature, scene) -> list:
+    """The body mesh chosen by the artist, else all that the armature deforms."""
     chosen = armature.neuralocks_character.body
     if chosen is not None and chosen.name in scene.objects:
-        return chosen
+        return [chosen]
     return body_reader.find(armature, scene.objects)
 
 
 def key_of(armature, scene) -> tuple:
     """What a sampling of this armature depends on besides its animation."""
-    settings, body = armature.neuralocks_character, body_of(armature, scene)
+    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
     return (
         scene.frame_start,
         scene.frame_end,
         scene.neuralocks.subframes,
         round(scene.render.fps / scene.render.fps_base, 6),
         round(scene.unit_settings.scale_length, 9),
-        body.name if body else "",
+        tuple(body.name for body in bodies),
         settings.head_bone,
         len(armature.data.bones),
         tuple(sorted(o.name for o in hairs_of(armature, scene))),
@@ -56,8 +56,8 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     scene = context.scene
     rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
     rig.humanoid()
-    body = body_of(armature, scene)
-    tracked = {o.name: o for o in [*hairs_of(armature, scene), *([body] if body else [])]}
+    bodies = [body.name for body in bodies_of(armature, scene)]
+    tracked = [*(hair.name for hair in hairs_of(armature, scene)), *bodies]
     frames = frame_numbers(scene.frame_start, scene.frame_end, scene.neuralocks.subframes)
     key = key_of(armature, scene)
     joints = np.empty((len(frames), len(rig.bones), 4, 4))
@@ -81,13 +81,14 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
         places[""][row] = evaluated.matrix_world
         for other in tracked:
             places[other][row] = bpy.data.objects[other].evaluated_get(graph).matrix_world
-        shapes.append(body_reader.shape_values(bpy.data.objects[body.name] if body else None))
+        values = [body_reader.shape_values(bpy.data.objects[body]) for body in bodies]
+        shapes.append(np.concatenate([np.zeros(0), *values]))
         yield row + 1, len(frames)
     rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
     untrimmed = places[""][0] @ rig.rest
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
-    arrays = body_reader.read(bpy.data.objects[body.name]) if body else None
-    character = rig_service.character(rig, places[""][0], arrays, places[body.name][0] if body else None, unit)
+    arrays = [(body_reader.read(bpy.data.objects[body]), places[body][0]) for body in bodies]
+    character = rig_service.character(rig, places[""][0], arrays, unit)
     clip = motion.clip(to_core(unit))
     session.forget_motion(name)
     session.rigs[name] = SampledRig(rig, motion, character, clip, trim_of(untrimmed, name), key)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender rig, read as arrays, as the core's character; and in plain words what is wrong with it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -106,8 +107,7 @@ def joint_weights(body: BodyArrays, bones: tuple[str, ...]) -> tuple[np.ndarray,
 def character(
     rig: RigArrays,
     place: np.ndarray,
-    body: BodyArrays | None = None,
-    body_place: np.ndarray | None = None,
+    bodies: Sequence[tuple[BodyArrays, np.ndarray]] = (),
     metres_per_unit: float = 1.0,
 ) -> Character:
     """The character in the core's space.
@@ -115,13 +115,14 @@ def character(
     Args:
         rig: the armature at rest.
         place: world transform (4, 4) of the armature object at the first sampled frame.
-        body, body_place: the mesh and its world transform at that frame.
+        bodies: skinned meshes, each with its world transform at that frame; together they are the body.
         metres_per_unit: the scene's unit scale.
     """
     core = to_core(metres_per_unit)
     humanoid = rig.humanoid()
     skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
-    return Character(skeleton, None if body is None else _body(body, core @ body_place, rig.bones), humanoid)
+    parts = [_body(body, core @ body_place, rig.bones) for body, body_place in bodies]
+    return Character(skeleton, _merged(parts), humanoid)
 
 
 def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:
@@ -136,6 +137,31 @@ def _body(body: BodyArrays, matrix: np.ndarray, bones: tuple[str, ...]) -> Body:
     shapes = {name: offsets @ matrix[:3, :3].T for name, offsets in body.shapes.items()}
     triangles = body.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else body.triangles
     return Body(points, triangles, *joint_weights(body, bones), shapes)
+
+
+def shape_names(bodies: Sequence[BodyArrays]) -> list[str]:
+    """Identifiers of all shape keys, body after body, in their order."""
+    return names.unique([name for body in bodies for name in body.shapes])
+
+
+def _merged(parts: list[Body]) -> Body | None:
+    if not parts:
+        return None
+    starts = np.cumsum([0] + [len(part.points) for part in parts])
+    shapes = {}
+    labels = iter(names.unique([name for part in parts for name in part.shapes]))
+    for part, start in zip(parts, starts):
+        for offsets in part.shapes.values():
+            whole = np.zeros((starts[-1], 3))
+            whole[start : start + len(part.points)] = offsets
+            shapes[next(labels)] = whole
+    return Body(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.triangles + start for part, start in zip(parts, starts)]),
+        np.concatenate([part.joint_indices for part in parts]),
+        np.concatenate([part.joint_weights for part in parts]),
+        shapes,
+    )
 
 
 def groom(

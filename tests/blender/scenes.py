@@ -109,7 +109,7 @@ def dance(rig, frames=(1, 24)) -> None:
     first, last = frames
     for frame in range(first, last + 1, 3):
         t = (frame - first) / 24
-        rig.pose.bones["head"].rotation_euler = (0.2 * math.sin(9 * t), 0.9 * math.sin(7 * t), 0.1)
+        rig.pose.bones["head"].rotation_euler = (0.2 * math.sin(9 * t), 0.9 * math.sin(7 * t), 0.3 * math.sin(2 * t))
         rig.pose.bones["spine"].rotation_euler = (0.3 * math.sin(5 * t), 0.2 * math.sin(3 * t), 0)
         rig.pose.bones["upper_arm.L"].rotation_euler = (0, 0, 0.5 * math.sin(4 * t))
         for bone in ("head", "spine", "upper_arm.L"):
@@ -127,3 +127,58 @@ def points(thing, graph=None) -> np.ndarray:
     data.attributes["position"].data.foreach_get("vector", values.ravel())
     matrix = np.array(evaluated.matrix_world)
     return values @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def constrain(rig) -> None:
+    """IK on an arm, a constraint on the head and a driver on the neck, all moving."""
+    scene = bpy.context.scene
+    target = bpy.data.objects.new("Target", None)
+    scene.collection.objects.link(target)
+    for frame in (1, 8, 16, 24):
+        target.location = (0.5 * math.sin(frame), -0.6, 1.2 + 0.3 * math.cos(frame))
+        target.keyframe_insert("location", frame=frame)
+    ik = rig.pose.bones["forearm.R"].constraints.new("IK")
+    ik.target, ik.chain_count = target, 2
+    track = rig.pose.bones["head"].constraints.new("DAMPED_TRACK")
+    track.target, track.track_axis, track.influence = target, "TRACK_Z", 0.4
+    driver = rig.pose.bones["neck"].driver_add("rotation_euler", 0).driver
+    driver.expression = "sin(frame / 4) * 0.3"
+
+
+def fcurves(thing) -> list:
+    """F-curves of an object's active action, in any Blender."""
+    return fcurves_of(thing.animation_data.action)
+
+
+def fcurves_of(action) -> list:
+    """F-curves of an action; since 5.0 only through its layers."""
+    if hasattr(action, "fcurves"):
+        return list(action.fcurves)
+    return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
+
+
+def rig_model(rig, path):
+    """A model of random weights for the hair bones of a rig."""
+    from dcc_addon.services.bones import chains_of
+    from dcc_addon.session import session
+    from neuralocks_core import model
+    from neuralocks_core.rig import RigModel, rig_spec
+    from neuralocks_core.rig.network import feature_columns, input_limits
+
+    spec, rng = rig_spec(True), np.random.default_rng(0)
+    chains = chains_of(session.rigs[rig.name].character)
+    sizes = [len(feature_columns(spec)), 16, 16, 3 * len(chains)]
+    layers = tuple(
+        ((rng.normal(size=(b, a)) * 0.5).astype(np.float32), rng.normal(size=b).astype(np.float32))
+        for a, b in zip(sizes[:-1], sizes[1:], strict=True)
+    )
+    made = RigModel(chains, spec, layers, np.asarray(input_limits(spec), np.float32), 0.8, {}, {}, [])
+    meta = {
+        "kind": "rig",
+        "boundary": spec.to_json(),
+        "chains": chains.to_json(),
+        "max_angle": made.max_angle,
+        "layers": [[w.tolist(), b.tolist()] for w, b in made.layers],
+        "limits": made.limits.tolist(),
+    }
+    return model.write(path, meta, {"rig.onnx": b"unused"})

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on in real Blenders, each scenario in its own process with a time limit.
+
+The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a list, `4.5,5.0`) chooses others.
+"""
+
+import ast
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+VERSIONS = ("4.2", "4.5", "5.0", "5.2")
+WINDOWED = "3.4"
+LIMIT = 120
+
+
+def _wanted() -> list[str]:
+    chosen = os.environ.get("NEURALOCKS_BLENDERS", "4.2,5.2")
+    return [*VERSIONS, WINDOWED] if chosen == "all" else chosen.split(",")
+
+
+def _scenarios() -> list[str]:
+    """Names of the scenarios; their module needs bpy, so it is read, not imported."""
+    tree = ast.parse((HERE / "scenarios.py").read_text())
+    return [n.name for n in tree.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_")]
+
+
+def _command(version: str) -> list[str]:
+    """How to run a script in this Blender; skips where it is not installed."""
+    script = str(HERE / "run.py")
+    if version == WINDOWED:
+        if not shutil.which("blender"):
+            pytest.skip("no blender program is installed")
+        return ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script, "--"]
+    python = ROOT / f".venv-blender-{version}" / "bin" / "python"
+    if not python.exists():
+        pytest.skip(f"Blender {version} is not installed as a Python module ({python.parent.parent.name} is missing)")
+    return [str(python), script]
+
+
+@pytest.fixture(scope="session")
+def random_model(tmp_path_factory):
+    """A strand model of random weights, whose hair moves a lot."""
+    torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    from neuralocks_core import model
+    from neuralocks_core.boundary import BoundarySpec
+    from neuralocks_core.training.autoencoder import StrandAutoencoder
+    from neuralocks_core.training.export import strand_graphs
+    from neuralocks_core.training.networks import StrandNet
+
+    spec = BoundarySpec()
+    torch.manual_seed(0)
+    net, encoder = StrandNet(spec.size), StrandAutoencoder()
+    with torch.no_grad():
+        net.out.weight.mul_(20)
+    meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": True, "output": "direction"}
+    path = tmp_path_factory.mktemp("model") / "random.neuralocks"
+    return model.write(path, meta, strand_graphs(encoder, net, "direction"))
+
+
+@pytest.mark.parametrize("scenario", _scenarios())
+@pytest.mark.parametrize("version", _wanted())
+def test_scenario(version, scenario, random_model, tmp_path):
+    """Runs one scenario; its output is shown when it fails."""
+    command = _command(version)
+    resources = tmp_path / "resources"
+    resources.mkdir()
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "BLENDER"))}
+    environment = kept | {
+        "NEURALOCKS_TEST_MODEL": str(random_model),
+        "OMP_NUM_THREADS": "1",
+        "BLENDER_USER_RESOURCES": str(resources),
+    }
+    if version == WINDOWED:
+        environment["PYTHONPATH"] = str(next((ROOT / ".venv-blender-4.2" / "lib").glob("python*")) / "site-packages")
+    try:
+        done = subprocess.run(
+            [*command, scenario, str(tmp_path / "work")],
+            env=environment,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+        )
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"{scenario} in Blender {version} did not end within {LIMIT} s")
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
