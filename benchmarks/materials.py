@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the material sliders act: each constant's effect in a model beside its effect in the reference solver.
+
+    python benchmarks/materials.py MODEL --character examples/shot/shot.usda [--groom FILE]... [--seed 0]
+
+Each constant is set to the low end, the default and the high end of its range, the others staying at their default,
+in a motion that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the
+body bows; `swing`, how far vertices move about their mean while the head shakes; `parting`, how far the tips of
+neighbouring strands move apart or together. Strands are of locks that training keeps back. The last column is the model's
+effect over the solver's.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+
+from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.locks import lock_mates
+from neuralocks_core.materials import RANGES, Material
+from neuralocks_core.motion import Clip
+from neuralocks_core.random_motion import scripted_clip
+from neuralocks_core.reference import simulate
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strands import StrandSet
+from neuralocks_core.training.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
+
+SHOWS = {
+    "bend": ("bow", "droop"),
+    "weight": ("bow", "droop"),
+    "damping": ("shake", "swing"),
+    "clumping": ("shake", "parting"),
+}
+"""Constant -> the motion that shows it, and the number that it changes."""
+SECONDS = 3.0
+
+
+def main() -> None:
+    """Command line."""
+    from usd.training import training_scene
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", nargs="?", default=None)
+    parser.add_argument("--character", required=True)
+    parser.add_argument("--groom", action="append", default=[])
+    parser.add_argument("--strands", type=int, default=48)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    scene = training_scene(arguments.character, arguments.groom, seed=arguments.seed)
+    strand_model = StrandModel(model.read(arguments.model or model.shipped(), "strands"))
+    print("| groom | constant | shown by | low: solver | model | default | model | high | model | effect |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for number, groom in enumerate(scene.grooms):
+        alone = replace(scene, grooms=(groom,), strands=arguments.strands, held_out=True, seed=number)
+        drawn = RolloutMaker(alone).draw(0).strands
+        measured = effects(strand_model, alone, drawn)
+        for name, rows in measured.items():
+            cells = " | ".join(f"{true:.1f} | {ours:.1f}" for true, ours in rows)
+            true, ours = rows[-1] - rows[0]
+            monotone = np.all(np.diff(rows[:, 1]) * np.sign(true) > 0)
+            verdict = f"{ours / true:.2f}" + ("" if monotone else ", not monotone") if abs(true) > 0.2 else "no effect"
+            print(f"| {number} | {name} | {SHOWS[name][1]} [mm] | {cells} | {verdict} |", flush=True)
+
+
+def effects(strand_model: StrandModel, scene: TrainingScene, drawn: np.ndarray) -> dict[str, np.ndarray]:
+    """Constant -> (3, 2) numbers [mm] at low, default and high: the solver's and the model's."""
+    groom = scene.grooms[0]
+    mates = lock_mates(groom.rest[drawn], groom.lock[drawn])
+    result = {}
+    for name, (kind, number) in SHOWS.items():
+        rows = []
+        for value in (RANGES[name][0], getattr(Material(), name), RANGES[name][1]):
+            material = Material(**{name: value})
+            moves = solved(scene, drawn, kind, material, mates), answered(strand_model, scene, drawn, kind, material)
+            rows.append([1e3 * NUMBERS[number](moved, mates) for moved in moves])
+        result[name] = np.array(rows)
+    return result
+
+
+def solved(scene: TrainingScene, drawn: np.ndarray, kind: str, material: Material, mates: np.ndarray) -> np.ndarray:
+    """The reference's displacement (T, n, 24, 3) [m]."""
+    character = scene.character
+    clip = _clip(scene, kind)
+    rest = scene.grooms[0].rest[drawn].astype(np.float64)
+    body = hair_body(character, reach=0.2 - float(rest[..., 1].min()))
+    world = None if body is None else posed_over_time(body, clip.joints @ character.inverse_bind)
+    rollout = simulate(
+        rest,
+        character.canonical_to_world(clip.joints),
+        world,
+        None if body is None else body.triangles,
+        material,
+        dt=scene.spec.dt,
+        rest_support=scene.rest_support,
+        neighbours=mates,
+    )
+    return rollout.points - rest
+
+
+def answered(
+    strand_model: StrandModel, scene: TrainingScene, drawn: np.ndarray, kind: str, material: Material
+) -> np.ndarray:
+    """The model's displacement (T, n, 24, 3) [m]; it sees the whole groom, or locks would be cut."""
+    groom: StrandSet = scene.grooms[0]
+    clip = _clip(scene, kind)
+    sampler = BoundarySampler(strand_model.spec, scene.character, clip)
+    session, log = strand_model.prepare(groom), material.log_ratios()
+    session.anchor(sampler.held_bind(log))
+    return np.stack([session.displacement(v)[drawn] for v in sampler.vectors(clip.times, log)])
+
+
+def _clip(scene: TrainingScene, kind: str) -> Clip:
+    clip = scripted_clip(scene.character, kind, SECONDS, 1 / scene.spec.dt)
+    body = scene.character.body
+    return Clip(clip.times, clip.joints, np.zeros((len(clip.times), 0 if body is None else len(body.shapes))))
+
+
+def _droop(moved: np.ndarray, mates: np.ndarray) -> float:
+    return float(np.linalg.norm(moved[:, :, -1], axis=-1).max(axis=0).mean())
+
+
+def _swing(moved: np.ndarray, mates: np.ndarray) -> float:
+    return float(np.sqrt(np.square(moved - moved.mean(axis=0)).sum(-1).mean()))
+
+
+def _parting(moved: np.ndarray, mates: np.ndarray) -> float:
+    pairs = [(i, j) for i, row in enumerate(mates) for j in row if j >= 0]
+    first, second = np.array(pairs).T
+    gap = moved[:, first, -1] - moved[:, second, -1]
+    return float(np.sqrt(np.square(gap).sum(-1).mean()))
+
+
+NUMBERS = {"droop": _droop, "swing": _swing, "parting": _parting}
+
+
+if __name__ == "__main__":
+    main()
