@@ -6,8 +6,8 @@
 Each constant is set to the low end, the default and the high end of its range, the others staying at their default,
 in a motion that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the
 body bows; `swing`, how far vertices move about their mean while the head shakes; `parting`, how far the tips of
-neighbouring strands move apart or together. Strands are of locks that training keeps back. The last column is the model's
-effect over the solver's.
+neighbouring strands move apart or together. Strands are of locks that training keeps back. The last column is
+the model's effect over the solver's.
 """
 
 from __future__ import annotations
