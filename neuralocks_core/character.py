@@ -178,7 +178,7 @@ class Character:
             return np.array([0.0, 0.08, 0.02])
         points = (self.body.points[mask] - self.canonical_to_bind[:3, 3]) @ self.facing.T
         low, high = points.min(axis=0), points.max(axis=0)
-        # The chin and the neck's skin belong to the head's vertices but not to the skull: measure from the
-        # top.
-        width = high[0] - low[0]
+        # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured over the ears.
+        skull = points[points[:, 1] > high[1] / 2]
+        width = np.ptp(skull[:, 0]) if high[1] > 0 and len(skull) else high[0] - low[0]
         return np.array([(low[0] + high[0]) / 2, high[1] - 0.65 * width, (low[2] + high[2]) / 2])

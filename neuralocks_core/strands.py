@@ -9,6 +9,7 @@ import numpy as np
 
 from .arclength import resample
 from .carrier import Carrier
+from .centreline import centre_lines
 from .groom import Groom
 from .locks import lock_of_roots
 
@@ -26,7 +27,8 @@ class StrandSet:
     """What inference and training read of a groom; see `strand_set`."""
 
     rest: np.ndarray
-    """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand."""
+    """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; of curls finer than that,
+    the line they wind around (`centreline`)."""
     valid: np.ndarray
     """(S,) bool, false where the groom's strand has no two distinct points; all else there is a
     placeholder."""
@@ -89,6 +91,7 @@ def strand_set(
     head_centre = np.asarray(head_centre, dtype=np.float64)
 
     sampled, valid = resample(groom, K)
+    sampled[valid] = centre_lines(sampled[valid])
     rest = (sampled - head_origin) @ facing.T
     rest[groom.counts == 0] = head_centre + [0.0, 0.1, 0.0]
     normal = _root_normals(rest[:, 0], head_centre)

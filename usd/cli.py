@@ -257,6 +257,7 @@ def train_command(
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
     credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
+    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
 ) -> None:
     """Train a strand model for a character (extra 'train')."""
     from .progress import progress_bar
@@ -266,7 +267,8 @@ def train_command(
     with progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings, skeleton=skeleton, head=head, resume=resume,
-            rollouts=rollouts, processes=processes, credits=credit or [], progress=progress,
+            rollouts=rollouts, processes=processes, credits=credit or [], keep_work=keep_work,
+            progress=progress,
         )  # fmt: skip
     typer.echo(str(path))
 

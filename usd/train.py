@@ -21,6 +21,7 @@ def train(
     rollouts: int = 1200,
     processes: int = 1,
     credits=(),
+    keep_work: bool = False,
     progress=None,
 ) -> Path:
     """Train a strand model.
@@ -35,6 +36,7 @@ def train(
         resume: go on with an interrupted training.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
+        keep_work: leave the simulations and the checkpoint beside the model.
         progress: called with (done, total, message).
 
     Raises:
@@ -56,5 +58,5 @@ def train(
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
         scene, out, RegressionOptions(**settings), rollouts=rollouts, processes=processes, resume=resume,
-        credits=tuple(credits), command=command, progress=progress,
+        credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
     )  # fmt: skip

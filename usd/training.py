@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `neuralocks train` learns from: a character, grooms and motion, out of files."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles import STYLES, Obstacle, from_head, grow
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands import StrandSet, strand_set
 from neuralocks_core.training.rollouts import TrainingScene
@@ -73,14 +75,19 @@ def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[Stran
 
 
 def _library(character: Character, seed: int) -> list[StrandSet]:
-    from neuralocks_core.hairstyles import STYLES, grow
-    from neuralocks_core.hairstyles.scalp import of_character
-
-    scalp = of_character(character)
-    return [
-        _strands(grow(style, scalp, MOST_STRANDS, seed + i, character.body), character, seed)
-        for i, style in enumerate(STYLES)
-    ]
+    if character.body is None:
+        raise NeuralocksError(f"{LIBRARY}: hair needs a head to grow on; give a character with skin, or a groom")
+    # Styles are grown facing +Z, around the head's own place.
+    points, facing = character.body.points @ character.facing.T, character.facing
+    centre = facing @ character.canonical_to_bind[:3, 3] + character.head_centre
+    scalp = from_head(points, character.body.triangles, centre)
+    obstacle = Obstacle(scalp, (points, character.body.triangles))
+    sets = []
+    for i, style in enumerate(STYLES):
+        groom = grow(style, scalp, MOST_STRANDS, seed + i, obstacle)
+        groom = replace(groom, points=(groom.points @ facing).astype(np.float32))
+        sets.append(_strands(groom, character, seed))
+    return sets
 
 
 def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:

@@ -51,7 +51,7 @@ class RegressionOptions:
     clips: int = 48
     moments: int = 4
     strands: int = 8
-    rate: float = 1.5e-3
+    rate: float = 3e-3
     velocity: float = 20.0
     collision: float = 10.0
     output: str = "direction"
