@@ -58,7 +58,9 @@ def read_rigged_hair(
     if skeleton:
         prims = [p for p in prims if str(p.GetPath()) == skeleton or p.GetName() == skeleton]
         if len(prims) != 1:
-            raise NeuralocksError(f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims")
+            raise NeuralocksError(
+                f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims"
+            )
     if not prims:
         raise NeuralocksError(f"{path}: it has no Skeleton; give a stage with a skinned character")
     found, reasons = [], []
@@ -142,3 +144,16 @@ def _check_mirrored(hair: RiggedHair) -> None:
 def _with_path(prim: Usd.Prim, error: Exception) -> str:
     text, path = str(error), str(prim.GetPath())
     return text if text.startswith((path, "--", "model")) else f"{path}: {text.removeprefix('skeleton: ')}"
+
+
+def describe_chains(hair: RiggedHair) -> list[dict]:
+    """Name, number of moving joints and length [m] of every chain."""
+    chains = hair.rig.chains
+    return [
+        {
+            "name": chains.chain_name(i),
+            "joints": int((chains.chain == i).sum()),
+            "length": round(chains.chain_length(i), 5),
+        }
+        for i in range(len(chains.roots))
+    ]

@@ -45,7 +45,7 @@ class PosePool:
         body, character = self.rig.character.body, self.rig.character
         to_canonical = np.linalg.inv(character.canonical_to_bind)
         canonical = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-        reach = np.linalg.norm(self.rig.points, axis=1).max() + 0.08
+        reach = np.linalg.norm(self.rig.points, axis=1).max() + 0.2
         near = np.linalg.norm(canonical, axis=1) < reach
         faces = body.triangles[near[body.triangles].all(axis=1)]
         used = np.unique(faces)
@@ -66,6 +66,10 @@ class PosePool:
             points[pose] = np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
         self.points = points
         self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        # Where the rest of the body was cut off, a plane says nothing about inside and outside.
+        cut = np.zeros(len(body.points), bool)
+        cut[body.triangles[~near[body.triangles].all(axis=1)]] = True
+        self._cut = cut[used][self.kept]
         self.normals = np.stack([_normals(p, self.triangles)[self.kept] for p in points])
         self._trees = [cKDTree(p[self.kept], balanced_tree=False, compact_nodes=False) for p in points]
 
@@ -90,6 +94,7 @@ class PosePool:
             nearest = self._trees[pose].query(points[row])[1]
             normals[row] = self.normals[pose][nearest]
             offsets[row] = np.einsum("vi,vi->v", normals[row], self.points[pose][self.kept[nearest]])
+            offsets[row][self._cut[nearest]] = -1e3
         return normals, offsets
 
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rig model as one self-contained C99 header for engines, and a worked example beside it."""
+
+import os
+import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.network import RigModel
+
+_TEXTS = Path(__file__).parent / "rig"
+
+
+def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
+    """Write `path` (ends in .h) and `<path>_example.c` beside it.
+
+    Args:
+        model: the trained model.
+        path: header to write.
+        prefix: of every name in it, so that several models can live in one program.
+
+    Raises:
+        NeuralocksError: the name or the prefix cannot be used, or the folder cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in (".h", ".hpp"):
+        raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
+        raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
+    _write(path, header_text(model, prefix))
+    _write(path.with_name(f"{path.stem}_example.c"), _example(model, path.name, prefix))
+    return path
+
+
+def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
+    """The header."""
+    text = (_TEXTS / "hair.h.in").read_text(encoding="utf-8")
+    if model.dynamic:
+        history = (_TEXTS / "history.h.in").read_text(encoding="utf-8")
+    else:
+        history = ""
+    text = text.replace("@HISTORY@", history)
+    for name, wanted in (("DYNAMIC", model.dynamic), ("STATIC", not model.dynamic)):
+        text = re.sub(rf"@IF_{name}@\n(.*?)@END@\n", lambda m: m[1] if wanted else "", text, flags=re.S)  # noqa: B023
+    chains = model.chains
+    size = np.float32(np.sin(model.max_angle / 2))
+    order = np.arange(3 * len(chains)).reshape(-1, 3).T.ravel()  # x of all joints, then y, then z: for vector units
+    layers = [(w.T, b) for w, b in model.layers]
+    layers[-1] = (layers[-1][0][:, order], layers[-1][1][order])
+    tables, buffers, code, below = [], [], [], "x"
+    for index, (weight, bias) in enumerate(layers):
+        rows, columns = weight.shape
+        table = ",\n".join(" {" + ", ".join(_float(v) for v in row) + "}" for row in weight)
+        tables.append(f"  static const float w{index}[{rows}][{columns}] = {{\n{table}}};")
+        tables.append(f"  static const float b{index}[{columns}] = {{{', '.join(_float(v) for v in bias)}}};")
+        buffers.append(f"  float h{index}[{columns}];")
+        code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
+        below = f"h{index}"
+    spec = model.spec
+    values = {
+        "PREFIX": prefix,
+        "UPPER": prefix.upper(),
+        "JOINTS": len(chains),
+        "FEATURES": model.inputs,
+        "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
+        "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
+        "CHAINS": ", ".join(chains.chain_name(c) for c in range(len(chains.roots)))[:300].replace("*/", ""),
+        "DEGREES": f"{np.degrees(model.max_angle):.0f}",
+        "TABLES": "\n".join(tables),
+        "BUFFERS": "\n".join(buffers),
+        "LAYERS": "\n".join(code),
+        "RAW": below,
+        "LIMITS": ", ".join(_float(v) for v in model.limits),
+        "SIZE": _float(size),
+        "SIZE2": _float(size * size),
+        "FLOOR": _float(np.float32(1) - size * size),
+        "BINS": len(spec.bins),
+        "STEPS": spec.steps,
+        "BIN_STEPS": ", ".join(str(b) for b in spec.bins),
+        "TAPER": ", ".join(_float(v) for v in _taper(spec)),
+        "DT": repr(float(spec.dt)),
+    }
+    return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
+    """Outer products: the inner loop has a constant length and vectorises. Blocks keep the sums in registers."""
+    block = 16 if columns % 16 == 0 else 8 if columns % 8 == 0 else 4 if columns % 4 == 0 else 1
+    lines = [
+        f"  for (j = 0; j < {columns}; j += {block}) {{",
+        f"    float s[{block}];",
+        f"    for (k = 0; k < {block}; ++k) s[k] = b{index}[j + k];",
+        f"    for (i = 0; i < {rows}; ++i)",
+        f"      for (k = 0; k < {block}; ++k) s[k] += w{index}[i][j + k] * {below}[i];",
+        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = {'s[k] > 0.0f ? s[k] : 0.0f' if hidden else 's[k]'};",
+        "  }",
+    ]
+    return "\n".join(lines)
+
+
+def _taper(spec) -> np.ndarray:
+    from neuralocks_core.boundary import _taper
+
+    return _taper(spec)
+
+
+def _example(model: RigModel, header: str, prefix: str) -> str:
+    text = (_TEXTS / "example.c.in").read_text(encoding="utf-8")
+    for name, wanted in (("DYNAMIC", model.dynamic), ("STATIC", not model.dynamic)):
+        text = re.sub(rf"@IF_{name}@\n(.*?)@END@\n", lambda m: m[1] if wanted else "", text, flags=re.S)  # noqa: B023
+    return text.replace("@HEADER@", header).replace("@PREFIX@", prefix).replace("@UPPER@", prefix.upper())
+
+
+def _float(value) -> str:
+    text = str(np.float32(value))
+    return (text if "." in text or "e" in text else f"{text}.0") + "f"
+
+
+def _c_text(name: str) -> str:
+    return "".join(c if c.isascii() and c.isprintable() and c not in '"\\?' else "_" for c in name)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, path)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+    except OSError as error:
+        raise NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose another folder") from None

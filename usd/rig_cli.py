@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks rig`: train, bake, inspect and export rigged mesh hair."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+from .command import command_of, note, print_json
+from .progress import progress_bar
+
+app = typer.Typer(no_args_is_help=True, add_completion=False)
+command = command_of(app)
+
+Head = Annotated[str | None, typer.Option(help="Joint that carries the hair, if it is not named like a head.")]
+Skeleton = Annotated[str | None, typer.Option(help="Skeleton prim, where several have hair chains.")]
+Chains = Annotated[list[str] | None, typer.Option(help="Name pattern of hair chains' first joints, such as 'Hair*_1'.")]
+Json = Annotated[bool, typer.Option("--json", help="Print for a machine to read.")]
+Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
+
+
+@command("train")
+def train(
+    character: Annotated[Path, typer.Argument(help="USD file with a skinned character and hair joints.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write, *.neuralocks.")],
+    dynamic: Annotated[bool, typer.Option(help="Learn lag, swing and settling too.")] = False,
+    seconds: Annotated[float, typer.Option(help="How long to train [s].")] = 75.0,
+    steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
+    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 16, and 32 for --dynamic.")] = None,
+    bend: Annotated[float | None, typer.Option(help="Stiffness over line density [m^4/s^2].")] = None,
+    weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
+    damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]; for --dynamic.")] = None,
+    seed: Annotated[int, typer.Option(help="Decides poses and first weights.")] = 0,
+    chains: Chains = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    as_json: Json = False,
+) -> None:
+    """Train a tiny network for the hair joints of one rig. No data is needed."""
+    if out.suffix != ".neuralocks":
+        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
+    if not 1 <= seconds <= 86400 or (steps is not None and not 1 <= steps <= 10_000_000):
+        raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
+    if hidden is not None and not 1 <= hidden <= 256:
+        raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
+    changed = {"bend": bend, "weight": weight, "damping": damping}
+    for name, value in changed.items():
+        if value is not None and not 1e-6 < value < 1e4:
+            raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
+    from .rig_train import train_rig
+
+    with progress_bar("training") as progress:
+        model, notes = train_rig(
+            character,
+            out,
+            dynamic=dynamic,
+            seconds=seconds,
+            steps=steps,
+            hidden=hidden,
+            material={name: value for name, value in changed.items() if value is not None},
+            seed=seed,
+            chains=chains,
+            head=head,
+            skeleton=skeleton,
+            command=shlex.join(["neuralocks", *sys.argv[1:]]),
+            progress=progress,
+        )
+    note(notes)
+    if as_json:
+        print_json({"model": str(out), "training": model.training, "report": model.report})
+    else:
+        typer.echo(
+            f"{out}: {len(model.chains)} hair joints in {len(model.chains.roots)} chains, {model.training['steps']} steps"
+        )
+        for line in report_lines(model.report):
+            typer.echo(line)
+
+
+@command("bake")
+def bake(
+    shot: Annotated[Path, typer.Argument(help="USD file with the animated character.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Override layer to write.")],
+    model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
+    frames: Annotated[str | None, typer.Option(help="A:B[:STEP]; the shot's range if left out.")] = None,
+    subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
+    loop: Annotated[bool, typer.Option("--loop", help="The clip's last sample is followed by its first.")] = False,
+    strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    as_json: Json = False,
+) -> None:
+    """Write the hair joints' animation as an override layer of the shot."""
+    from .rig_bake import bake_rig
+
+    with progress_bar("baking") as progress:
+        result = bake_rig(
+            shot,
+            out,
+            model,
+            skeleton=skeleton,
+            head=head,
+            frames=frames,
+            subframes=subframes,
+            loop=loop,
+            strength=strength,
+            progress=progress,
+        )
+    note(result.notes)
+    if as_json:
+        print_json(vars(result))
+    else:
+        typer.echo(f"{result.path}: {result.joints} hair joints, {result.samples} samples, in {result.animation}")
+
+
+@command("export-c")
+def export_c(
+    model: Model = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Header to write.")] = Path("hair.h"),
+    prefix: Annotated[str, typer.Option(help="Prefix of all names in it.")] = "nl_hair",
+) -> None:
+    """Write one self-contained C99 header, usable from C++, and a worked example beside it."""
+    from neuralocks_core.export_c import export_c as write
+    from neuralocks_core.rig.network import RigModel
+
+    path = write(RigModel.load(model), out, prefix)
+    typer.echo(f"{path} and {path.with_name(path.stem + '_example.c')}")
+
+
+@command("export-onnx")
+def export_onnx(
+    model: Model = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="ONNX file to write.")] = Path("hair.onnx"),
+) -> None:
+    """Write the network as ONNX with a batch axis, for crowds."""
+    import os
+
+    from neuralocks_core import model as model_file
+
+    data = model_file.read(model or model_file.shipped("rig"), "rig").graphs["rig.onnx"]
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        part = out.with_name(f".{out.name}.part")
+        part.write_bytes(data)
+        os.replace(part, out)
+    except OSError as error:
+        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
+    typer.echo(f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz")
+
+
+@command("inspect")
+def inspect(
+    character: Annotated[Path, typer.Argument(help="USD file.")],
+    chains: Chains = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    as_json: Json = False,
+) -> None:
+    """List the hair chains of a rig with their lengths and joint counts."""
+    from .rig_stage import describe_chains, read_rigged_hair, weight_notes
+
+    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains)
+    rows = describe_chains(hair)
+    if as_json:
+        print_json({"skeleton": hair.source.path, "chains": rows, "notes": weight_notes(hair.source)})
+        return
+    typer.echo(f"{hair.source.path}: {len(hair.rig.chains)} hair joints in {len(rows)} chains")
+    for row in rows:
+        typer.echo(f"  {row['name']}: {row['joints']} joints, {100 * row['length']:.1f} cm")
+    note(weight_notes(hair.source))
+
+
+def report_lines(report: dict) -> list[str]:
+    """A model's report in words."""
+    lines = []
+    if "energy" in report:
+        e = report["energy"]
+        lines.append(
+            f"energy {e['network']:.3f} m^2/s^2, direct optimisation {e['optimised']:.3f}, carried rigidly {e['rigid']:.3f}"
+        )
+    for name, words in (("network", "network"), ("rigid", "carried rigidly")):
+        if f"penetration_{name}" in report:
+            p = report[f"penetration_{name}"]
+            lines.append(f"inside the body, {words}: {p['percent']:.2f} % of vertices, at most {p['worst_mm']:.1f} mm")
+    for name, row in report.get("motion_error", {}).items():
+        lines.append(f"motion error against the simulation, {name}: {row:.3f}")
+    return lines
