@@ -165,7 +165,7 @@ def _some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
     roots = points[starts[:: max(1, len(starts) // most)]] if len(starts) else points[:1]
     roots = roots[np.isfinite(roots).all(axis=1)]
     if not len(roots):
-        raise NeuralocksError(f"{prim.GetPath()}: its points hold NaN or infinity; repair the groom")
+        raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
     return roots
 
 

@@ -8,7 +8,7 @@ no trace in the file.
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,13 +133,7 @@ def _write(shot, model, material, strength, resolve, velocities, jobs, codes, sp
             frames = _Frames(shot, item, model, material, strength, resolve, velocities, jobs)
             try:
                 for code in codes:
-                    arrays = spool.read(number, code, 1 + velocities, len(item.groom.points))
-                    resumed += arrays is not None
-                    if arrays is None:
-                        arrays = frames.at(code)
-                        behind.put(spool.write, number, code, arrays)
-                    behind.put(writer.sample, item, code, arrays[0], arrays[1] if velocities else None)
-                    del arrays
+                    resumed += _frame(spool, behind, writer, item, number, code, frames)
                     done += 1
                     say(done, total, item.path)
             finally:
@@ -154,47 +148,60 @@ def _write(shot, model, material, strength, resolve, velocities, jobs, codes, sp
     return resumed
 
 
+def _frame(
+    spool: Spool, behind: Behind, writer: OverrideWriter, item: StageGroom, number: int, code: float, frames
+) -> bool:
+    """One frame, one array after the other; whether it was there already."""
+    count = len(item.groom.points)
+    there = all(spool.holds(number, code, name, count) for name in frames.names)
+    arrays = (spool.read(number, code, name) for name in frames.names) if there else frames.at(code)
+    for name, array in zip(frames.names, arrays):
+        if not there:
+            behind.put(spool.write, number, code, name, array)
+        behind.put(writer.sample, item, code, name, array)
+        del array
+    return there
+
+
 class _Frames:
     """Samples of one groom in ascending order; the pose half-way between two frames is computed once."""
 
     def __init__(self, shot: Shot, item: StageGroom, model, material, strength, resolve, velocities, jobs):
         self._arguments = (item, model, material), {"strength": strength, "resolve": resolve, "jobs": jobs}
         self._poser: GroomPoser | None = None
-        self._velocities = velocities
+        self.names = ("points", "velocities") if velocities else ("points",)
         self._rate = shot.border.rate
         clip = item.attachment.rig.time_codes
-        moving = [t for t in (item.placement.samples[:1] + item.placement.samples[-1:])]
+        moving = item.placement.samples[:1] + item.placement.samples[-1:]
         self._first, self._last = min([clip[0], *moving]), max([clip[-1], *moving])
         self._kept: tuple[float, np.ndarray] | None = None
 
-    def at(self, code: float) -> list[np.ndarray]:
-        """Points and velocities (P, 3) float32, stage units and per second."""
+    def at(self, code: float) -> Iterator[np.ndarray]:
+        """Points, then velocities per second, (P, 3) float32; each can be let go before the next is made."""
         if self._poser is None:  # only now: a resumed bake may have nothing left to compute
             self._poser = GroomPoser(*self._arguments[0], **self._arguments[1])
-        if not self._velocities:
-            return [self._poser.points(code)]
         # Outside of its samples the animation stands still: differences are taken inside only, on one side at the ends.
         before, after = (min(max(t, self._first), self._last) for t in (code - HALF, code + HALF))
+        wanted = len(self.names) == 2
+        if wanted and after > before and (self._kept is None or self._kept[0] != before):
+            self._kept = before, self._poser.points(before)
+        yield self._poser.points(code)
+        if not wanted:
+            return
         if after <= before:
-            points = self._poser.points(code)
-            return [points, np.zeros_like(points)]
-        earlier = self._kept[1] if self._kept and self._kept[0] == before else self._points(before)
-        self._kept = None
-        points = self._points(code)
-        later = self._points(after)
-        np.subtract(later, earlier, out=earlier)
-        earlier *= np.float32(self._rate / (after - before))
+            yield np.zeros_like(self._poser.item.groom.points)
+            return
+        velocity, later = self._kept[1], self._poser.points(after)
         self._kept = after, later
-        return [points, earlier]
+        np.subtract(later, velocity, out=velocity)
+        velocity *= np.float32(self._rate / (after - before))
+        yield velocity
 
     def close(self) -> None:
         """Let threads and buffers go."""
         self._kept = None
         if self._poser is not None:
             self._poser.close()
-
-    def _points(self, code: float) -> np.ndarray:
-        return self._poser.points(code)
 
 
 def _check_out(out: Path) -> None:

@@ -8,18 +8,21 @@ import threading
 class Behind:
     """Runs calls one after another on a thread.
 
-    `put` waits while one call is running and another waits, so memory does not grow. The first error of a call is
-    raised from the next `put`, or at the end; later calls are then dropped.
+    `put` waits until the call before is done, so that no more than the arrays of one call are held. The first error of
+    a call is raised from the next `put`, or at the end; later calls are then dropped.
     """
 
-    def __init__(self, waiting: int = 1):
-        self._calls: queue.Queue = queue.Queue(waiting)
+    def __init__(self):
+        self._calls: queue.Queue = queue.Queue()
+        self._free = threading.Semaphore(1)
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="write", daemon=True)
 
     def put(self, function, *arguments) -> None:
-        """Queue a call."""
+        """Start a call."""
+        self._free.acquire()
         if self._error is not None:
+            self._free.release()
             raise self._error
         self._calls.put((function, arguments))
 
@@ -43,4 +46,5 @@ class Behind:
                     function(*arguments)
                 except BaseException as error:
                     self._error = error
-            call = arguments = None  # the arrays of a frame are freed before the next is waited for
+            call = arguments = None  # the arrays of a frame are freed before the next may come
+            self._free.release()

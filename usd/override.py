@@ -57,21 +57,22 @@ class OverrideWriter:
         if velocities:
             Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
 
-    def sample(self, item: StageGroom, time_code: float, points: np.ndarray, velocities: np.ndarray | None) -> None:
-        """Add one time sample."""
-        path = item.prim.GetPath()
-        pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
-        extent = np.stack([points.min(axis=0) - pad, points.max(axis=0) + pad])
-        values = {"extent": extent, "points": points, "velocities": velocities}
+    def sample(self, item: StageGroom, time_code: float, name: str, value: np.ndarray) -> None:
+        """Add one time sample of `points` (and of the extent with it) or `velocities`, (P, 3) float32."""
         with _named(self._out):
-            for name, value in values.items():
-                if value is not None:
-                    # Flat arrays convert a fifth faster than rows of three.
-                    array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value).reshape(-1))
-                    self._layer.SetTimeSample(path.AppendProperty(name), float(time_code), array)
-                    self._held += value.nbytes
+            if name == "points":
+                pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
+                extent = np.stack([value.min(axis=0) - pad, value.max(axis=0) + pad])
+                self._set(item, time_code, "extent", extent)
+            self._set(item, time_code, name, value)
             if self._held >= SAVE_EVERY:
                 self._save()
+
+    def _set(self, item: StageGroom, time_code: float, name: str, value: np.ndarray) -> None:
+        # Flat arrays convert a fifth faster than rows of three.
+        array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value).reshape(-1))
+        self._layer.SetTimeSample(item.prim.GetPath().AppendProperty(name), float(time_code), array)
+        self._held += value.nbytes
 
     def close(self) -> None:
         """Write what is held."""

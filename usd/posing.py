@@ -53,6 +53,7 @@ class GroomPoser:
         self._sampler = model.sampler(character, attachment.rig.clip)
         self._session = model.prepare(self.strands)
         self._session.anchor(self._sampler.held_bind(self._material))
+        self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
         self._resolver = None
         if resolve and character.body is not None:
             from neuralocks_core.resolve import Resolver

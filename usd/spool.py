@@ -58,25 +58,24 @@ class Spool:
         # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
 
-    def read(self, groom: int, time_code: float, arrays: int, points: int) -> list[np.ndarray] | None:
-        """The arrays (points, 3) of a finished frame, or None."""
-        path = self._path(groom, time_code)
+    def holds(self, groom: int, time_code: float, name: str, points: int) -> bool:
+        """Whether an array (points, 3) of a frame is there, as a whole."""
         try:
-            if path.stat().st_size != arrays * points * 12:
-                return None
-            data = np.fromfile(path, np.float32).reshape(arrays, points, 3)
+            return self._path(groom, time_code, name).stat().st_size == points * 12
         except OSError:
-            return None
-        return list(data)
+            return False
 
-    def write(self, groom: int, time_code: float, arrays: list[np.ndarray]) -> None:
-        """Keep a finished frame."""
-        path = self._path(groom, time_code)
+    def read(self, groom: int, time_code: float, name: str) -> np.ndarray:
+        """An array (points, 3) float32 that `holds` says is there."""
+        return np.fromfile(self._path(groom, time_code, name), np.float32).reshape(-1, 3)
+
+    def write(self, groom: int, time_code: float, name: str, array: np.ndarray) -> None:
+        """Keep an array (points, 3) of a finished frame."""
+        path = self._path(groom, time_code, name)
         part = path.with_suffix(".part")
         try:
             with open(part, "wb") as file:
-                for array in arrays:
-                    file.write(np.ascontiguousarray(array, np.float32).data)
+                file.write(np.ascontiguousarray(array, np.float32).data)
             os.replace(part, path)
         except OSError as error:
             raise cannot_write(self.out, error) from None
@@ -98,8 +97,8 @@ class Spool:
         self._lock.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _path(self, groom: int, time_code: float) -> Path:
-        return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+    def _path(self, groom: int, time_code: float, name: str) -> Path:
+        return self.folder / f"{groom}_{float(time_code).hex()}_{name}.frame"
 
 
 def fingerprint(files, values: dict) -> str:

@@ -200,13 +200,13 @@ def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
     command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
     spool = tmp_path / ".bake.usdc.baking"
-    while len(list(spool.glob("*.frame"))) < 5 and process.poll() is None:
+    while len(list(spool.glob("*_velocities.frame"))) < 3 and process.poll() is None:
         time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert not out.exists() and spool.exists(), "the bake was over before it could be killed"
     result = bake(shot, out, model)
-    assert result.resumed >= 5
+    assert result.resumed >= 3
     assert out.read_bytes() == whole
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "bake.usdc"}
 

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What users get wrong gives one line that names the prim, file or argument, and leaves nothing behind."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from usd.bake import bake
+from usd.inspect import inspect
+
+from .shots import JOINTS, Recipe, write_shot
+
+HAIR, RIG, MOTION, SKIN = "/Hero/Hair", "/Hero/Rig", "/Hero/Rig/Motion", "/Hero/Skin"
+
+
+def edited(folder, edit, recipe=Recipe()):  # noqa: B008
+    """A shot with one thing broken."""
+    path = write_shot(folder, recipe)
+    stage = Usd.Stage.Open(str(path))
+    edit(stage)
+    stage.GetRootLayer().Save()
+    return path
+
+
+def attribute(path, name, value, time=None):
+    """An edit that sets an attribute."""
+
+    def edit(stage):
+        target = stage.GetPrimAtPath(path).GetAttribute(name)
+        target.Set(value) if time is None else target.Set(value, time)
+
+    return edit
+
+
+def changed(path, name, change, time=None):
+    """An edit that changes the value that an attribute has."""
+
+    def edit(stage):
+        target = stage.GetPrimAtPath(path).GetAttribute(name)
+        code = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
+        value = target.Get(code)
+        change(value) if not isinstance(value, float) else None
+        target.Set(value, code)
+
+    return edit
+
+
+def scaled_root(*scale):
+    def edit(stage):
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddScaleOp().Set(Gf.Vec3f(*scale))
+
+    return edit
+
+
+def unbound(stage):
+    stage.GetPrimAtPath(RIG).GetRelationship("skel:animationSource").SetTargets([])
+
+
+def renamed(stage):
+    """No joint's name says head, and nothing binds the groom."""
+    names = [f"bone{i}" for i in range(len(JOINTS))]
+    paths = [names[0], *(f"{names[0]}/{n}" for n in names[1:])]
+    stage.GetPrimAtPath(RIG).GetAttribute("joints").Set(paths)
+    stage.GetPrimAtPath(MOTION).GetAttribute("joints").Set(paths)
+
+
+def assign(index, value):
+    def change(array):
+        array[index] = value
+
+    return change
+
+
+NAN = float("nan")
+BROKEN = {
+    "nan points": (changed(HAIR, "points", assign(7, Gf.Vec3f(NAN, 0, 0))), HAIR, "not finite"),
+    "all nan": (attribute(HAIR, "points", Vt.Vec3fArray(480, Gf.Vec3f(NAN))), HAIR, "not finite"),
+    "infinite points": (changed(HAIR, "points", assign(8, Gf.Vec3f(float("inf"), 0, 0))), HAIR, "not finite"),
+    "ragged counts": (changed(HAIR, "curveVertexCounts", assign(0, 11)), HAIR, "sum to"),
+    "negative count": (changed(HAIR, "curveVertexCounts", assign(0, -12)), HAIR, "negative"),
+    "no strands": (attribute(HAIR, "curveVertexCounts", []), HAIR, "no strands"),
+    "no points": (attribute(HAIR, "points", []), HAIR, "no points"),
+    "far points": (changed(HAIR, "points", assign(9, Gf.Vec3f(1e30, 0, 0))), HAIR, "check the unit"),
+    "bad joint index": (attribute(HAIR, "primvars:skel:jointIndices", [99]), HAIR, "joint index"),
+    "nan weight": (attribute(HAIR, "primvars:skel:jointWeights", [NAN]), HAIR, "weights"),
+    "short skin": (attribute(SKIN, "primvars:skel:jointIndices", [0, 1]), SKIN, "joint indices"),
+    "nan skin": (changed(SKIN, "points", assign(0, Gf.Vec3f(NAN))), SKIN, "NaN"),
+    "bad face": (changed(SKIN, "faceVertexIndices", assign(0, 9999)), SKIN, "face"),
+    "no animation": (unbound, RIG, "no animation"),
+    "nan rotation": (changed(MOTION, "rotations", assign(3, Gf.Quatf(NAN)), 4), MOTION, "NaN"),
+    "null rotation": (changed(MOTION, "rotations", assign(3, Gf.Quatf(0, 0, 0, 0)), 4), MOTION, "null rotation"),
+    "short animation": (attribute(MOTION, "translations", [Gf.Vec3f(0)], 4), MOTION, "for 8 joints"),
+    "few binds": (attribute(RIG, "bindTransforms", [Gf.Matrix4d(1)]), RIG, "for 8 joints"),
+    "flat bind": (changed(RIG, "bindTransforms", assign(3, Gf.Matrix4d(0))), RIG, "zero scale"),
+    "nan bind": (changed(RIG, "bindTransforms", assign(3, Gf.Matrix4d(NAN))), RIG, "NaN"),
+    "no joints": (attribute(RIG, "joints", []), RIG, "no joints"),
+    "double joint": (attribute(RIG, "joints", ["a"] * 8), RIG, "twice"),
+    "child first": (attribute(RIG, "joints", ["a/b", "a", *"cdefgh"]), RIG, "before its parent"),
+    "mirrored root": (scaled_root(-1, 1, 1), RIG, "mirrored"),
+    "flat root": (scaled_root(1, 0, 1), "/Hero", "zero scale"),
+    "nan root": (scaled_root(1, NAN, 1), "/Hero", "NaN"),
+    "stray key": (attribute(MOTION, "translations", [Gf.Vec3f(0)] * 8, 1e9), RIG, "stray keys"),
+    "no unit": (lambda stage: UsdGeom.SetStageMetersPerUnit(stage, 0), "shot.usda", "metersPerUnit"),
+    "no rate": (lambda stage: stage.SetTimeCodesPerSecond(0), "shot.usda", "timeCodesPerSecond"),
+    "no groom": (lambda stage: stage.RemovePrim(HAIR), "shot.usda", "no groom"),
+    "no skeleton": (lambda stage: stage.RemovePrim(RIG), "shot.usda", "no UsdSkel skeleton"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_stage_is_named_in_one_line(tmp_path, model, case):
+    edit, subject, fact = BROKEN[case]
+    path = edited(tmp_path, edit)
+    with pytest.raises(NeuralocksError) as caught:
+        bake(path, tmp_path / "out.usdc", model)
+    message = str(caught.value)
+    assert subject in message and fact in message and "; " in message and "\n" not in message
+    assert [p.name for p in tmp_path.iterdir()] == ["shot.usda"]
+    try:
+        facts = inspect(path)
+    except NeuralocksError as error:
+        assert fact in str(error)
+    else:
+        assert any(fact in line for line in facts["stops"])
+
+
+def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
+    path = edited(tmp_path, renamed, Recipe(bound="none"))
+    try:
+        bake(path, tmp_path / "out.usdc", model)
+    except NeuralocksError as error:
+        assert "--head" in str(error)
+    assert bake(path, tmp_path / "out.usdc", model, head="bone3").grooms[0]["joint"].endswith("bone3")
+
+
+WRONG = {
+    "prim": ({"grooms": ["/Hero/Nope"]}, "/Hero/Nope: no such prim"),
+    "no prim path": ({"grooms": ["Hair"]}, "Hair: no prim path"),
+    "not a groom": ({"grooms": ["/Hero/Skin"]}, "without BasisCurves"),
+    "skeleton": ({"skeleton": "/Nope"}, "/Nope: no such skeleton"),
+    "head": ({"head": "nose"}, "nose"),
+    "frames": ({"frames": "5:1"}, "5:1"),
+    "words as frames": ({"frames": "a:b"}, "a:b"),
+    "endless frames": ({"frames": "0:1e12"}, "samples"),
+    "jobs": ({"jobs": 0}, "--jobs 0"),
+    "subframes": ({"subframes": 0}, "--subframes 0"),
+    "material": ({"material": ["colour=3"]}, "colour"),
+    "material range": ({"material": ["bend=1e9"]}, "bend"),
+    "model": ({"model": "nope.neuralocks"}, "nope.neuralocks"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_argument_is_named(tmp_path, model, case):
+    arguments, text = WRONG[case]
+    recipe = Recipe(bound="none") if case == "head" else Recipe()
+    with pytest.raises(NeuralocksError, match=text.replace("(", ".")):
+        bake(write_shot(tmp_path, recipe), tmp_path / "out.usdc", **{"model": model, **arguments})
+    assert [p.name for p in tmp_path.iterdir()] == ["shot.usda"]
+
+
+@pytest.mark.parametrize("content", [b"", b"PXR-USDC" + bytes(80), b"#usda 1.0\ndef (", b"PK\x03\x04junk"])
+@pytest.mark.parametrize("extension", ["usda", "usdc", "usdz"])
+def test_no_usd_file_is_said_so(tmp_path, model, content, extension):
+    path = tmp_path / f"bad.{extension}"
+    path.write_bytes(content)
+    with pytest.raises(NeuralocksError, match="bad"):
+        bake(path, tmp_path / "out.usdc", model)
+
+
+def test_truncated_crate_is_refused(tmp_path, model):
+    path = write_shot(tmp_path, Recipe(extension="usdc"))
+    data = path.read_bytes()
+    path.unlink()
+    for size in (10, 60, len(data) // 2, len(data) - 5):
+        cut = tmp_path / f"cut{size}.usdc"
+        cut.write_bytes(data[:size])
+        with pytest.raises(NeuralocksError):
+            bake(cut, tmp_path / "out.usdc", model)
+        cut.unlink()
+    assert not list(tmp_path.iterdir())
+
+
+def test_one_frame_is_a_held_pose(tmp_path, model):
+    result = bake(write_shot(tmp_path, Recipe(frames=1)), tmp_path / "out.usdc", model)
+    assert result.frames == [1.0] and any("one sample" in note for note in result.notes)
+    layer = Sdf.Layer.FindOrOpen(str(result.path))
+    assert not np.any(layer.QueryTimeSample(f"{HAIR}.velocities", 1.0))
+
+
+def test_missing_blend_shapes_and_references_are_noted(tmp_path, model):
+    def edit(stage):
+        binding = UsdSkel.BindingAPI(stage.GetPrimAtPath(SKIN))
+        binding.CreateBlendShapesAttr(["smile", "frown"])
+        binding.CreateBlendShapeTargetsRel().SetTargets([f"{SKIN}/smile"])
+        stage.GetPrimAtPath("/Hero").GetReferences().AddReference("./missing.usd")
+
+    result = bake(edited(tmp_path, edit), tmp_path / "out.usdc", model)
+    assert any("blend shape" in note for note in result.notes)
+    assert any("missing.usd" in note for note in result.notes)
+
+
+def test_strands_without_length_follow_the_head(tmp_path, model):
+    def edit(stage):
+        target = stage.GetPrimAtPath(HAIR).GetAttribute("points")
+        points = np.array(target.Get())
+        points[12:24] = points[12]
+        target.Set(Vt.Vec3fArray.FromNumpy(points))
+
+    result = bake(edited(tmp_path, edit), tmp_path / "out.usdc", model, frames=[5])
+    assert any("1 of 40 strands" in note for note in result.notes)
+    points = np.asarray(Sdf.Layer.FindOrOpen(str(result.path)).QueryTimeSample(f"{HAIR}.points", 5.0))
+    assert np.isfinite(points).all() and np.ptp(points[12:24], axis=0).max() < 1e-6
+
+
+def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
+    shot = write_shot(tmp_path)
+    target = tmp_path / "file"
+    target.write_text("")
+    with pytest.raises(NeuralocksError, match="cannot be written"):
+        bake(shot, target / "out.usdc", model)  # a file where a folder should be
+
+    import usd.spool as spool
+
+    def full(self, *arguments):
+        raise spool.cannot_write(self.out, OSError(28, "No space left on device"))
+
+    monkeypatch.setattr(spool.Spool, "write", full)
+    with pytest.raises(NeuralocksError, match="no space left"):
+        bake(shot, tmp_path / "out.usdc", model)
+    monkeypatch.setattr("usd.bake.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))
+    with pytest.raises(NeuralocksError, match="needs"):
+        bake(shot, tmp_path / "out.usdc", model)
+    assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "file"}
