@@ -14,6 +14,8 @@ MOST_SAMPLES = 400_000
 BAND = 0.01
 """Points farther from the surface than this [m] are not looked for by `near`. A strand that enters the body passes
 nearer with some vertex: it is half of the longest segment that hair of half a metre has."""
+CELL = 0.012
+"""Width of the cells of the first sieve [m]; two of them are more than BAND and the distance between samples."""
 CURVED = 0.003
 """How far a surface may bend away from the plane of its nearest sample [m]."""
 
@@ -60,20 +62,26 @@ class Collider:
             proven: go on until no other triangle can be nearer; else only those around the nearest four samples are
                 looked at, which may miss the nearest one by a fraction of a millimetre.
         """
+        distance, normal, _ = self.closest(points, limit, proven)
+        return distance, normal
+
+    def closest(self, points: np.ndarray, limit: float = 0.03, proven: bool = True):
+        """As `distance`, and the index (...,) of the nearest triangle among `triangles`."""
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
-            return np.zeros(shape), np.zeros((*shape, 3))
+            return np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape, int)
         rough, sample = self._tree.query(points, workers=-1)
         triangle = self._owner[sample]
         closest = self._tree.data[sample]
         normal = self._normals[triangle]
         near = np.flatnonzero(rough <= limit + self._reach)
-        closest, normal = closest.copy(), normal.copy()
+        closest, normal, triangle = closest.copy(), normal.copy(), triangle.copy()
         pending, k = near, 8 if proven else 4
         while len(pending):
             count = min(k, self._tree.n)
             far, found = self._tree.query(points[pending], k=np.arange(1, count + 1), workers=-1)
-            closest[pending], normal[pending], best = self._nearest(points[pending], self._owner[found])
+            nearest = self._nearest(points[pending], self._owner[found])
+            closest[pending], normal[pending], triangle[pending], best = nearest
             done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
             pending, k = pending[~done], 4 * k
         offset = points - closest
@@ -82,28 +90,60 @@ class Collider:
         # On the surface the offset has no direction: the surface's own normal takes over.
         along = sign[:, None] * offset / np.maximum(length, 1e-30)[:, None]
         direction = np.where(length[:, None] > 1e-9, along, normal)
-        return (sign * length).reshape(shape), direction.reshape(*shape, 3)
+        return (sign * length).reshape(shape), direction.reshape(*shape, 3), triangle.reshape(shape)
 
     def near(self, points: np.ndarray, reach: float) -> np.ndarray:
-        """Indices (n,) of the points (N, 3) that may lie less than `reach` [m] outside, or inside: a cheap first sieve.
+        """Indices (n,) of the points (N, 3) that may lie less than `reach` [m] outside, or inside: a cheap sieve.
 
         Each point is judged by the plane of its nearest surface sample, with room for the surface's curvature.
         """
-        far, sample = self._tree.query(points, distance_upper_bound=BAND + self._reach, workers=-1)
-        close = np.flatnonzero(np.isfinite(far))
-        sample = sample[close]
+        close = np.flatnonzero(self.around(points))
+        far, sample = self._tree.query(points[close], distance_upper_bound=BAND + self._reach, workers=-1)
+        found = np.isfinite(far)
+        close, sample = close[found], sample[found]
         height = ((points[close] - self._tree.data[sample]) * self._normals[self._owner[sample]]).sum(axis=1)
         return close[height < reach + CURVED]
 
+    def around(self, points: np.ndarray) -> np.ndarray:
+        """Which points (N, 3) lie in a cell that is, or is nearly, next to the surface: the first, cheapest sieve."""
+        low, marked = self._cells
+        if marked is None:
+            return np.ones(len(points), bool)
+        cell = ((points - low) / CELL).astype(np.int32)
+        size = np.array(marked.shape)
+        inside = ((cell >= 0) & (cell < size)).all(axis=1) & (points >= low).all(axis=1)
+        flat = np.ravel_multi_index(tuple(np.clip(cell, 0, size - 1).T), marked.shape)
+        return inside & marked.ravel()[flat]
+
+    @cached_property
+    def _cells(self):
+        """Low corner, and marks of the cells up to two away from one with a sample; None if there are too many."""
+        samples = self._tree.data
+        low = samples.min(axis=0) - 3 * CELL
+        size = ((samples.max(axis=0) - low) / CELL).astype(np.int64) + 4
+        if np.prod(size.astype(float)) > 4e6:
+            return low, None
+        marked = np.zeros(size, bool)
+        marked[tuple(((samples - low) / CELL).astype(int).T)] = True
+        for axis in range(3):
+            for _ in range(2):
+                wide = marked.copy()
+                ahead, behind = ([slice(None)] * 3 for _ in range(2))
+                ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
+                wide[tuple(ahead)] |= marked[tuple(behind)]
+                wide[tuple(behind)] |= marked[tuple(ahead)]
+                marked = wide
+        return low, marked
+
     def _nearest(self, points, candidates):
-        """Closest point, pseudonormal there and distance, over candidate triangles (N, k) for points (N, 3)."""
+        """Closest point, pseudonormal there, triangle and distance, of candidate triangles (N, k), for (N, 3)."""
         corners = self.points[self.triangles[candidates]]
         place, feature = closest_on_triangle(points[:, None], *np.moveaxis(corners, -2, 0))
         squared = ((place - points[:, None]) ** 2).sum(axis=-1)
         best = squared.argmin(axis=1)
         rows = np.arange(len(points))
         triangle, feature = candidates[rows, best], feature[rows, best]
-        return place[rows, best], self._pseudonormals[triangle, feature], np.sqrt(squared[rows, best])
+        return place[rows, best], self._pseudonormals[triangle, feature], triangle, np.sqrt(squared[rows, best])
 
     @cached_property
     def _pseudonormals(self) -> np.ndarray:

@@ -5,6 +5,7 @@ import numpy as np
 
 from neuralocks_core.character import Body, Character
 from neuralocks_core.collider import Collider
+from neuralocks_core.head_field import HeadField, PosedBody
 from neuralocks_core.strands import StrandSet
 
 MARGIN = 0.001
@@ -39,6 +40,7 @@ class Resolver:
             points = self.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
             self.at_rest = Collider(points, self.body.triangles)
             self.rest_distance = self.at_rest.distance(strands.rest)[0]
+            self._fields: dict[bytes, HeadField] = {}
 
     def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
         """The body that the hair can reach, posed by world joint transforms (J, 4, 4), in canonical space."""
@@ -48,12 +50,26 @@ class Resolver:
         skinning = to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
         return Collider(self.body.posed(skinning, shape), self.body.triangles)
 
+    def _quick(self, joints: np.ndarray, shape: np.ndarray | None) -> PosedBody:
+        """As `collider`, with what moves rigidly with the head looked up in a grid, made once for a body shape."""
+        shape = None if shape is None else np.asarray(shape, float)
+        key = b"" if shape is None else shape.tobytes()
+        if key not in self._fields:
+            if len(self._fields) > 8:
+                self._fields.clear()
+            to_canonical = np.linalg.inv(self.character.canonical_to_bind)
+            points = self.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+            self._fields[key] = HeadField(points, self.body.triangles, _moves_with_head(self.character, self.body))
+        to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
+        posed = self.body.posed(to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind, shape)
+        return PosedBody(self._fields[key], posed)
+
     def displacement(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:
         """The network's displacement (S, 24, 3) [m] for a pose, changed where it leaves hair inside the body."""
         if self.body is None:
             return displacement
         points = self.strands.rest + displacement
-        resolved = resolve(points, self.collider(joints, shape), self.rest_distance)
+        resolved = resolve(points, self._quick(joints, shape), self.rest_distance)
         if resolved is points:
             return displacement
         moved = (resolved != points).any(axis=(1, 2)) & self.strands.valid
@@ -62,11 +78,13 @@ class Resolver:
         return result
 
 
-def resolve(points: np.ndarray, collider: Collider, rest_distance: np.ndarray, margin: float = MARGIN) -> np.ndarray:
+def resolve(
+    points: np.ndarray, collider: Collider | PosedBody, rest_distance: np.ndarray, margin: float = MARGIN
+) -> np.ndarray:
     """Strands without vertices inside the body.
 
-    Strands that touch nothing come back bit for bit. The others are laid over the planes of the surface under them, from
-    the root on and with every length kept, until nothing is inside any more. A strand depends on itself and on the
+    Strands that touch nothing come back bit for bit. The others are laid over the planes of the surface under them,
+    from the root on and with every length kept, until nothing is inside any more. A strand depends on itself and on the
     body only: neither the order of strands nor their division into chunks matters.
 
     Args:
@@ -151,6 +169,12 @@ def _violates(points: np.ndarray, collider: Collider, low: np.ndarray, margin: f
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def _moves_with_head(character: Character, body: Body) -> np.ndarray:
+    """Which vertices (V,) follow the head joint and nothing else, so that they stand still in canonical space."""
+    own = np.sum(body.joint_weights * (body.joint_indices == character.head), axis=1)
+    return own > 1 - 1e-5
 
 
 def _within_reach(character: Character, strands: StrandSet) -> Body | None:
