@@ -76,6 +76,7 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
             "character": str(character),
             "out": out,
             "minutes": context.scene.neuralocks.train_minutes,
+            "head": sampled.character.skeleton.names[sampled.character.head],
         }
         stop()
         _jobs.append(TrainingJob(training_python(), settings))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One hairstyle on one character, ready to give its points at any time: what the live view draws."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
@@ -9,6 +11,13 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands import Carrier, strand_set
+
+
+BLOCK_POINTS = 24_576
+"""Points worked on at a time: they stay in a core's cache, and a product of so few rows by a 3x3 matrix stays on its
+core instead of waking BLAS threads that wait for each other."""
+CHUNK = 512
+"""Strands that the runtime takes at a time; blocks are made of whole ones."""
 
 
 class LiveHair:
@@ -28,9 +37,12 @@ class LiveHair:
         self._session = model.prepare(strands)
         self._sampler: BoundarySampler | None = None
         self._clip: Clip | None = None
-        self._bind = np.empty((len(groom.points), 3), np.float32)
-        self._world = np.empty_like(self._bind)
-        self._displacement = np.empty((len(strands.rest), strands.rest.shape[1], 3), np.float32)
+        self._points = np.empty((len(groom.points), 3), np.float32)
+        count = groom.strand_count
+        step = CHUNK * max(1, int(BLOCK_POINTS / max(len(groom.points) / count, 1)) // CHUNK)
+        self._blocks = [slice(low, min(low + step, count)) for low in range(0, count, step)]
+        self._ends = np.concatenate([groom.starts, [len(groom.points)]])
+        self._pool = ThreadPoolExecutor(model.threads, thread_name_prefix="live")
 
     def follow(self, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
@@ -54,9 +66,22 @@ class LiveHair:
         """
         vector = self._sampler.vectors([time], material, strength, joints[None])[0]
         self._session.anchor(self._sampler.held_bind(material))
-        displacement = self._session.displacement(vector, out=self._displacement)
-        self._carrier.carry(displacement, self._bind)
         matrix = to_local @ self.character.carrying(joints)
-        np.matmul(self._bind, matrix[:3, :3].T.astype(np.float32), out=self._world)
-        self._world += matrix[:3, 3].astype(np.float32)
-        return self._world
+        linear = np.ascontiguousarray(matrix[:3, :3].T, np.float32)
+        # From the head's own place, so that coordinates far from the origin cost no digits.
+        centre = self.character.canonical_to_bind[:3, 3].astype(np.float32)
+        origin = (matrix[:3, :3] @ centre.astype(float) + matrix[:3, 3]).astype(np.float32)
+
+        def work(strands: slice) -> None:
+            out = self._points[self._ends[strands.start] : self._ends[strands.stop]]
+            self._carrier.carry(self._session.displacement(vector, strands), out, strands)
+            out -= centre
+            np.matmul(out, linear, out=out)
+            out += origin
+
+        if len(self._blocks) == 1:
+            work(self._blocks[0])
+        else:
+            for _ in self._pool.map(work, self._blocks):
+                pass
+        return self._points

@@ -12,7 +12,7 @@ def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
     if "--check" in sys.argv:
         try:
-            for needed in ("torch", "neuralocks_core.training.train", "usd.training"):
+            for needed in ("torch", "warp", "usd.train"):
                 importlib.import_module(needed)
         except ImportError as error:
             print(f"it lacks '{error.name}'", file=sys.stderr)
@@ -38,14 +38,22 @@ def _printer(stream):
 
 
 def _train_strands(settings: dict, say) -> None:
-    from neuralocks_core.training.regression import RegressionOptions
-    from neuralocks_core.training.train import train_strands
-    from usd.training import training_scene
+    from usd.train import train
 
     say(0, 1, "Reading the character")
-    scene = training_scene(settings["character"], motion=[settings["character"]], seed=0)
-    options = RegressionOptions(minutes=settings["minutes"])
-    train_strands(scene, settings["out"], options, rollouts=settings.get("rollouts", 1200), progress=say)
+    character, minutes = settings["character"], settings["minutes"]
+    # A short training cannot use more simulations than it has time to make.
+    rollouts = settings.get("rollouts") or max(24, min(1200, int(80 * minutes)))
+    train(
+        character,
+        [],
+        [character],
+        settings["out"],
+        {"minutes": minutes},
+        head=settings.get("head"),
+        rollouts=rollouts,
+        progress=say,
+    )
 
 
 def _train_rig(settings: dict, say) -> None:

@@ -152,7 +152,10 @@ def rest_is_safe(folder: Path) -> None:
     groomed = np.array([p.position for p in strands.data.points])
     _live(rig, strands)
     moved = _at(strands, 14)
-    own = lambda: np.array([p.position for p in bpy.data.objects["Hair"].data.points])
+
+    def own():
+        return np.array([p.position for p in bpy.data.objects["Hair"].data.points])
+
     assert _apart(own(), groomed) > 1e-3
 
     file = folder / "live.blend"
