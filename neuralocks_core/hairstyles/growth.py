@@ -31,6 +31,12 @@ class Site:
     own: np.ndarray
     """(S, 4) random numbers in 0..1."""
 
+    def rows(self, part: slice) -> Site:
+        """Some of the strands; `guide` still counts all of them."""
+        roots = Roots(self.roots.place[part], self.roots.normal[part], self.roots.border[part])
+        rest = (getattr(self, field)[part] for field in ("seen", "clump", "guide", "of_clump", "own"))
+        return Site(roots, *rest)
+
     def along_scalp(self, direction: np.ndarray) -> np.ndarray:
         """(S, 3) unit: a direction (S, 3) or (3,) laid flat on the scalp."""
         normal = self.roots.normal
@@ -62,9 +68,25 @@ class Plan:
     cut: np.ndarray
     """(S,) height in head radii from the head's centre at which scissors cut; -inf nowhere."""
 
+    def rows(self, part: slice) -> Plan:
+        """Some of the strands."""
+        return Plan(**{field: value[part] for field, value in vars(self).items()})
+
+
+CHUNK = 4096
+"""Strands worked on at a time: their arrays stay in the processor's cache."""
+
 
 def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
-    """(S, steps, 3) [m] strands from their roots, cut and divided evenly."""
+    """(S, steps, 3) float32 [m] strands from their roots, cut and divided evenly."""
+    points = np.empty((len(plan.length), steps, 3), np.float32)
+    for start in range(0, len(points), CHUNK):
+        part = slice(start, start + CHUNK)
+        points[part] = _march(site.rows(part), plan.rows(part), scalp, obstacle, steps)
+    return points
+
+
+def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
     size = scalp.radius / 0.1
     length = plan.length * size
     step = length / (steps - 1)

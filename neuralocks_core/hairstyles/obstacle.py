@@ -12,6 +12,8 @@ from .scalp import Scalp
 _CELL = 0.08
 """Grid spacing in head radii (7 mm on an adult)."""
 
+_CHUNK = 8192
+
 
 class Obstacle:
     """Signed distance around the head, sampled on a grid once and interpolated linearly.
@@ -44,6 +46,13 @@ class Obstacle:
         Args:
             points: (N, 3) [m]; outside the grid the nearest value on its border is taken.
         """
+        distance, out = np.empty(len(points), np.float32), np.empty((len(points), 3), np.float32)
+        for start in range(0, len(points), _CHUNK):  # no more at a time than the cache holds
+            part = slice(start, start + _CHUNK)
+            distance[part], out[part] = self._distance(points[part])
+        return distance, out
+
+    def _distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at = (points - self._low) / self._step
         at = np.clip(at, 0.0, self._shape - 1.001).astype(np.float32)
         cell = at.astype(np.int64)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .growth import Site, at_vertices, smooth, unit
+from .growth import CHUNK, Site, at_vertices, smooth, unit
 from .obstacle import Obstacle
 
 
@@ -48,11 +48,20 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
         obstacle: what they keep out of.
         size: head radius in units of 0.1 m.
     """
-    count, steps = axis.shape[:2]
-    points = _clumped(axis, site, shape.clumping, size)
-    if shape.vertices != steps:
-        place = np.linspace(0.0, steps - 1, shape.vertices)
-        points = _rounded(points, np.broadcast_to(place, (count, shape.vertices)))
+    gathered = _clumped(axis, site, shape.clumping, size)
+    points = np.empty((len(axis), shape.vertices, 3), np.float32)
+    for start in range(0, len(axis), CHUNK):
+        part = slice(start, start + CHUNK)
+        points[part] = _swung(gathered[part], site.rows(part), shape, obstacle, size)
+    points[:, 0] = axis[:, 0]
+    return points
+
+
+def _swung(points: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size: float) -> np.ndarray:
+    """`shaped` after the clumps, strand by strand."""
+    if shape.vertices != points.shape[1]:
+        place = np.linspace(0.0, points.shape[1] - 1, shape.vertices)
+        points = _rounded(points, np.broadcast_to(place, (len(points), shape.vertices)))
     share = np.linspace(0.0, 1.0, shape.vertices)
     length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1, keepdims=True)
     arc = length * share
@@ -76,7 +85,7 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
     if shape.frizz:
         wander = _wander(site.own, arc / size)
         points = points + shape.frizz * size * smooth(arc / (0.03 * size))[..., None] * wander
-    return _clear(points.astype(np.float32), arc, obstacle, size, axis[:, 0])
+    return _clear(points, arc, obstacle, size)
 
 
 def _clumped(points: np.ndarray, site: Site, strength: float, size: float) -> np.ndarray:
@@ -126,16 +135,10 @@ def _wander(own: np.ndarray, arc: np.ndarray) -> np.ndarray:
     return wander
 
 
-def _clear(
-    points: np.ndarray, arc: np.ndarray, obstacle: Obstacle, size: float, root: np.ndarray
-) -> np.ndarray:
-    """Strands outside the skin; the root stays in it."""
+def _clear(points: np.ndarray, arc: np.ndarray, obstacle: Obstacle, size: float) -> np.ndarray:
+    """Strands outside the skin."""
     margin = (0.0005 + 0.002 * smooth(arc / (0.02 * size))) * size
-    for start in range(0, len(points), 8192):
-        part = slice(start, start + 8192)
-        flat, wanted = points[part].reshape(-1, 3), margin[part].ravel()
-        for _ in range(2):
-            flat = obstacle.push_out(flat, wanted)
-        points[part] = flat.reshape(points[part].shape)
-    points[:, 0] = root
-    return points
+    flat = points.reshape(-1, 3)
+    for _ in range(2):
+        flat = obstacle.push_out(flat, margin.ravel())
+    return flat.reshape(points.shape)
