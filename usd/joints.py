@@ -33,6 +33,7 @@ class JointSource:
 
     def __init__(self, prim: Usd.Prim):
         self.prim, self.path = prim, str(prim.GetPath())
+        self._stage = prim.GetStage()  # a prim alone does not keep its stage open
         self.notes: list[str] = []
         skeleton = UsdSkel.Skeleton(prim)
         self.names = tuple(str(name) for name in skeleton.GetJointsAttr().Get() or ())

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: the same as Python, statuses, one line of error, and a quick start."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from usd.bake import bake
+from usd.cli import main
+from usd.groom import import_groom, write_groom
+from usd.inspect import inspect
+
+from .shots import Recipe, write_shot
+
+ROOT = Path(__file__).parents[2]
+GROOMS = ROOT.parent / "shared" / "data" / "grooms"
+
+
+def status(*words) -> int:
+    """Exit status of a command line."""
+    with pytest.raises(SystemExit) as caught:
+        main([str(word) for word in words])
+    return int(caught.value.code or 0)
+
+
+def test_bake_is_the_python_function(tmp_path, model, capsys):
+    shot = write_shot(tmp_path, Recipe(unit=0.01))
+    words = ("bake", shot, "-o", tmp_path / "a.usdc", "--model", model, "--groom", "/Hero/Hair", "--frames", "2:6:2",
+             "--material", "bend=2x", "--material", "weight=1.2", "--jobs", "2", "--json")  # fmt: skip
+    assert status(*words) == 0
+    told = json.loads(capsys.readouterr().out)
+    bake(shot, tmp_path / "b.usdc", model, ["/Hero/Hair"], frames="2:6:2", material={"bend": "2x", "weight": 1.2})
+    assert (tmp_path / "a.usdc").read_bytes() == (tmp_path / "b.usdc").read_bytes()
+    assert told["frames"] == [2.0, 4.0, 6.0] and told["grooms"][0]["joint"].endswith("head")
+
+
+def test_errors_are_one_line_and_status_one(tmp_path, model, capsys):
+    for words in (
+        ("bake", tmp_path / "nope.usda", "-o", tmp_path / "a.usdc", "--model", model),
+        ("inspect", tmp_path / "nope.usda"),
+        ("import", tmp_path / "nope.tfx", "-o", tmp_path / "a.usdc"),
+        ("export", tmp_path / "nope.neuralocks", "-o", tmp_path),
+    ):
+        assert status(*words) == 1
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1 and captured.err.startswith("error: "), captured
+        assert "nope" in captured.err
+
+
+def test_wrong_usage_is_status_two(capsys):
+    assert status("bake") == 2
+    assert status("bake", "a.usd", "-o", "b.usdc", "--jobs", "many") == 2
+    assert status("unknown") == 2
+
+
+def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
+    import onnxruntime
+
+    assert status("export", model, "-o", tmp_path / "onnx") == 0
+    description = json.loads((tmp_path / "onnx" / "description.json").read_text())
+    for name, graph in description["graphs"].items():
+        session = onnxruntime.InferenceSession(tmp_path / "onnx" / name, providers=["CPUExecutionProvider"])
+        assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
+    assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
+    capsys.readouterr()
+
+
+def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", bound="mesh"))
+    assert status("inspect", shot, "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["unit [m]"], facts["up axis"], facts["rate [1/s]"], facts["frames"]) == (0.01, "Z", 24.0, [1.0, 9.0])
+    rig, groom = facts["skeletons"][0], facts["grooms"][0]
+    assert rig["head"].endswith("head") and abs(rig["head width [m]"] - 0.2) < 0.01 and rig["joints"] == 8
+    assert groom["strands"] == 40 and "Skin" in groom["carried by"] and facts["stops"] == []
+    assert status("inspect", shot) == 0
+    assert "head width [m]: 0.2" in capsys.readouterr().out
+
+
+def test_a_wrong_unit_is_noticed(tmp_path):
+    from pxr import Usd, UsdGeom
+
+    shot = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(shot))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.GetRootLayer().Save()
+    assert any("metersPerUnit" in line for line in inspect(shot)["spoils"])
+
+
+def test_help_comes_without_the_heavy_parts():
+    heavy = ("pxr", "numpy", "onnxruntime", "torch")
+    code = f"import sys; from usd.cli import app; print([m for m in {heavy} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+    words = [sys.executable, "-m", "usd", "--help"]
+    assert "bake" in subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_bake_needs_no_torch(tmp_path, model):
+    shot = write_shot(tmp_path)
+    code = (
+        "import sys\n"
+        "class Absent:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('torch', 'warp', 'bpy', 'onnx'): raise ModuleNotFoundError(name)\n"
+        "sys.meta_path.insert(0, Absent())\n"
+        f"from usd.bake import bake; bake({str(shot)!r}, {str(tmp_path / 'a.usdc')!r}, {str(model)!r}, frames='1:2')"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+    assert (tmp_path / "a.usdc").exists()
+
+
+@pytest.mark.skipif(not GROOMS.exists(), reason="../shared/data/grooms is not there")
+def test_a_hair_file_becomes_a_usd_groom(tmp_path, capsys):
+    import numpy as np
+    from pxr import Usd, UsdGeom, UsdValidation
+
+    file = GROOMS / "mohawk" / "ratboy_mohawk.tfx"
+    assert status("import", file, "-o", tmp_path / "groom.usdc", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    stage = Usd.Stage.Open(str(tmp_path / "groom.usdc"))
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    assert [e.GetMessage() for e in context.Validate(stage)] == []
+    prim = next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves))
+    counts = UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr().Get()
+    assert len(counts) == told["grooms"][0]["strands"] == 2228 and sum(counts) == told["grooms"][0]["vertices"]
+    uv = UsdGeom.PrimvarsAPI(prim).GetPrimvar("groom_root_uv")
+    assert uv.GetInterpolation() == "uniform" and len(uv.Get()) == 2228
+    # And once more through USD: nothing changes but the file.
+    again, _ = import_groom(tmp_path / "groom.usdc", tmp_path / "again.usda")
+    points = np.asarray(UsdGeom.BasisCurves(prim).GetPointsAttr().Get())
+    assert np.array_equal(again[0].points, points)
+    assert write_groom(tmp_path / "third.usda", again[0]).exists()

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading stages: poses as UsdSkel evaluates them, skin as UsdSkel deforms it, and which joint carries what."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from usd.border import Border
+from usd.stage import read_rigs, read_shot
+
+from .shots import HEAD, POSITIONS, Recipe, strand_points, write_shot
+
+BODY = Path(__file__).parents[2] / "examples" / "shot" / "shot.usda"
+
+
+@pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z")], ids=["m", "cm_z_up"])
+def test_poses_are_those_of_usd_skel(tmp_path, recipe):
+    shot = read_shot(write_shot(tmp_path, recipe))
+    rig, cache = shot.rigs[0], UsdSkel.Cache()
+    cache.Populate(UsdSkel.Root(shot.stage.GetPrimAtPath("/Hero")), Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(UsdSkel.Skeleton(shot.stage.GetPrimAtPath("/Hero/Rig")))
+    for code in (1.0, 3.5, 9.0, 20.0):
+        theirs = np.array(query.ComputeJointSkelTransforms(code)).swapaxes(-1, -2)
+        assert np.abs(rig.source.posed([code])[0] - theirs).max() < 1e-5
+    at_frame = rig.clip.at([shot.border.seconds(4.0)])[0]
+    assert np.abs(rig.joints_at(4.0) - at_frame).max() < 1e-9
+
+
+def test_bind_pose_comes_in_metres_y_up_whatever_the_stage(tmp_path):
+    for i, recipe in enumerate([Recipe(), Recipe(unit=0.01), Recipe(unit=0.0254, up="Z", nesting="/A/B/C")]):
+        rig = read_shot(write_shot(tmp_path, recipe, f"s{i}")).rigs[0]
+        assert np.abs(rig.character.skeleton.bind[:, :3, 3] - POSITIONS).max() < 1e-6
+        assert rig.character.head == HEAD
+        assert np.allclose(rig.character.facing, np.eye(3))
+        width = np.ptp(rig.character.body.points[rig.character.head_mask()][:, 0])
+        assert abs(width - 0.2) < 1e-3
+        inward = np.cross(
+            *np.diff(rig.character.body.points[rig.character.body.triangles[:150]], axis=1).swapaxes(0, 1)
+        )
+        centre = rig.character.body.points[rig.character.body.triangles[:150]].mean(1) - [0, 1.68, 0.02]
+        assert ((inward * centre).sum(1) > -1e-12).all()
+
+
+@pytest.mark.skipif(not BODY.exists(), reason="examples/shot is not in this checkout")
+def test_the_shipped_body_is_posed_as_usd_skel_deforms_it():
+    shot = read_shot(BODY)
+    rig = shot.rigs[0]
+    root = UsdSkel.Root(shot.stage.GetPrimAtPath("/Body"))
+    cache = UsdSkel.Cache()
+    cache.Populate(root, Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(UsdSkel.Skeleton(shot.stage.GetPrimAtPath(rig.path)))
+    mesh = shot.stage.GetPrimAtPath("/Body/Skin")
+    code = 60.0
+    points = Vt.Vec3fArray(UsdGeom.Mesh(mesh).GetPointsAttr().Get())
+    if not rig.clip.shape.any():
+        assert cache.GetSkinningQuery(mesh).ComputeSkinnedPoints(query.ComputeSkinningTransforms(code), points, code)
+        posed = rig.character.posed_body(rig.joints_at(code))
+        assert np.abs(posed - np.asarray(points)).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [("own", "own skel binding"), ("mesh", "on which it sits"), ("none", "name")]
+)
+def test_what_carries_the_groom_is_said(tmp_path, bound, words):
+    shot = read_shot(write_shot(tmp_path, Recipe(bound=bound)))
+    assert shot.grooms[0].joint == "hips/spine/neck/head"
+    assert words in shot.grooms[0].attachment.how
+    assert np.abs(shot.grooms[0].groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-6
+
+
+def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
+    free = read_shot(write_shot(tmp_path, Recipe(bound="none"), "free"), head="neck")
+    assert free.grooms[0].joint == "hips/spine/neck"
+    bound = read_shot(write_shot(tmp_path, Recipe(), "bound"), head="neck")
+    assert bound.grooms[0].joint == "hips/spine/neck/head"
+    assert any("--head neck is not used" in note for note in bound.notes)
+
+
+def test_each_groom_finds_its_own_character(tmp_path):
+    write_shot(tmp_path, Recipe(bound="mesh"), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for name, x in (("A", 0.0), ("B", 2.0)):
+        prim = UsdGeom.Xform.Define(stage, f"/{name}")
+        prim.AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
+        model = stage.DefinePrim(f"/{name}/Model")
+        model.GetReferences().AddReference("./asset.usda")
+    stage.GetRootLayer().Save()
+    shot = read_shot(tmp_path / "two.usda")
+    assert [(g.path, g.attachment.rig.path) for g in shot.grooms] == [
+        ("/A/Model/Hair", "/A/Model/Rig"),
+        ("/B/Model/Hair", "/B/Model/Rig"),
+    ]
+    only = read_shot(tmp_path / "two.usda", skeleton="/B/Model/Rig", grooms=["/B"])
+    assert [g.path for g in only.grooms] == ["/B/Model/Hair"]
+
+
+def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
+    """As exported by tools that bake a head constraint into the groom's transform."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    rig = read_shot(path).rigs[0]
+    stage = Usd.Stage.Open(str(path))
+    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
+    for frame in range(1, 10):
+        op.Set(Gf.Matrix4d(rig.character.carrying(rig.joints_at(frame)).T.tolist()), frame)
+    stage.GetRootLayer().Save()
+    item = read_shot(path).grooms[0]
+    assert item.joint.endswith("head")
+    assert np.abs(item.groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-5
+
+
+def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
+    shot = read_shot(write_shot(tmp_path, Recipe(rate=30, frames=31)))
+    assert np.isclose(shot.rigs[0].clip.end - shot.rigs[0].clip.start, 1.0)
+
+
+def test_rigs_are_read_without_grooms_or_animation(tmp_path):
+    path = write_shot(tmp_path, Recipe(frames=0))
+    assert len(read_rigs(path)[0].clip.times) == 1
+    with pytest.raises(NeuralocksError, match="no animation"):
+        read_shot(path)
+
+
+@given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
+@settings(max_examples=30, deadline=None)
+def test_crossing_the_border_and_back_changes_nothing(unit, up, rate):
+    border = Border(unit, up, rate)
+    points = np.array([[1.0, 2, 3], [-4, 5, 0.5]])
+    there = points @ border.to_core[:3, :3].T
+    assert np.allclose(there @ border.from_core[:3, :3].T, points)
+    assert np.allclose(np.linalg.norm(there, axis=1), unit * np.linalg.norm(points, axis=1))
+    assert np.allclose(border.to_core[:3, :3] @ ([0, 1, 0] if up == "Y" else [0, 0, 1]), [0, unit, 0])
