@@ -14,7 +14,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, leap, pulse, swing
 
-SECONDS = 8.5
+SECONDS = 10.0
 STEP = 0.54
 """[s] from one heel strike to the next."""
 STRIDE = 0.64
@@ -22,9 +22,9 @@ STRIDE = 0.64
 HEADING = 0.5 * np.pi
 """[rad] She walks in towards +X and turns to face +Z."""
 TURN = 2.75
-NOD = 4.0
-SHAKE = 4.95
-JUMP = 6.25
+NOD = 3.75
+SHAKE = 4.65
+JUMP = 5.85
 HEIGHT = 0.26
 """[m] of the jump."""
 
@@ -76,7 +76,7 @@ def _head(puppet, times, twist, lag, crouch):
     puppet.turn_neck(swing(times, SHAKE, 2.5, 2.1)[:, None] * UP * 0.6)
     puppet.bend_spine(swing(times, SHAKE, 2.5, 2.1)[:, None] * UP * -0.06)
     # At the end she looks aside, a little down, and holds it.
-    end = ease(times, JUMP + 1.2, 0.45)[:, None]
+    end = ease(times, JUMP + 1.1, 0.4)[:, None]
     puppet.turn_neck(end * (UP * 0.22 + SIDE * 0.06 + FRONT * 0.12))
 
 
