@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from neuralocks_core.centreline import centre_lines
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands import Carrier, K, root_frames, root_uv, scalp_local, strand_set
 
@@ -28,10 +29,11 @@ def ragged_groom(seed=0, strands=300):
     return Groom("/hair", np.concatenate(pieces), counts)
 
 
-def coil_groom(strands=20, vertices=400):
-    """Tight coils: ten turns of 5 mm radius, many vertices to each network vertex."""
+def coil_groom(strands=20, vertices=400, turns=10.0):
+    """Coils of 5 mm radius; ten turns are finer than the network's vertices."""
     t = np.linspace(0.0, 1.0, vertices)
-    coil = np.stack([0.005 * np.cos(62.8 * t), -0.2 * t, 0.005 * np.sin(62.8 * t)], axis=1)
+    angle = 2 * np.pi * turns * t
+    coil = np.stack([0.005 * np.cos(angle), -0.2 * t, 0.005 * np.sin(angle)], axis=1)
     roots = np.random.default_rng(1).normal(size=(strands, 1, 3)) * 0.05
     return Groom("/coils", (coil + roots).reshape(-1, 3), np.full(strands, vertices))
 
@@ -45,6 +47,7 @@ def test_samples_divide_the_arc_evenly():
         expected = np.stack(
             [np.interp(np.linspace(0, arc[-1], K), arc, own[:, axis]) for axis in range(3)], axis=1
         )
+        expected = centre_lines(expected[None])[0]
         np.testing.assert_allclose(strands.rest[s], expected - ORIGIN, atol=1e-6)
 
 
@@ -141,7 +144,7 @@ def test_chunks_and_slices_give_the_whole():
 
 def test_facing_turns_both_ways():
     """A rig that faces +X is read as one that faces +Z, and its displacements go back to its own axes."""
-    groom = coil_groom(strands=4, vertices=24)
+    groom = coil_groom(strands=4, vertices=24, turns=2.0)
     facing = Rotation.from_euler("y", -90, degrees=True).as_matrix()  # +X to +Z
     turned = Groom("/turned", (groom.points - ORIGIN) @ facing + ORIGIN, groom.counts)
     straight, other = strand_set(groom, ORIGIN, CENTRE), strand_set(turned, ORIGIN, CENTRE, facing)
