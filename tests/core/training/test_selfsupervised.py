@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from neuralocks_core import rotation
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.character import Body, Character
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.runtime import strand_inputs
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moments import MomentPool, nearest_planes, vertex_normals
-from neuralocks_core.training.networks import StrandNet, deform
+from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary, train_on_moments
 from tests.core.rigs import HEAD, bind, person
@@ -145,29 +144,28 @@ def test_a_past_that_is_not_detached_changes_the_gradient(pool, inputs):
     assert all(g.isfinite().all() for g in grads) and not torch.allclose(*grads)
 
 
-def _answer(net, groom, inputs, vector, bind_vector):
-    with torch.no_grad():
-        offsets = net(torch.from_numpy(inputs[0]), torch.from_numpy(np.stack([vector, bind_vector])))
-        return deform(offsets[0], torch.from_numpy(groom.rest), offsets[1]).numpy()
+def test_hair_finds_less_energy_than_rigid_hair_has(pool, inputs):
+    """Heads that lean most: what is learned must hang lower at no more bending and collision than it gains."""
+    net, options = _net(pool, inputs), SelfSupervisedOptions(static=True, random_materials=False, volume=0.0)
+    leaning = sorted(pool.moments, key=lambda m: m.gravity[1])[-6:]
+    hair, rng = [pool.hair[m.hair] for m in leaning], np.random.default_rng(0)
+    optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
+    for _ in range(150):
+        losses = moment_losses(net, leaning, hair, inputs, SPEC, options, rng)
+        optimiser.zero_grad()
+        sum(losses.values()).backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
+        optimiser.step()
+    end = _values(losses)
+    assert end["gravity"] < 0 and sum(end.values()) < 0, "rigid hair has zero"
 
 
-def test_hair_learns_gravity_and_to_trail_without_any_simulation(pool, inputs):
-    """A bowed head: hair swings to hang along gravity. A head that speeds up to the left: hair trails to its right."""
-    net, scene = _net(pool, inputs), pool.scene
-    options = SelfSupervisedOptions(steps=250, poses=8, pool=len(pool.moments), volume=0.0, rate=3e-3)
-    for state in train_on_moments(pool, inputs, net, options):
-        assert np.isfinite(list(state["losses"].values())).all()
-    bind_vector = pool.hair[0].bind.copy()
-    bind_vector[SPEC.slices["material"]] = 0
-    tilted = bind_vector.copy()
-    turn = rotation.from_vector(np.array([0.0, 0.0, 0.5]))
-    tilted[SPEC.slices["gravity"]] = turn.T @ [0, -1, 0]
-    droop = _answer(net, scene.grooms[0], inputs, tilted, bind_vector)[:, -1]
-    assert (droop @ (turn.T @ [0, -1, 0] - np.array([0, -1, 0]))).mean() > 0.01
-    pushed = bind_vector.copy()
-    pushed[SPEC.slices["history"]].reshape(8, -1)[:3, 0] = -0.7
-    trail = _answer(net, scene.grooms[0], inputs, pushed, bind_vector)[:, -1, 0].mean()
-    assert trail < -0.002
+def test_training_goes_on_from_where_it_was_and_stays_finite(pool, inputs):
+    net, options = _net(pool, inputs), SelfSupervisedOptions(steps=12, poses=4, pool=len(pool.moments) + 1)
+    before = len(pool.moments)
+    states = list(train_on_moments(pool, inputs, net, options, resume=lambda _: {"step": 7, "done": 7 / 12}))
+    assert states[-1]["step"] == 12 and np.isfinite(list(states[-1]["losses"].values())).all()
+    assert len(pool.moments) > before
 
 
 def test_the_papers_own_settings_train(pool, inputs):
