@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build the shipped shot: python examples/make_shot.py [-o examples/shot] [--strands 5000] [--body]
+"""Build the shipped shot: python examples/make_shot.py [-o examples/shot] [--strands 3200] [--body]
 
 Layers as a pipeline has them: body.usdc (character), motion.usdc (animation), groom.usdc (hair at rest, skinned to the
 head) and shot.usda, which puts them together with a camera and lights.
@@ -7,6 +7,7 @@ head) and shot.usda, which puts them together with a camera and lights.
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve
 
 from acting import SECONDS, act  # noqa: E402
 
+from neuralocks_core.arclength import resample  # noqa: E402
 from neuralocks_core.groom import Groom  # noqa: E402
 from neuralocks_core.hairstyles import grow  # noqa: E402
 from neuralocks_core.hairstyles.scalp import Scalp  # noqa: E402
@@ -24,6 +26,7 @@ from usd.body import MESH, ROOT, SKELETON, write_body  # noqa: E402
 from usd.stage import read_rigs  # noqa: E402
 
 RATE = 24.0
+VERTICES = 24
 HAIR = f"{ROOT}/Hair"
 HAIR_COLOR = (0.105, 0.042, 0.018)
 
@@ -32,7 +35,7 @@ def main() -> None:
     """Write the four layers."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "shot")
-    parser.add_argument("--strands", type=int, default=5000)
+    parser.add_argument("--strands", type=int, default=3200)
     parser.add_argument("--style", default="wavy")
     parser.add_argument("--body", action="store_true", help="build the body again (needs anny)")
     options = parser.parse_args()
@@ -61,7 +64,17 @@ def grow_groom(body: Path, style: str, strands: int) -> Groom:
     centre = to_bind[:3, :3] @ character.head_centre + to_bind[:3, 3]
     skin = character.body
     scalp = Scalp(np.array(mesh.GetPointsAttr().Get(), float), triangles, centre)
-    return grow(style, scalp, strands, seed=1, body=(skin.points, skin.triangles))
+    groom = grow(style, scalp, strands, seed=1, body=(skin.points, skin.triangles))
+    # As many vertices as the network has keep a bake of ten seconds under half a gigabyte.
+    points, _ = resample(groom, VERTICES)
+    kept = np.linspace(0, groom.counts[0] - 1, VERTICES, dtype=int)
+    width = np.reshape(groom.widths, (strands, -1))[:, kept]
+    return replace(
+        groom,
+        points=points.reshape(-1, 3).astype(np.float32),
+        counts=np.full(strands, VERTICES, np.int32),
+        widths=width.ravel(),
+    )
 
 
 def write_motion(path: Path, character) -> None:
