@@ -24,8 +24,8 @@ class Carrier:
     """Moves the groom's own vertices as the network's vertices move.
 
     An own vertex takes the displacement of the network polyline at its arc length. What separates it from
-    that polyline (the turns of a coil, say) is carried along rigidly: turned by the smallest rotation that
-    takes the polyline's rest segment to the deformed one. Zero displacement gives the groom's own points bit
+    that polyline (the turns of a coil, say) is carried along rigidly: turned by the smallest rotations that
+    take the polyline's rest segments to the deformed ones. Zero displacement gives the groom's own points bit
     for bit, and strands that the network does not move (`StrandSet.valid` false) always stay.
 
     Args:
@@ -123,35 +123,46 @@ class Carrier:
         moved = flat.take(segment, axis=0)
         moved += weight * steps.reshape(-1, 3).take(segment, axis=0)
         if self._bent[start:stop].any():
-            axis, turn = _turns(self._rest[start:stop], steps)
-            axis = axis.take(segment, axis=0)
-            residual = self._residual[here]
-            across = _cross(axis, residual)
-            moved += across
-            moved += _cross(axis, across) * turn.take(segment)[:, None]
+            turns = _turns(self._rest[start:stop], steps).reshape(-1, 4)
+            before = turns.take(segment, axis=0)
+            turn = before + weight * (turns.take(segment + 1, axis=0) - before)
+            axis, residual = turn[:, :3], self._residual[here]
+            # A quaternion of any length turns r by 2 (w a x r + a x (a x r)) / |q|^2: nothing where a is
+            # zero.
+            once = _cross(axis, residual)
+            twice = _cross(axis, once)
+            once *= turn[:, 3:]
+            once += twice
+            once *= (2.0 / np.maximum(_dot(turn, turn), 1e-12))[:, None]
+            moved += once
         return moved
 
 
-def _turns(rest: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest rotations of each rest segment to the deformed one, as the two terms that add to the identity.
+def _turns(rest: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Smallest rotations of the segments at rest to the deformed ones, blended at each vertex.
 
-    R r = r + a x r + b a x (a x r), a = e0 x e1, b = 1 / (1 + e0 . e1): exactly r where nothing moved.
+    Blended, so that what lies off the polyline is not torn where two segments meet.
 
     Args:
         rest: (N, K, 3) [m].
         steps: (N, K, 3) [m], difference of displacement along each segment (last row unused).
 
     Returns:
-        a (N K, 3) and b (N K,), the last of each strand unused.
+        (N, K, 4) float32 quaternions x y z w, not of unit length, x y z exactly zero where nothing moved.
     """
-    before = np.zeros_like(rest)
-    np.subtract(rest[:, 1:], rest[:, :-1], out=before[:, :-1])
-    after = before + steps
+    before = rest[:, 1:] - rest[:, :-1]
+    after = before + steps[:, :-1]
     before, after = (e / np.maximum(np.sqrt(_dot(e, e)), 1e-12)[..., None] for e in (before, after))
-    axis = _cross(before, after)
-    # Turned back onto itself a segment has no smallest rotation; a large bounded one is as good as any.
-    turn = 1.0 / np.maximum(1.0 + _dot(before, after), 1e-3)
-    return axis.reshape(-1, 3), turn.ravel()
+    # Half way between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
+    segment = np.empty((*before.shape[:2], 4), np.float32)
+    segment[..., :3] = _cross(before, after)
+    segment[..., 3] = 1.0 + _dot(before, after)
+    segment /= np.sqrt(np.maximum(_dot(segment, segment), 1e-12))[..., None]
+    turns = np.empty((*rest.shape[:2], 4), np.float32)
+    turns[:, 0], turns[:, -1] = segment[:, 0], segment[:, -1]
+    np.add(segment[:, :-1], segment[:, 1:], out=turns[:, 1:-1])
+    turns[:, 1:-1] *= np.float32(0.5)
+    return turns
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
