@@ -12,7 +12,6 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands import Carrier, strand_set
 
-
 BLOCK_POINTS = 24_576
 """Points worked on at a time: they stay in a core's cache, and a product of so few rows by a 3x3 matrix stays on its
 core instead of waking BLAS threads that wait for each other."""

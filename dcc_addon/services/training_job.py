@@ -126,21 +126,23 @@ class TrainingJob:
         return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
 
     def _listen(self) -> None:
-        for line in self._process.stdout:
-            try:
-                said = json.loads(line)
-            except json.JSONDecodeError:
-                continue
-            if "error" in said:
-                self.error = str(said["error"])
-            else:
-                self.done = float(said.get("done", self.done))
-                self.message = str(said.get("message", self.message))
+        with self._process.stdout as lines:
+            for line in lines:
+                try:
+                    said = json.loads(line)
+                except json.JSONDecodeError:
+                    continue
+                if "error" in said:
+                    self.error = str(said["error"])
+                else:
+                    self.done = float(said.get("done", self.done))
+                    self.message = str(said.get("message", self.message))
 
     def _drain(self) -> None:
-        for line in self._process.stderr:
-            if line.strip():
-                self._tail = [*self._tail[-20:], line.strip()]
+        with self._process.stderr as lines:
+            for line in lines:
+                if line.strip():
+                    self._tail = [*self._tail[-20:], line.strip()]
 
 
 def default_python() -> str:

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A picture of the panel with live hair, in a real window:
+
+    xvfb-run -s "-screen 0 1280x960x24" blender --factory-startup -p 0 0 1280 960 \\
+        --python examples/blender_panel.py -- OUT.png
+
+`--model FILE` chooses a model, `--frame N` the frame. Needs a Blender with a window; the packages of the add-on must be
+importable (install the extension, or set PYTHONPATH).
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import blender_shot
+import bpy
+from mathutils import Quaternion, Vector
+
+
+def options():
+    """What was given after `--`."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--model", default="")
+    parser.add_argument("--frame", type=int, default=90)
+    parser.add_argument("--strands", type=int)
+    return parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
+
+
+def prepare(wanted) -> None:
+    """Build the scene, make the hair live, aim the view, open the sidebar."""
+    import dcc_addon
+
+    if not hasattr(bpy.types.Scene, "neuralocks"):
+        dcc_addon.register()
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    armature, _, hair = blender_shot.build(strands=wanted.strands)
+    armature.hide_set(True)
+    hair.neuralocks_hair.model = wanted.model
+    bpy.ops.neuralocks.sample_motion()
+    hair.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(wanted.frame)
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        if area.type == "VIEW_3D":
+            _view(area, armature)
+
+
+def _view(area, armature) -> None:
+    space = area.spaces.active
+    space.show_region_ui = True
+    space.shading.type, space.shading.light, space.shading.color_type = "SOLID", "STUDIO", "MATERIAL"
+    space.shading.show_cavity, space.overlay.show_overlays = True, False
+    head = armature.matrix_world @ armature.pose.bones[_head(armature)].matrix
+    region = space.region_3d
+    region.view_perspective = "PERSP"
+    region.view_location = head.to_translation() + Vector((0, 0, -0.03))
+    region.view_rotation = Quaternion((0.62, 0.64, 0.32, 0.31))
+    region.view_distance = 0.8
+    for part in area.regions:
+        if part.type == "UI" and hasattr(part, "active_panel_category"):
+            try:
+                part.active_panel_category = "Neuralocks"
+            except (AttributeError, TypeError):
+                pass
+
+
+def _head(armature) -> str:
+    from dcc_addon.session import session
+
+    sampled = session.rigs[armature.name]
+    return sampled.rig.bones[sampled.character.head]
+
+
+def click_tab() -> None:
+    """Widen the sidebar and click the tab, as an artist does; Python cannot before Blender 4.2."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    side = next(r for r in area.regions if r.type == "UI")
+    top = window.height - (side.y + side.height)
+    way = [
+        f"mousemove {side.x + side.width - 12} {top + TAB}",
+        "click 1",
+        f"mousemove {side.x} {top + 400}",
+        "mousedown 1",
+    ]
+    way += [f"mousemove {side.x - step} {top + 400}" for step in (20, 50, 80)] + ["mouseup 1", "mousemove 8 500"]
+    # In a process of its own: Blender must see each event before the next one comes.
+    subprocess.Popen(["sh", "-c", "; sleep 0.3; ".join(f"xdotool {step}" for step in way)])
+
+
+TAB = 130
+"""How far below the top of the sidebar the third tab lies."""
+
+
+def main() -> None:
+    """Steps with pauses in between, so that the window can draw."""
+    wanted = options()
+    steps = [lambda: prepare(wanted), click_tab, lambda: None, lambda: None, lambda: _shoot(wanted.out)]
+
+    def tick():
+        try:
+            steps.pop(0)()
+        except Exception:
+            traceback.print_exc()
+            os._exit(1)
+        if steps:
+            return 3.0
+        os._exit(0)
+
+    bpy.context.preferences.view.show_splash = False
+    bpy.app.timers.register(tick, first_interval=2.0)
+
+
+def _shoot(out: Path) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.screen.screenshot(filepath=str(out))
+
+
+main()

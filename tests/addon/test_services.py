@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's services, without Blender."""
+
+import json
+import sys
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+from dcc_addon import build
+from dcc_addon.services import axes, card, names, rig, training_job
+from dcc_addon.services.motion import Motion, frame_numbers, similar
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.report import Card
+from neuralocks_core.rotation import from_vector
+
+BONES = ("hips", "spine", "neck", "head", "upper_arm.L", "upper_arm.R")
+PARENTS = np.array([-1, 0, 1, 2, 1, 1])
+PLACES = np.array([[0, 0, 1], [0, 0, 1.2], [0, 0, 1.5], [0, 0, 1.6], [0.2, 0, 1.4], [-0.2, 0, 1.4]])
+
+
+def _rest():
+    rest = np.tile(np.eye(4), (6, 1, 1))
+    rest[:, :3, 3] = PLACES
+    return rest
+
+
+def _motion(rng, scale=1.0, stretch=0.0):
+    """World transforms (T, J, 4, 4) of a chain that turns at random, and the bind pose."""
+    bind = scale * _rest()
+    bind[:, 3, 3] = 1
+    turns = from_vector(rng.normal(size=(9, 6, 3)) * 0.4)
+    world = np.zeros((9, 6, 4, 4))
+    for joint, parent in enumerate(PARENTS):
+        local = np.tile(np.eye(4), (9, 1, 1))
+        local[:, :3, :3] = turns[:, joint] * (scale if parent < 0 else 1.0)
+        local[:, :3, 3] = scale * PLACES[0] if parent < 0 else PLACES[joint] - PLACES[parent]
+        world[:, joint] = local if parent < 0 else world[:, parent] @ local
+    world[..., 1, :3] *= 1 + stretch
+    return bind, world
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01, 37.0])
+def test_stored_channels_give_the_sampled_poses_back(scale):
+    """Also for an armature object of any scale, although scales of a SkelAnimation have half precision."""
+    bind, world = _motion(np.random.default_rng(0), scale)
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {"": None})
+    apart = motion.world() - world @ np.diag([1 / scale, 1 / scale, 1 / scale, 1])
+    assert np.abs(apart[..., :3, :3]).max() < 1e-6
+    assert np.abs(apart[..., :3, 3]).max() < 1e-6 * scale
+    assert set(np.unique(motion.scale)) == {1.0}
+
+
+def test_stretched_bones_keep_place_and_rotation():
+    """A stretched bone has no single scale; what hair reads of it stays."""
+    bind, world = _motion(np.random.default_rng(1))
+    stretched = world @ np.diag([1.0, 1.7, 1.0, 1.0])
+    result = similar(stretched)
+    np.testing.assert_allclose(result[..., :3, 3], world[..., :3, 3])
+    np.testing.assert_allclose(result[..., :3, :3] / 1.7 ** (1 / 3), world[..., :3, :3], atol=1e-9)
+
+
+def test_mirrored_armature_is_refused_in_plain_words():
+    with pytest.raises(NeuralocksError, match="Rig: it is mirrored .*apply its scale"):
+        similar(np.diag([-1.0, 1, 1, 1])[None], "Rig")
+
+
+def test_samples_are_found_by_frame():
+    bind, world = _motion(np.random.default_rng(2))
+    motion = Motion.from_world(np.arange(9) / 2 + 3, 25, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    assert [motion.row(f) for f in (3, 3.5, 7, 2, 3.3, 7.5)] == [0, 1, 8, None, None, None]
+    assert motion.times[-1] == 7 / 25
+
+
+def test_frame_numbers():
+    np.testing.assert_allclose(frame_numbers(1, 3, 1), [1, 1.5, 2, 2.5, 3])
+    assert list(frame_numbers(4, 4, 3)) == [4]
+    with pytest.raises(NeuralocksError, match="ends at 1"):
+        frame_numbers(2, 1, 0)
+
+
+def test_blender_front_becomes_core_front():
+    """Z up and looking along -Y becomes Y up and +Z; the unit is applied once."""
+    core = axes.to_core(0.01)
+    np.testing.assert_allclose(axes.transformed([[0, -100, 0], [0, 0, 100], [100, 0, 0]], core),
+                               [[0, 0, 1], [0, 1, 0], [1, 0, 0]], atol=1e-12)  # fmt: skip
+
+
+def test_joint_paths_are_unique_and_plain():
+    paths = names.joint_paths(["a.b", "a-b", "1c", "ä"], [-1, 0, 0, 1])
+    assert paths == ["a_b", "a_b/a_b_2", "a_b/_1c", "a_b/a_b_2/_"]
+    long = names.unique(["x" * 90, "x" * 90])
+    assert len(set(long)) == 2 and max(map(len, long)) < 63
+
+
+def test_parents_come_first():
+    order = names.parents_first([2, 0, -1, 1])
+    assert list(order) == [2, 0, 1, 3]
+
+
+def test_weights_keep_the_strongest_four():
+    rows = [(0, g, w) for g, w in enumerate((0.1, 0.4, 0.05, 0.3, 0.2))] + [(1, 5, 1.0)]
+    body = rig.BodyArrays("b", np.zeros((3, 3)), np.zeros((0, 3), int), (*BONES[:5], "not a bone"), np.array(rows))
+    indices, weights = rig.joint_weights(body, BONES)
+    assert list(indices[0]) == [1, 3, 4, 0]
+    np.testing.assert_allclose(weights[0], [0.4, 0.3, 0.2, 0.1])
+    np.testing.assert_allclose(weights[1:], [[1, 0, 0, 0]] * 2)
+
+
+def test_character_faces_forward_and_says_what_is_missing():
+    found = rig.RigArrays("Rig", BONES, PARENTS, _rest())
+    character = rig.character(found, np.eye(4))
+    np.testing.assert_allclose(character.facing, np.eye(3), atol=1e-9)
+    assert character.skeleton.names[character.head].endswith("/head")
+    assert rig.advice(found) == []
+    lame = rig.RigArrays("Rig", BONES[:4], PARENTS[:4], _rest()[:4])
+    assert any("left arm" in line for line in rig.advice(lame))
+
+
+@pytest.mark.parametrize(
+    ("bones", "head", "words"),
+    [
+        ((), "", "has no bones"),
+        (("a", "b"), "", "no bone is named like a head"),
+        (("a", "head"), "skull", "no bone 'skull'"),
+    ],
+)
+def test_rig_problems_in_plain_words(bones, head, words):
+    parents = np.arange(len(bones)) - 1
+    with pytest.raises(NeuralocksError, match=words):
+        rig.RigArrays("Rig", bones, parents, _rest()[: len(bones)], head).humanoid()
+
+
+@pytest.mark.parametrize(
+    ("points", "counts", "words"),
+    [
+        (np.zeros((0, 3)), [], "no strands"),
+        (np.zeros((3, 3)), [1, 1, 1], "one point"),
+        (np.full((2, 3), np.nan), [2], "finite"),
+    ],
+)
+def test_bad_hair_in_plain_words(points, counts, words):
+    with pytest.raises(NeuralocksError, match=words):
+        rig.groom("Hair", points, np.array(counts, int), np.eye(4))
+
+
+def test_card_fits_a_sidebar():
+    lines = card.lines_of(
+        Card("t", {"/Hair": {"droop_cm": 1.234, "settling_s": float("nan"), "strands": 7}}, notes=("n",))
+    )
+    assert lines == ["droop: 1.23 cm", "n"]
+
+
+CHILD = """
+import json, sys, time
+settings = json.load(sys.stdin)
+print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
+if settings["out"] == "wait": time.sleep(60)
+if settings["out"] == "fail":
+    print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
+if settings["out"] == "crash": raise RuntimeError("boom")
+"""
+
+
+@pytest.fixture
+def job(tmp_path, monkeypatch):
+    child = tmp_path / "child.py"
+    child.write_text(CHILD)
+    monkeypatch.setattr(training_job, "CHILD", child)
+    started = []
+
+    def start(out):
+        started.append(training_job.TrainingJob(sys.executable, {"out": out}))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.cancel()
+
+
+def _wait(condition):
+    end = time.monotonic() + 30
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert condition()
+
+
+def test_training_runs_beside_and_says_how_far_it_is(job):
+    running = job("well")
+    _wait(lambda: not running.running)
+    assert running.succeeded and running.message == "half" and running.done == 0.5
+
+
+def test_training_is_cancelled_at_once(job):
+    running = job("wait")
+    _wait(lambda: running.done == 0.5)
+    assert running.running and running.seconds_left is not None
+    running.cancel()
+    _wait(lambda: not running.running)
+    assert not running.succeeded
+
+
+@pytest.mark.parametrize(("out", "words"), [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom")])
+def test_training_says_why_it_failed(job, out, words):
+    running = job(out)
+    _wait(lambda: not running.running)
+    assert not running.succeeded and running.failure() == words
+
+
+@pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
+def test_missing_trainer_comes_with_a_remedy(python, words):
+    problem = training_job.problem(python)
+    assert words in problem and "pip install 'neuralocks[train]'" in problem
+
+
+def test_zips_hold_what_blender_expects(tmp_path):
+    """The manifest lists the wheels that are in the zip, and the legacy zip has one folder with the packages in it."""
+    import tomllib
+
+    wheel = tmp_path / "thing-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as made:
+        made.writestr("thing/__init__.py", "")
+    with zipfile.ZipFile(build.extension(tmp_path, "linux-x64", [wheel])) as made:
+        manifest = tomllib.loads(made.read("blender_manifest.toml").decode())
+        listed = set(made.namelist())
+    assert manifest["platforms"] == ["linux-x64"] and manifest["permissions"]
+    assert all(w.removeprefix("./") in listed for w in manifest["wheels"])
+    assert {"__init__.py", "LICENSE", "services/live.py"} <= listed
+    assert not any("build.py" in n or "__pycache__" in n for n in listed)
+    with zipfile.ZipFile(build.legacy(tmp_path, [wheel])) as made:
+        listed = made.namelist()
+    assert all(n.startswith("neuralocks/") for n in listed) and "neuralocks/packages/thing/__init__.py" in listed
+    assert json.dumps(manifest["version"]) == json.dumps(
+        build.version((build.HERE / "blender_manifest.toml").read_text())
+    )
