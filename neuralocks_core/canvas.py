@@ -135,8 +135,8 @@ class PlainCanvas:
 
     def _surface(self, camera, body, colours, high):
         seen = _project(camera, body, high)[self._triangles]
-        facing = np.cross(seen[:, 1, :2] - seen[:, 0, :2], seen[:, 2, :2] - seen[:, 0, :2])
-        shown = facing > 0
+        (ax, ay), (bx, by) = (seen[:, 1, :2] - seen[:, 0, :2]).T, (seen[:, 2, :2] - seen[:, 0, :2]).T
+        shown = ax * by - ay * bx > 0
         seen, tint = seen[shown], colours[self._triangles[shown]]
         size = np.ceil(1.5 * np.abs(seen[:, [1, 2, 0], :2] - seen[:, :, :2]).max(axis=(1, 2))).clip(1, 60).astype(int)
         parts = []

@@ -14,7 +14,7 @@ from neuralocks_core.canvas import Camera, open_canvas
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.report import write_whole
 
-STRANDS = {"picture": 16000, "clip": 9000}
+STRANDS = {"picture": 16000, "clip": 8000}
 """Strands drawn: of a larger groom only so many, of a smaller one copies beside its own."""
 VERTICES = 24
 SUFFIXES = (".png", ".mp4", ".gif")
@@ -86,7 +86,9 @@ def render(
         clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
         frames = np.abs(scene.times[None] - clock[:, None]).argmin(axis=1)
     width, height = size or ((440, 620) if still else (480, 600))
-    film = _Film(scene, width, height, scale or (2.0 if still else 1.5), STRANDS["picture" if still else "clip"])
+    strands = STRANDS["picture" if still else "clip"]
+    # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
+    film = _Film(scene, width, height, scale or (2.0 if still else 1.5), strands, 0.02 if still else 0.3)
     images = []
     try:
         for i, image in enumerate(film.shoot(frames)):
@@ -102,8 +104,8 @@ def render(
 class _Film:
     """A scene with its camera, strands and colours made ready."""
 
-    def __init__(self, scene: Scene, width: int, height: int, scale: float, strands: int):
-        self.scene = scene
+    def __init__(self, scene: Scene, width: int, height: int, scale: float, strands: int, calm: float):
+        self.scene, self._calm = scene, calm
         self._pick(strands)
         triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
         self._canvas = open_canvas(width, height, triangles, len(self._tone), VERTICES, scale)
@@ -170,7 +172,7 @@ class _Film:
     def _dress(self) -> np.ndarray:
         """Skin above the collar, dark cloth below: linear RGB (V, 3)."""
         scene = self.scene
-        below = (scene.centre[1] - scene.body_rest[:, 1] - 0.245) / 0.006
+        below = (scene.centre[1] - scene.body_rest[:, 1] - 0.25) / 0.03
         cloth = np.clip(below, 0, 1)[:, None]
         return (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
 
@@ -180,10 +182,10 @@ class _Film:
         centre = np.einsum("tij,j->ti", scene.head[:, :3, :3], scene.centre) + scene.head[:, :3, 3]
         reach = np.linalg.norm(scene.rest - scene.centre, axis=1).max()
         step = np.median(np.diff(scene.times)) if len(scene.times) > 1 else 1.0
-        smooth = _blurred(centre, 0.35 / step)
+        smooth = _blurred(centre, self._calm / step)
         # How far the head strays from the smooth path, so that a jump does not leave the picture.
         stray = np.abs(centre - smooth).max()
-        high = 0.17 + 0.62 * min(reach, 0.6) + 0.6 * stray
+        high = 0.15 + 0.60 * min(reach, 0.6) + 0.5 * min(stray, 0.3)
         front = (scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1])
         front /= np.linalg.norm(front)
         # Where the face looks on average, so that a shot of somebody's back does not show the back only.

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+import trimesh
+
+from neuralocks_core import canvas, preview, shading
+from neuralocks_core.errors import NeuralocksError
+
+CENTRE = np.array([0.0, 1.5, 0.0])
+
+
+def scene(frames=4, strands=300):
+    """A ball with hair on its upper half that turns about Y."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    body = np.array(ball.vertices) + CENTRE
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(strands, 3))
+    out[:, 1] = np.abs(out[:, 1])
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    rest = CENTRE + out[:, None] * np.linspace(0.1, 0.2, 10)[None, :, None]
+    rest[:, :, 1] -= np.linspace(0, 0.3, 10) ** 2
+    rest = rest.reshape(-1, 3)
+    head = np.tile(np.eye(4), (frames, 1, 1))
+    for i, angle in enumerate(np.linspace(0, 1, frames)):
+        turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+        head[i, :3, :3] = turn
+        head[i, :3, 3] = CENTRE - turn @ CENTRE
+
+    def posed(points):
+        return lambda i: points @ head[i, :3, :3].T + head[i, :3, 3]
+
+    return preview.Scene(
+        np.arange(frames) / 24, head, np.eye(3), CENTRE, np.full(strands, 10), rest, posed(rest),
+        np.array(ball.faces), posed(body), body,
+    )
+
+
+@pytest.mark.parametrize("kind", [".png", ".mp4", ".gif"])
+def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
+    pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
+    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), panels=2, scale=1.0)
+    assert path.stat().st_size > 500 and list(tmp_path.iterdir()) == [path]
+    if kind == ".png":
+        from PIL import Image
+
+        with Image.open(path) as image:
+            assert image.size == (2 * 96 + 4, 128)
+            reddish = np.asarray(image, int)
+        assert ((reddish[..., 0] - reddish[..., 2]) > 25).mean() > 0.02
+
+
+def test_both_canvases_draw_the_same_picture():
+    """VTK and the plain rasteriser agree on where body and hair are."""
+    try:
+        canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, 2).close()
+    except Exception as error:
+        pytest.skip(f"VTK cannot draw here: {error}")
+    pictures = []
+    for kind in (canvas.VtkCanvas, canvas.PlainCanvas):
+        film = preview._Film(scene(), 120, 160, 2.0, 600, 0.02)
+        film._canvas.close()
+        film._canvas = kind(120, 160, film.scene.triangles, len(film._tone), preview.VERTICES, 2.0)
+        pictures.append(next(film.shoot([0])).astype(float))
+        film.close()
+    background = canvas.backdrop(120, 160).astype(float)
+    covered = [np.abs(picture - background).max(axis=2) > 12 for picture in pictures]
+    assert covered[0].mean() > 0.05
+    assert (covered[0] != covered[1]).mean() < 0.05
+
+
+def test_hair_in_front_dims_what_is_behind_it():
+    near = np.random.default_rng(0).uniform(0, 0.1, (5000, 3)) * [1, 1, 0.2] + [0, 0, 0.2]
+    shadow = shading.ShadowMap(near, np.full(5000, 1e-5))
+    behind, before, aside = shadow.depth(
+        np.array([[0.05, 0.05, 0.0], [0.05, 0.05, 0.4], [0.5, 0.05, 0.0]]), np.array([0, 0, 1.0])
+    )
+    assert behind == pytest.approx(5, rel=0.25) and before < 0.05 and aside == 0
+
+
+@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("missing/hair.png", "no such folder")])
+def test_bad_targets_are_named(tmp_path, name, said):
+    with pytest.raises(NeuralocksError, match=said):
+        preview.render(scene(2, 20), tmp_path / name, size=(64, 64), panels=1)

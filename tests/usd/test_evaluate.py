@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report card, the preview and the demo on bakes whose answers are known."""
+
+import json
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from usd.bake import bake
+from usd.baked import read_baked
+from usd.demo import demo, shipped_shot
+from usd.evaluate import evaluate
+
+FRAMES = "1:60:4"
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory, still_model):
+    out = tmp_path_factory.mktemp("bakes") / "rigid.usdc"
+    bake(shipped_shot(), out, still_model, frames=FRAMES, velocities=False)
+    return out
+
+
+def test_a_rigid_bake_has_no_motion_no_droop_and_exact_lengths(rigid):
+    values = next(iter(evaluate(rigid).grooms.values()))
+    assert values["frames"] == 15
+    for name in ("droop_cm", "speed_cm_s", "swing_percent", "energy_bend", "energy_gravity"):
+        assert values[name] == pytest.approx(0, abs=1e-3), name
+    assert values["stretch_percent_max"] < 0.01
+
+
+def test_a_moving_bake_moves_and_keeps_its_lengths(tmp_path, model):
+    bake(shipped_shot(), tmp_path / "moving.usdc", model, frames=FRAMES, velocities=False)
+    values = next(iter(evaluate(tmp_path / "moving.usdc").grooms.values()))
+    assert values["speed_cm_s"] > 0.02 and values["swing_percent"] > 0.02
+    assert values["energy_bend"] > 0
+
+
+def test_resolving_takes_hair_out_of_the_body(tmp_path, model):
+    share = {}
+    for resolve in (False, True):
+        out = tmp_path / f"resolved-{resolve}.usdc"
+        bake(shipped_shot(), out, model, frames="20:60:20", resolve=resolve, velocities=False)
+        share[resolve] = next(iter(evaluate(out).grooms.values()))["penetration_percent"]
+    assert share[False] > 1
+    assert share[True] < 0.1 * share[False]
+
+
+def test_a_stage_without_samples_is_no_bake():
+    with pytest.raises(NeuralocksError, match="no animated points"):
+        read_baked(shipped_shot())
+
+
+def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch):
+    import usd.demo
+
+    short = lambda *args, **options: bake(*args, frames="1:9:2", **options)  # noqa: E731
+    monkeypatch.setattr(usd.demo, "bake", short)
+    done = demo(tmp_path / "out", still_model, clip=False)
+    assert all(path.is_file() for path in done.outputs.values())
+    assert json.loads(done.outputs["report card"].read_text())["grooms"]
