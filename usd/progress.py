@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A progress bar with the time left, for what takes more than two seconds, on a terminal only."""
+"""A progress bar with the time left, for what takes more than two seconds; in a log, a line now and then."""
 
 import sys
 import time
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 
 QUIET_FOR = 2.0
 """[s] Work that is done by then shows no bar."""
+LOG_EVERY = 20.0
+"""[s] Between two lines where stderr is no terminal."""
 
 
 @contextmanager
@@ -28,11 +30,19 @@ def progress_bar(title: str) -> Iterator:
     )
     bar = Progress(*columns, console=console, transient=True)
     began, shown = time.monotonic(), None
+    logged = began
     drawn = sys.stderr.isatty()
 
     def callback(done: int, total: int, message: str = "") -> None:
-        nonlocal shown
-        if not drawn or (shown is None and time.monotonic() - began < QUIET_FOR):
+        nonlocal shown, logged
+        now = time.monotonic()
+        if not drawn:
+            if now - logged > LOG_EVERY:
+                logged = now
+                left = f", {(now - began) * (total - done) / done / 60:.1f} min left" if done else ""
+                print(f"{title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
+            return
+        if shown is None and now - began < QUIET_FOR:
             return
         if shown is None:
             bar.start()
