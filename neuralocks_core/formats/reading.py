@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arclength import SHORTEST, arc_lengths
 from ..errors import NeuralocksError
 from ..groom import LARGEST_COORDINATE, Groom
 from . import cemyuksel, counted, tressfx, tressfx_text
@@ -78,7 +79,12 @@ def read_with_notes(
         raise bad_file(
             str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit"
         )
-    return Groom(path.stem or "groom", points, raw.counts, widths, root_uv), notes
+    groom = Groom(path.stem or "groom", points, raw.counts, widths, root_uv)
+    still = int((arc_lengths(groom)[1] <= SHORTEST).sum())
+    if still:
+        fact = f"{still} of {groom.strand_count} strands have no two distinct points"
+        notes.append(f"{path}: {fact}; they are kept, but will not move on their own")
+    return groom, notes
 
 
 def _metres_per_unit(unit: str | float) -> float:

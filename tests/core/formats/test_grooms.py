@@ -97,6 +97,14 @@ def test_what_else_the_files_hold(folder):
     np.testing.assert_allclose(v4.widths, [1e-4, 2e-4], rtol=1e-6)
 
 
+def test_strands_without_length_are_reported(folder):
+    _, notes = formats.read_with_notes(put(folder, "a.data", FILES["a.data"]))
+    assert notes == [
+        f"{folder / 'a.data'}: 1 of 3 strands have no two distinct points; they are kept, but will not "
+        "move on their own"
+    ]
+
+
 def test_units_of_the_formats(folder):
     assert np.ptp(formats.read(put(folder, "a.data", FILES["a.data"])).points) == pytest.approx(
         np.ptp(POINTS)
@@ -108,7 +116,7 @@ def test_units_of_the_formats(folder):
         scaled = tressfx_text(POINTS / np.ptp(POINTS) * 0.2 / unit)
         groom, notes = formats.read_with_notes(put(folder, "text.tfx", scaled))
         assert np.ptp(groom.points) == pytest.approx(0.2, rel=1e-4)
-        assert "does not state its unit" in notes[-1]
+        assert "does not state its unit" in notes[0]
 
 
 def test_transform_of_the_text_format(folder):
