@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Slow and trusted: the rod solver that results are compared with. Needs warp (extra `compare`)."""
+"""Slow and trusted: the rod solver that results are compared with, and what games use. Needs warp (extra `compare`)."""
 
 from neuralocks_core.reference.rods import Rollout, simulate
+from neuralocks_core.reference.xpbd import simulate_xpbd
 
-__all__ = ["Rollout", "simulate"]
+__all__ = ["Rollout", "simulate", "simulate_xpbd"]

@@ -364,15 +364,19 @@ def newton(
     collision: wp.float64,
     iterations: int,
     tolerance: wp.float64,
+    again: int,
+    wake: wp.array(dtype=wp.int32),
     residual: wp.array(dtype=wp.float64),
     used: wp.array(dtype=wp.int32),
 ):
     """Improve each strand by at most `iterations` Newton steps with a backtracking line search on the true energy.
 
     residual: rms over the free vertices of the net force per mass [m/s^2], tension solved for; a strand stops where
-    it is below `tolerance`.
+    it is below `tolerance`. again: the step's first solve was before; strands solved then and not woken are skipped.
     """
     s = wp.tid()
+    if again == 1 and wake[s] == 0 and residual[s] < tolerance:
+        return
     c = s * stride
     vertices = x.shape[0]
     for k in range(vertices):

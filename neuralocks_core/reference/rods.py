@@ -89,7 +89,7 @@ def simulate(
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
     way = headway(head, substeps)
     frames = len(head)
-    material = _material(material, strands)
+    material = check_material(material, strands)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     planes = np.zeros((frames, strands, vertices, 4), np.float32)
     planes[..., 3] = -1e3
@@ -118,8 +118,7 @@ def simulate(
         stepper.move_body(first)
     stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
     if start is None:
-        for step in SETTLE_DT:
-            stepper.settle(step, iterations)
+        stepper.settle(SETTLE_DT, iterations)
     before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
     stepper.start_moving(before)
     for frame in range(frames):
@@ -134,8 +133,12 @@ def simulate(
     return Rollout(points, planes, residual, used)
 
 
-def _material(material: Any, strands: int) -> dict[str, np.ndarray]:
-    """Four (S,) arrays of finite, not negative numbers."""
+def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
+    """Four (S,) arrays of finite, not negative numbers.
+
+    Raises:
+        NeuralocksError: any other number, or a wrong shape.
+    """
     found = {}
     for name, default in MATERIAL.items():
         if material is None:

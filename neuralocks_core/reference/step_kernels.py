@@ -108,11 +108,12 @@ def body_planes(
     face: wp.array2d(dtype=wp.int32),
     corner: wp.array2d(dtype=wp.vec2),
     plane: wp.array2d(dtype=wp.vec4d),
+    wake: wp.array(dtype=wp.int32),
 ):
     """Nearest body element as a plane through its closest point; inside is negative.
 
     The element found last, where it is now, bounds the search; a vertex that hardly moved on a body that stands still
-    (`moved` 0) keeps its plane.
+    (`moved` 0) keeps its plane, else its strand is woken.
     """
     k, s = wp.tid()
     if k < 2:
@@ -146,6 +147,7 @@ def body_planes(
         normal = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
         at = wp.vec3d(wp.float64(near[0]), wp.float64(near[1]), wp.float64(near[2]))
         found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at))
+    wake[s] = 1
     face[k, s] = element
     seen[k, s] = p
     plane[k, s] = found

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One time step after the other on a device: what `rods.simulate` is made of."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
@@ -60,7 +62,7 @@ class Stepper:
         self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=device)
         self.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
         self.residual = self._empty(wp.float64, (self.strands,))
-        self.used = self._empty(wp.int32, (self.strands,))
+        self.used, self.wake = (self._empty(wp.int32, (self.strands,)) for _ in range(2))
         self.points = self._empty(wp.vec3, shape[::-1])
         self.planes = self._empty(wp.vec4, shape[::-1])
         # a CPU runs its threads one after the other: one scratch column stays in the cache
@@ -99,12 +101,16 @@ class Stepper:
         self.x.assign(np.ascontiguousarray(np.swapaxes(points @ matrix.T + origin, 0, 1)))
         self.carry, self.carry_origin = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
 
-    def settle(self, dt: float, iterations: int) -> None:
-        """One step of a gradient flow towards the equilibrium of the pose."""
-        self.wp.copy(self.last, self.x)
-        if self.mesh is not None:
-            self._look(self.x, 1)
-        self._solve(dt, iterations, settling=1)
+    def settle(self, dts: Sequence[float], iterations: int) -> None:
+        """Follow a gradient flow, in steps of `dts` [s], to the equilibrium of the pose, or until nothing moves."""
+        for i, dt in enumerate(dts):
+            self.wp.copy(self.last, self.x)
+            self.used.zero_()
+            if self.mesh is not None:
+                self._look(self.x, int(i == 0))
+            self._solve(dt, iterations, settling=1)
+            if not self.used.numpy().any():
+                break
 
     def start_moving(self, before: np.ndarray) -> None:
         """Give every vertex the velocity that the head has when it came from `before` one step ago."""
@@ -150,11 +156,13 @@ class Stepper:
                 break
             if self.mesh is None and not self.clumped:
                 take = iterations
-            if self.mesh is not None and spent > 0:
-                self._look(self.x, 0)
+            if spent > 0:
+                self.wake.fill_(int(self.clumped))
+                if self.mesh is not None:
+                    self._look(self.x, 0)
             if spent == 0 or self.clumped:
                 self._gather(1.0 / dt, settling)
-            self._newton(take)
+            self._newton(take, int(spent > 0))
             spent += take
 
     def _gather(self, inverse_dt: float, settling: int) -> None:
@@ -165,15 +173,16 @@ class Stepper:
         )  # fmt: skip
         self._run(self.kernels.forces, args)
 
-    def _newton(self, iterations: int) -> None:
+    def _newton(self, iterations: int, again: int) -> None:
         args = [
-            self.constants, self.scratch, self.stride, self.x, self.tension, self.turn, self.target, self.pull, self.plane,
-            self.margin, self.collision, iterations, self.tolerance, self.residual, self.used,
+            self.constants, self.scratch, self.stride, self.x, self.tension, self.turn, self.target, self.pull,
+            self.plane, self.margin, self.collision, iterations, self.tolerance, again, self.wake, self.residual,
+            self.used,
         ]  # fmt: skip
         self.wp.launch(self.rod_kernels.newton, dim=self.strands, inputs=args, device=self.device)
 
     def _look(self, x: object, moved: int) -> None:
-        args = (self.mesh.id, REACH, moved, x, self.seen, self.face, self.corner, self.plane)
+        args = (self.mesh.id, REACH, moved, x, self.seen, self.face, self.corner, self.plane, self.wake)
         self._run(self.kernels.body_planes, args)
 
     def _pose(self, turn: np.ndarray, origin: np.ndarray) -> None:
