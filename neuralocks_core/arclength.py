@@ -7,8 +7,9 @@ import numpy as np
 
 from .groom import Groom
 
-SHORTEST = 1e-6
-"""A strand shorter than this [m] has no two distinct points as far as float32 hair is concerned."""
+SHORTEST = 2e-5
+"""A strand shorter than this [m] counts as one point: its 23 edges would be below float32's resolution at a
+head's height, and it is shorter than a hair is wide."""
 
 
 def resample(groom: Groom, vertices: int) -> tuple[np.ndarray, np.ndarray]:
