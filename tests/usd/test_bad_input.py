@@ -229,7 +229,7 @@ def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
     monkeypatch.setattr(spool.Spool, "write", full)
     with pytest.raises(NeuralocksError, match="no space left"):
         bake(shot, tmp_path / "out.usdc", model)
-    monkeypatch.setattr("usd.bake.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))
+    monkeypatch.setattr("usd.samples.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))
     with pytest.raises(NeuralocksError, match="needs"):
         bake(shot, tmp_path / "out.usdc", model)
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "file"}

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reference solver writes the same kind of layer as a bake."""
+
+import numpy as np
+import pytest
+
+from usd.simulate import simulate
+
+from .shots import Recipe, write_shot
+from .test_bake import samples, world_points
+
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+
+
+def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", strands=12, bound="mesh"))
+    result = simulate(shot, tmp_path / "out.usdc", strands=12)
+    first = world_points(result.path, 1.0)
+    assert np.abs(first - world_points(shot, 1.0)).max() < 1e-3
+    last = world_points(result.path, 9.0).reshape(12, 12, 3)
+    lengths = [np.linalg.norm(np.diff(p.reshape(12, 12, 3), axis=1), axis=-1).sum(1) for p in (first, last)]
+    assert np.abs(lengths[1] / lengths[0] - 1).max() < 0.05
+    assert np.abs(samples(result.path, "velocities", at=5.0)).max() > 1

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.errors import NeuralocksError
+
+from .bake import BakeResult, as_material, described
+from .placing import GroomPlacer
+from .samples import around, check_out, write_samples
+from .stage import Shot, StageGroom, read_shot
+from .time_codes import time_codes
+
+STRANDS = 2000
+"""Strands simulated where no number is given."""
+
+
+def simulate(
+    shot,
+    out,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    frames=None,
+    *,
+    subframes: int = 1,
+    material=None,
+    strands: int | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> BakeResult:
+    """Simulate a shot's hair and write it as a bake.
+
+    Args:
+        shot, out, grooms, skeleton, head, frames, subframes, material, progress: as for `bake`.
+        strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these.
+
+    Raises:
+        NeuralocksError: as `bake`, or the solver is not installed.
+    """
+    began = time.monotonic()
+    out = Path(out)
+    check_out(out)
+    look = as_material(material)
+    count = STRANDS if strands is None else strands
+    if count < 1:
+        raise NeuralocksError(f"--strands {count}: must be above 0")
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
+    codes = time_codes(frames, shot.first, shot.last, subframes)
+    inputs = {"solver": 1, "strands": count, "material": look.log_ratios().tolist(), "codes": codes}
+
+    def poser(item: StageGroom) -> _SimulatedPoser:
+        return _SimulatedPoser(item, codes, look, count, progress)
+
+    resumed = write_samples(shot, out, codes, poser, inputs, progress=progress)
+    return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)
+
+
+class _SimulatedPoser:
+    """Points of one groom out of a simulation of some of its strands."""
+
+    def __init__(self, item: StageGroom, codes: list[float], material, count: int, progress):
+        from neuralocks_core.comparison import simulated, whole_locks
+
+        self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
+        every = self._placer.strands
+        chosen = whole_locks(every, count)
+        if not len(chosen):
+            raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
+        # Simulation begins with the animation, whatever frames are wanted.
+        start = min(codes[0], float(self._rig.time_codes[0]))
+        times = sorted({start} | {t for code in codes for t in (code, *around(item, code))})
+        self._row = {code: row for row, code in enumerate(times)}
+        seconds = self._rig.border.seconds(times)
+        clip, character = self._rig.clip, item.attachment.character
+        self._moved = simulated(character, every.subset(chosen), clip, seconds, material, progress=progress)
+        mean = every.rest.mean(axis=1)
+        self._nearest = cKDTree(mean[chosen]).query(mean)[1]
+        self._nearest[chosen] = np.arange(len(chosen))
+
+    def points(self, time_code: float) -> np.ndarray:
+        """(P, 3) float32, in the prim's own space and units."""
+        moved = self._moved[self._row[time_code]]
+        joints = self._rig.joints_at(time_code)
+        return self._placer.points(time_code, joints, lambda strands: moved[self._nearest[strands]])
+
+    def close(self) -> None:
+        """Let the threads go."""
+        self._placer.close()
