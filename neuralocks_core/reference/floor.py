@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The least error that a method without memory can have: the reference itself, when it forgets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.metrics import motion_error, position_error
+from neuralocks_core.reference.rods import Progress, simulate
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Error of the forgetful reference against the one that remembers, at the frames looked at."""
+
+    history: int
+    """Frames it knows."""
+    frames: np.ndarray
+    """Those looked at."""
+    median: float
+    """Motion error of the median strand, relative to hair carried rigidly (= 1)."""
+    rms: float
+    """The same over all strands together: those that came to rest elsewhere weigh most."""
+    position_percent: float
+    """Mean distance in percent of strand length."""
+    position_median_percent: float
+    """Median over strands and frames of the same."""
+
+
+def stateless_floor(
+    rest: np.ndarray,
+    head: np.ndarray,
+    body: Sequence[np.ndarray] | np.ndarray | None = None,
+    triangles: np.ndarray | None = None,
+    material: Any = None,
+    *,
+    history: int = 60,
+    every: int = 10,
+    truth: np.ndarray | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Floor:
+    """Restart the reference at rest `history` frames before each frame looked at, and compare.
+
+    Hair that slid over a shoulder stays there; whoever sees only the last N frames cannot know. A network whose
+    error is near this one has nothing left to learn (docs/architecture.md, Reference). It costs `history / every` times a
+    simulation.
+
+    Args:
+        rest, head, body, triangles, material: as in `simulate`.
+        history: frames of motion that the method may see.
+        every: look at each n-th frame, from `history` on.
+        truth: (T, S, K, 3) points of `simulate` over the whole clip, where they are at hand.
+        progress: called with restarts done, all restarts, message.
+        options: of `simulate`; the same for both.
+
+    Raises:
+        NeuralocksError: the clip is not longer than the history, or as `simulate`.
+    """
+    count = len(head)
+    if history < 1 or every < 1 or count <= history + every:
+        raise NeuralocksError(
+            f"head: {count} frames for a history of {history} looked at every {every}; give a longer clip"
+        )
+    if truth is None:
+        truth = simulate(rest, head, body, triangles, material, **options).points
+    if body is not None and options.get("bind_body") is None:
+        # else each restart would measure the rest distances on its own first pose
+        first = np.asarray(head[0], float)
+        options["bind_body"] = (np.asarray(body[0]) - first[:3, 3]) @ first[:3, :3]
+    frames = np.arange(history, count, every)
+    forgetful = np.empty((len(frames), *np.shape(rest)), np.float32)
+    for i, frame in enumerate(frames):
+        span = slice(frame - history, frame + 1)
+        near = None if body is None else body[span]
+        forgetful[i] = simulate(rest, head[span], near, triangles, material, **options).points[-1]
+        if progress:
+            progress(i + 1, len(frames), "restarting")
+    length = np.linalg.norm(np.diff(rest, axis=1), axis=-1).sum(1)
+    error = motion_error(forgetful - rest, truth[frames] - rest, length)
+    gap = np.linalg.norm(forgetful - truth[frames], axis=-1).mean(-1) / length
+    position = position_error(forgetful - rest, truth[frames] - rest, length)
+    return Floor(history, frames, error["median"], error["rms"], position, float(100 * np.median(gap)))
