@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.formats.bvh import read_bvh
 from neuralocks_core.random_motion import random_clip
 from neuralocks_core.retarget import mirrored, retarget
@@ -48,6 +49,19 @@ def test_she_stands_on_her_feet_with_her_head_up(woman, path):
 
 
 @needs_capture
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+def test_each_naming_gives_whole_limbs(path):
+    """No socket without length stands for a thigh or an arm, and both sides are found."""
+    source = Character(read_bvh(path).skeleton)
+    bind = source.skeleton.bind[:, :3, 3]
+    for side in ("left", "right"):
+        for upper, lower in (("upper_leg", "lower_leg"), ("lower_leg", "foot"), ("upper_arm", "lower_arm")):
+            ends = [source.humanoid[f"{side}_{part}"] for part in (upper, lower)]
+            assert source.skeleton.parents[ends[1]] == ends[0]
+            assert np.linalg.norm(bind[ends[1]] - bind[ends[0]]) > 0.15
+
+
+@needs_capture
 def test_a_walk_walks(woman):
     clip = retarget(read_bvh(REAL / "02_01.bvh"), woman)
     hips = place(clip, woman, "hips")
@@ -70,8 +84,6 @@ def test_limbs_point_where_the_source_points(woman):
     """Bone directions are the source's own, whatever the rest poses."""
     for path in FILES[:1] + FILES[3:6]:
         motion = read_bvh(path)
-        from neuralocks_core.character import Character
-
         source = Character(motion.skeleton)
         clip = retarget(motion, woman)
         for child, joint in (("left_hand", "left_lower_arm"), ("right_foot", "right_lower_leg")):
@@ -93,8 +105,6 @@ def test_a_clip_mirrored_twice_is_itself(woman):
 
 def test_retargeting_to_a_turned_rig_turns_the_motion(woman, tmp_path):
     """A character bound facing another way does the same thing, seen from its own front."""
-    from neuralocks_core.character import Character, Skeleton
-
     if not FILES:
         pytest.skip("the shared motion capture is not there")
     whole = np.eye(4)
