@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Split inference beside the same network on whole inputs, and beside the machine's own matrix rate.
+
+    python benchmarks/inference.py [MODEL] [--threads 2]
+
+Times are medians of repeated calls, all in one run; compare the ratios, not the milliseconds of two machines. Run it
+on an idle machine.
+"""
+
+import argparse
+import logging
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+HIDDEN, OUTPUTS, CHUNK = 256, 72, 512
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", nargs="?")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--strands", type=int, nargs="+", default=[3000, 50000, 120000])
+    arguments = parser.parse_args()
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = str(arguments.threads)
+
+    from neuralocks_core.runtime import StrandModel
+
+    model = StrandModel.load(arguments.model, threads=arguments.threads)
+    print(f"{model.file.path}, {arguments.threads} threads; milliseconds a frame")
+    print(
+        f"{'strands':>8} {'whole':>9} {'split':>9} {'int8':>9} {'floor':>9} | {'whole/split':>11} {'split/floor':>11}"
+        f" | {'split error':>12} {'int8 error':>11}"
+    )
+    whole, eight = whole_graph(model), quantised(model)
+    real, vector = shipped(model)
+    for strands in arguments.strands:
+        session = Inputs(model, real, strands)
+        a, whole_ms = timed(lambda s=session, v=vector: s.whole(whole, v, arguments.threads))
+        b, split_ms = timed(lambda s=session, v=vector: s.split(model, v))
+        c, int8_ms = timed(lambda s=session, v=vector: s.split(model, v, eight)) if eight else (b, float("nan"))
+        floor_ms = floor(strands, arguments.threads)
+        print(
+            f"{strands:8d} {whole_ms:9.2f} {split_ms:9.2f} {int8_ms:9.2f} {floor_ms:9.2f} | {whole_ms / split_ms:11.2f} "
+            f"{split_ms / floor_ms:11.2f} | {np.abs(a - b).max():10.1e} m {1000 * np.abs(c - b).max():8.2f} mm"
+        )
+
+
+class Inputs:
+    """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
+
+    def __init__(self, model, real, strands: int):
+        from neuralocks_core.runtime import strand_inputs
+
+        take = np.arange(strands) % len(real.rest)
+        session = model.prepare(real)
+        self.strand = strand_inputs(real, session.codes)[take]
+        edges = np.zeros_like(real.rest)
+        edges[:, 1:] = np.diff(real.rest, axis=1)
+        self.edges = edges.reshape(len(edges), OUTPUTS)[take]
+        self.anchor = np.zeros_like(self.edges)
+        self.part = model.run("strand.onnx", "strand_part", strand=self.strand)
+
+    def split(self, model, vector, tail=None) -> np.ndarray:
+        """As the runtime does it: the body once, then chunks of strands."""
+        frame = model.frame_part(vector)
+        result = np.empty_like(self.edges)
+        run = (
+            (lambda feed: tail.run(["displacement"], feed)[0])
+            if tail
+            else (lambda feed: model.run("tail.onnx", "displacement", **feed))
+        )
+
+        def work(chunk):
+            result[chunk] = run(
+                {
+                    "strand_part": self.part[chunk],
+                    "frame_part": frame,
+                    "anchor": self.anchor[chunk],
+                    "edges": self.edges[chunk],
+                }
+            )
+
+        model.by_chunk(work, len(result))
+        return result
+
+    def whole(self, session, vector, threads: int) -> np.ndarray:
+        """The network as one: every strand's input holds the body too, all strands in one call."""
+        inputs = np.concatenate([self.strand, np.broadcast_to(vector, (len(self.strand), len(vector)))], axis=1)
+        return session.run(["displacement"], {"input": inputs, "anchor": self.anchor, "edges": self.edges})[0]
+
+
+def shipped(model):
+    """Strands of the shipped groom, and the boundary vector of the middle of the shipped shot."""
+    from neuralocks_core.strands import strand_set
+    from usd.demo import shipped_shot
+    from usd.stage import read_shot
+
+    item = read_shot(shipped_shot()).grooms[0]
+    character, clip = item.attachment.character, item.attachment.rig.clip
+    strands = strand_set(item.groom, character.canonical_to_bind[:3, 3], character.head_centre, character.facing)
+    return strands, model.sampler(character, clip).vectors([(clip.start + clip.end) / 2])[0]
+
+
+def whole_graph(model):
+    """One ONNX graph over (S, 70 + F): the two parts of the first layer put back together."""
+    import onnx
+    import onnxruntime
+    from onnx import helper, numpy_helper
+
+    parts = {name: onnx.load_from_string(model.file.graphs[f"{name}.onnx"]) for name in ("strand", "frame", "tail")}
+    values = {t.name: numpy_helper.to_array(t) for part in parts.values() for t in part.graph.initializer}
+    weight = np.concatenate([values["strand_part.weight"], values["frame_part.weight"]])
+    bias = values["strand_part.bias"] + values["frame_part.bias"]
+    tail = parts["tail"].graph
+    nodes = [helper.make_node("Gemm", ["input", "whole.weight", "whole.bias"], ["sum"]), *list(tail.node)[1:]]
+    inputs = [
+        helper.make_tensor_value_info("input", onnx.TensorProto.FLOAT, ["S", len(weight)]),
+        *(i for i in tail.input if i.name in ("anchor", "edges")),
+    ]
+    weights = [numpy_helper.from_array(weight, "whole.weight"), numpy_helper.from_array(bias, "whole.bias")]
+    graph = helper.make_graph(nodes, "whole", inputs, list(tail.output), [*tail.initializer, *weights])
+    whole = helper.make_model(graph, opset_imports=parts["tail"].opset_import, ir_version=parts["tail"].ir_version)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = model.threads
+    return onnxruntime.InferenceSession(whole.SerializeToString(), options, providers=["CPUExecutionProvider"])
+
+
+def quantised(model):
+    """The tail with dynamic 8-bit matrix products, or None where onnxruntime's tools are missing."""
+    import tempfile
+
+    import onnxruntime
+
+    logging.disable(logging.WARNING)
+    try:
+        from onnxruntime.quantization import QuantType, quantize_dynamic
+    except ImportError:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = Path(folder) / "tail.onnx", Path(folder) / "tail8.onnx"
+        source.write_bytes(model.file.graphs["tail.onnx"])
+        quantize_dynamic(source, target, weight_type=QuantType.QInt8, nodes_to_exclude=["running"], per_channel=True)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        return onnxruntime.InferenceSession(target.read_bytes(), options, providers=["CPUExecutionProvider"])
+
+
+def floor(strands: int, threads: int) -> float:
+    """Milliseconds that the two matrix products left would take at the best rate of this machine's matrix library."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    import onnxruntime
+    from onnx import TensorProto, helper, numpy_helper
+
+    rng = np.random.default_rng(0)
+    weight = rng.normal(size=(HIDDEN, HIDDEN)).astype(np.float32)
+    graph = helper.make_graph(
+        [helper.make_node("MatMul", ["x", "w"], ["y"])],
+        "product",
+        [helper.make_tensor_value_info("x", TensorProto.FLOAT, [CHUNK, HIDDEN])],
+        [helper.make_tensor_value_info("y", TensorProto.FLOAT, [CHUNK, HIDDEN])],
+        [numpy_helper.from_array(weight, "w")],
+    )
+    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(proto.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    x = rng.normal(size=(CHUNK, HIDDEN)).astype(np.float32)
+    with ThreadPoolExecutor(threads) as pool:
+
+        def burst():
+            list(pool.map(lambda _: session.run(None, {"x": x}), range(64)))
+
+        _, once = timed(burst)
+    work = strands * (HIDDEN * HIDDEN + HIDDEN * OUTPUTS)
+    return once * work / (64 * CHUNK * HIDDEN * HIDDEN)
+
+
+def timed(function, seconds: float = 1.5):
+    """Result, and the median wall time of a call [ms]."""
+    result = function()
+    spent = []
+    while sum(spent) < seconds and len(spent) < 200 or len(spent) < 5:
+        start = time.perf_counter()
+        result = function()
+        spent.append(time.perf_counter() - start)
+    return result, 1000 * float(np.median(spent))
+
+
+if __name__ == "__main__":
+    main()
