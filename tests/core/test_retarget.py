@@ -1,5 +1,6 @@
 """Motion capture on the shipped body looks right: upright, on its feet, the same left and right."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,11 @@ def woman():
     return read_rigs(HERE.parents[2] / "examples" / "shot" / "body.usdc")[0].character
 
 
+@cache
+def take(path):
+    return read_bvh(path)
+
+
 def place(clip, character, name):
     return clip.joints[:, character.humanoid[name], :3, 3]
 
@@ -32,7 +38,7 @@ def place(clip, character, name):
 @needs_capture
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_she_stands_on_her_feet_with_her_head_up(woman, path):
-    clip = retarget(read_bvh(path), woman)
+    clip = retarget(take(path), woman)
     head, hips = place(clip, woman, "head"), place(clip, woman, "hips")
     assert np.median(head[:, 1] - hips[:, 1]) > 0.45
     up = woman.relative_rotations(clip.joints, [woman.head])[:, 0, 1, 1]
@@ -52,7 +58,7 @@ def test_she_stands_on_her_feet_with_her_head_up(woman, path):
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_each_naming_gives_whole_limbs(path):
     """No socket without length stands for a thigh or an arm, and both sides are found."""
-    source = Character(read_bvh(path).skeleton)
+    source = Character(take(path).skeleton)
     bind = source.skeleton.bind[:, :3, 3]
     for side in ("left", "right"):
         for upper, lower in (("upper_leg", "lower_leg"), ("lower_leg", "foot"), ("upper_arm", "lower_arm")):
@@ -63,7 +69,7 @@ def test_each_naming_gives_whole_limbs(path):
 
 @needs_capture
 def test_a_walk_walks(woman):
-    clip = retarget(read_bvh(REAL / "02_01.bvh"), woman)
+    clip = retarget(take(REAL / "02_01.bvh"), woman)
     hips = place(clip, woman, "hips")
     speed = np.linalg.norm(hips[-1] - hips[0]) / clip.end
     assert 0.6 < speed < 2.2
@@ -83,7 +89,7 @@ def test_a_walk_walks(woman):
 def test_limbs_point_where_the_source_points(woman):
     """Bone directions are the source's own, whatever the rest poses."""
     for path in FILES[:1] + FILES[3:6]:
-        motion = read_bvh(path)
+        motion = take(path)
         source = Character(motion.skeleton)
         clip = retarget(motion, woman)
         for child, joint in (("left_hand", "left_lower_arm"), ("right_foot", "right_lower_leg")):
@@ -111,6 +117,6 @@ def test_retargeting_to_a_turned_rig_turns_the_motion(woman, tmp_path):
     whole[:3, :3] = from_vector(np.array([0, 1.1, 0]))
     skeleton = woman.skeleton
     turned = Character(Skeleton(skeleton.names, skeleton.parents, whole @ skeleton.bind))
-    motion = read_bvh(REAL / "02_01.bvh")
+    motion = take(REAL / "02_01.bvh")
     straight, other = retarget(motion, Character(skeleton)), retarget(motion, turned)
     assert np.allclose(whole @ straight.joints, other.joints, atol=1e-9)
