@@ -79,7 +79,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "FLOOR": _float(np.float32(1) - size * size),
         "BINS": len(spec.bins),
         "STEPS": spec.steps,
-        "BIN_STEPS": ", ".join(str(b) for b in spec.bins),
+        "BINSTEPS": ", ".join(str(b) for b in spec.bins),
         "TAPER": ", ".join(_float(v) for v in _taper(spec)),
         "DT": repr(float(spec.dt)),
     }

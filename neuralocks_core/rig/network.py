@@ -6,7 +6,7 @@ variant, the history of effective gravity and angular velocity. It gives one bou
 axes, and exactly none for the bind pose at rest.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -160,7 +160,8 @@ class RigSampler:
     """What a rig model reads of one character in one clip, at any time: the same whatever the clip's rate and the order of asking."""
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
-        self._sampler = BoundarySampler(spec, character, clip)
+        # The network does not read the body's shape: measuring it would be most of the work.
+        self._sampler = BoundarySampler(spec, replace(character, body=None), clip)
         self._columns = feature_columns(spec)
 
     def features(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:

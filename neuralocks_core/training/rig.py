@@ -21,7 +21,7 @@ Progress = Callable[[int, int, str], None]
 
 def train_static(
     rig: HairRig,
-    material: RigMaterial = RigMaterial(),  # noqa: B008  frozen
+    material: RigMaterial = RigMaterial(),
     *,
     seconds: float = 75.0,
     steps: int | None = None,

@@ -27,7 +27,7 @@ class RigMaterial:
         rest_support: hold the bind pose against its own weight: it is as the artist wants it.
     """
 
-    bend: float = 3e-3
+    bend: float = 1e-2
     weight: float = 1.0
     collision: float = 3e7
     margin: float = 0.008

@@ -97,6 +97,10 @@ class PosePool:
             offsets[row][self._cut[nearest]] = -1e3
         return normals, offsets
 
+    def around(self, pose: int, points: np.ndarray, reach: float) -> list:
+        """For each point (n, 3), the kept body vertices within `reach` [m], as indices into `points[pose]`."""
+        return [self.kept[hits] for hits in self._trees[pose].query_ball_point(points, reach)]
+
 
 def _random_skinning(character, count, rng) -> np.ndarray:
     """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less; the first is the bind pose."""
@@ -140,3 +144,25 @@ def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     face = np.cross(b - a, c - a)
     total = np.stack([np.bincount(triangles.ravel(), np.repeat(face[:, i], 3), len(points)) for i in range(3)], axis=1)
     return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)).astype(np.float32)
+
+
+def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tuple[np.ndarray, np.ndarray] | None:
+    """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in canonical space of the head."""
+    body, character = rig.character.body, rig.character
+    if body is None:
+        return None
+    to_canonical = np.linalg.inv(character.canonical_to_bind)
+    canonical = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
+    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
+    near = np.flatnonzero(used)
+    chosen = np.sort(np.random.default_rng(0).permutation(near)[:most_points])
+    normals = _normals(body.points.astype(np.float32), body.triangles)[chosen].astype(float)
+    to_head = np.linalg.inv(character.canonical_to_world(joints))
+    skinning = to_head[:, None] @ joints @ character.inverse_bind
+    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
+    for row, matrices in enumerate(skinning):
+        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
+        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
+        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
+    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)

@@ -63,7 +63,7 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
         outside = _distances(rest, [0], rig.points[None])[0] > 0
         for name, q in (("network", turns), ("rigid", rigid)):
             points = skin(chains, *pose_chains(chains, quaternion_matrices(q)), rig.points, rig.weights)
-            distance = np.where(outside, _distances(pool, poses, points), 1.0)
+            distance = np.where(outside, _distances(pool, poses, points, exact=name == "network"), 1.0)
             report[f"penetration_{name}"] = {
                 "percent": 100 * float((distance < 0).sum() / (count * max(outside.sum(), 1))),
                 "percent_deeper_than_3_mm": 100 * float((distance < -3e-3).sum() / (count * max(outside.sum(), 1))),
@@ -104,19 +104,21 @@ def _optimise(energy, pool, poses, gravity, max_angle, start, steps: int = 250):
     return float(lowest.mean()), state
 
 
-def _distances(pool: PosePool, poses, points: np.ndarray) -> np.ndarray:
-    """Signed distances (B, V) [m] to the exact body surface where a vertex may be in it, 1 elsewhere."""
+def _distances(pool: PosePool, poses, points: np.ndarray, exact: bool = True) -> np.ndarray:
+    """Signed distances (B, V) [m] to the body where a vertex may be in it, 1 elsewhere; to planes of vertices if not `exact`."""
     normals, offsets = pool.planes(poses, points)
     plane = np.einsum("bvi,bvi->bv", normals, points) - offsets
-    result = np.ones(plane.shape)
-    for row, pose in enumerate(poses):
+    result = np.where(plane < 2e-3, plane, 1.0)
+    for row, pose in enumerate(poses if exact else ()):
         near = np.flatnonzero(plane[row] < 2e-3)
-        if len(near):
-            body, at = pool.points[pose], points[row][near]
-            # Only the surface around these vertices is built.
-            reach = np.zeros(len(body), bool)
-            for hits in pool._trees[pose].query_ball_point(at, 0.045):
-                reach[pool.kept[hits]] = True
-            faces = pool.triangles[reach[pool.triangles].any(axis=1)]
-            result[row, near] = Collider(body, faces).distance(at)[0] if len(faces) else 1.0
+        if not len(near):
+            continue
+        body, at = pool.points[pose], points[row][near]
+        hits = pool.around(pose, at, 0.045)
+        reach = np.zeros(len(body), bool)
+        reach[np.unique(np.concatenate([np.asarray(h, int) for h in hits]))] = True
+        # Around vertices at the surface a patch of it is enough; one that is far from it needs the whole to tell its side.
+        whole = any(len(h) == 0 for h in hits)
+        faces = pool.triangles if whole else pool.triangles[reach[pool.triangles].any(axis=1)]
+        result[row, near] = Collider(body, faces).distance(at)[0]
     return result

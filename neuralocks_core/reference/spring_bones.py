@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""VRM spring bones, as specified (VRM 1.0 VRMC_springBone): what avatars' hair moves by today.
+
+    next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt + gravity direction * gravity power dt
+
+then back to the bone's length, out of colliders, and the joint turns from its rest axis to the new one. State is carried from frame to frame, and
+drag acts per frame, whatever its length: that is the specified behaviour.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neuralocks_core.reference.chains import _normalised, _product
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.kinematics import quaternion_matrices
+
+
+@dataclass(frozen=True)
+class SpringSettings:
+    """The specified parameters; their defaults are VRM's.
+
+    Attributes:
+        stiffness: pull to the rest direction [m/s].
+        drag: share of the tail's motion that is lost each frame.
+        gravity_power: pull downwards [m/s].
+        hit_radius: of a tail [m].
+    """
+
+    stiffness: float = 1.0
+    drag: float = 0.4
+    gravity_power: float = 0.0
+    hit_radius: float = 0.0
+
+
+def spring_bones(
+    chains: HairChains,
+    heads: np.ndarray,
+    step: float,
+    settings: SpringSettings = SpringSettings(),
+    spheres: np.ndarray | None = None,
+) -> np.ndarray:
+    """Turns (C, T, N, 4) wxyz, canonical, of joints that swing as spring bones.
+
+    Args:
+        chains: the hair joints.
+        heads: canonical space to world, (C, T, 4, 4).
+        step: time between frames [s].
+        settings: as the artist sets them.
+        spheres: colliders fixed to the head: centre and radius, canonical, (K, 4) [m].
+    """
+    heads = np.asarray(heads, float)
+    clips, frames = heads.shape[:2]
+    first = np.array([np.flatnonzero(chains.bone_joint == j)[0] for j in range(len(chains))])
+    bones, lengths = chains.bones[first], chains.lengths[first]
+    way = chains.origins - np.where((chains.parents >= 0)[:, None], chains.origins[chains.parents], 0)
+    rest_tail = chains.origins + bones
+    tail = np.einsum("cij,nj->cni", heads[:, 0, :3, :3], rest_tail) + heads[:, 0, None, :3, 3]
+    previous = tail.copy()
+    result = np.empty((clips, frames, len(chains), 4), np.float32)
+    for frame in range(frames):
+        rotation, origin = heads[:, frame, :3, :3], heads[:, frame, :3, 3]
+        world = np.empty((clips, len(chains), 3, 3))
+        place = np.empty((clips, len(chains), 3))
+        for j, parent in enumerate(chains.parents):
+            carrier = rotation if parent < 0 else world[:, parent]
+            place[:, j] = (origin if parent < 0 else place[:, parent]) + carrier @ way[j]
+            axis = carrier @ (bones[j] / lengths[j])
+            new = tail[:, j] + (tail[:, j] - previous[:, j]) * (1 - settings.drag)
+            new = new + axis * settings.stiffness * step + np.array([0.0, -1.0, 0.0]) * settings.gravity_power * step
+            new = _at_length(place[:, j], new, lengths[j])
+            for sphere in spheres if spheres is not None else ():
+                centre = rotation @ sphere[:3] + origin
+                off = new - centre
+                distance = np.linalg.norm(off, axis=-1, keepdims=True)
+                reach = sphere[3] + settings.hit_radius
+                out = centre + off / np.maximum(distance, 1e-9) * reach
+                new = np.where(distance < reach, _at_length(place[:, j], out, lengths[j]), new)
+            previous[:, j], tail[:, j] = tail[:, j], new
+            local = np.einsum("cji,cj->ci", carrier, new - place[:, j]) / lengths[j]
+            turn = _from_to(bones[j] / lengths[j], local)
+            result[:, frame, j] = turn
+            world[:, j] = carrier @ quaternion_matrices(turn)
+    return result
+
+
+def _at_length(origin, point, length):
+    way = point - origin
+    return origin + way * (length / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9))
+
+
+def _from_to(a, b):
+    """Smallest turns (C, 4) wxyz from direction a (3,) to directions b (C, 3)."""
+    cross = np.cross(np.broadcast_to(a, b.shape), b)
+    half = np.concatenate([1 + (b @ a)[:, None], cross], axis=-1)
+    opposite = half[:, 0] < 1e-6
+    side = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
+    half[opposite] = np.concatenate([[0.0], side])
+    return _normalised(_product(half, np.array([1.0, 0.0, 0.0, 0.0])))

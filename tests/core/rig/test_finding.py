@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chains are found by themselves on rigs of any naming, and what cannot be used is named in one line."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig import HairChains, find_chains
+from neuralocks_core.rotation import from_vector
+from tests.core.rig.builders import character, skin, tail
+
+
+def test_chains_by_name_with_end_joints():
+    """The last joint of each chain drives nothing: it is the end of a bone and does not move."""
+    who = character([*tail("Hair_L", 3), *tail("Hair_R", 2), ("Eye_L", "head", (0.03, 1.6, 0.1))])
+    chains = find_chains(who)
+    assert chains.names == ("Hair_L_1", "Hair_L_2", "Hair_R_1")
+    assert list(chains.parents) == [-1, 0, -1]
+    assert chains.chain_length(0) == pytest.approx(2 * np.hypot(0.06, 0.01))
+
+
+def test_strange_names_are_found_by_what_they_drive():
+    """A subtree that drives only a mesh of its own is hair; the jaw and what drives the body's mesh are not."""
+    who = character([*tail("J_opt_C_01", 2), *tail("jaw", 2, at=(0, 1.5, 0.1)), *tail("cable", 2, at=(0.1, 1.6, 0))])
+    lock = skin(who, {"J_opt_C_01_1": np.eye(3) * 0.1 + [0, 1.6, -0.1]})
+    body = skin(who, {"hips": np.eye(3), "head": np.eye(3) + 1, "cable_1": np.eye(3)})
+    jaw = skin(who, {"jaw_1": np.eye(3)})
+    assert find_chains(who, [lock, body, jaw]).names == ("J_opt_C_01_1",)
+
+
+def test_a_branching_chain_is_one_chain():
+    """Both branches hang from the joint that forks, and its bones go to both."""
+    fork = tail("hair_a", 3, at=(0.02, 1.5, -0.1), parent="hair_2") + tail(
+        "hair_b", 2, at=(-0.02, 1.5, -0.1), parent="hair_2"
+    )
+    chains = find_chains(character([*tail("hair", 2), *fork]))
+    assert len(chains.roots) == 1
+    assert (chains.bone_joint == chains.names.index("hair_2")).sum() == 2
+
+
+def test_a_last_joint_with_skin_moves():
+    """Its bone reaches as far as the skin that it drives."""
+    who = character(tail("hair", 2, step=(0, -0.06, 0)))
+    mesh = skin(who, {"hair_1": [[0, 1.6, -0.1]] * 3, "hair_2": [[0, 1.54, -0.1], [0, 1.5, -0.1], [0, 1.44, -0.1]]})
+    chains = find_chains(who, [mesh])
+    assert chains.names == ("hair_1", "hair_2")
+    np.testing.assert_allclose(chains.bones[1], [0, -0.10, 0], atol=1e-12)
+
+
+def test_joint_orients_and_facing_cancel():
+    """The same rig with turned joints and a turned body has the same chains in canonical space."""
+    plain = find_chains(character(tail("hair", 3)))
+    who = character(tail("hair", 3), turn=from_vector(np.array([0.3, -1.0, 0.6])))
+    turn = np.eye(4)
+    turn[:3, :3] = from_vector(np.array([0, 2.1, 0]))
+    moved = Character(Skeleton(who.skeleton.names, who.skeleton.parents, turn @ who.skeleton.bind))
+    other = find_chains(moved)
+    np.testing.assert_allclose(other.origins, plain.origins, atol=1e-9)
+    np.testing.assert_allclose(other.bones, plain.bones, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("extra", "patterns", "words"),
+    [
+        ([], None, "no hair chains"),
+        (tail("hair", 3, step=(0, 0, 0)), None, "has no length"),
+        (tail("hair", 2), ["nothing*"], "no joint has such a name"),
+        (tail("hair", 2), ["chest"], "does not hang below"),
+    ],
+)
+def test_bad_rigs_are_refused(extra, patterns, words):
+    """One line with the joint's name and a remedy."""
+    with pytest.raises(NeuralocksError, match=words):
+        find_chains(character(extra), None, patterns)
+
+
+def test_a_mirrored_or_unevenly_scaled_joint_is_refused():
+    """Rotations cannot be written for them."""
+    who = character(tail("hair", 3))
+    for scale, words in (((-1, 1, 1), "mirrored"), ((1, 2, 1), "unevenly scaled")):
+        bind = who.skeleton.bind.copy()
+        bind[-2, :3, :3] = np.diag(scale)
+        with pytest.raises(NeuralocksError, match=words):
+            find_chains(Character(Skeleton(who.skeleton.names, who.skeleton.parents, bind)))
+
+
+def test_a_model_for_other_chains_is_refused():
+    """By a missing name, and by bones of another length."""
+    chains = find_chains(character(tail("hair", 3)))
+    with pytest.raises(NeuralocksError, match="train a model for this rig"):
+        chains.match(["head", "head/hair_1"])
+    longer = find_chains(character(tail("hair", 3, step=(0, -0.08, 0))))
+    with pytest.raises(NeuralocksError, match="elsewhere"):
+        chains.check_same(longer)
+    assert HairChains.from_json(chains.to_json()).names == chains.names

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One network in numpy, ONNX and C: the same answers, bounded for anything."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.export_c import export_c
+from neuralocks_core.rig import RigModel, rig_spec
+from neuralocks_core.rig.graph import rig_graph
+from neuralocks_core.rig.network import held_features
+from neuralocks_core.rotation import from_quaternion
+from tests.core.rig.builders import random_model
+
+FLAGS = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
+COMPILERS = [
+    (name, lang, std)
+    for name, lang, std in (
+        ("gcc", "c", "c99"),
+        ("g++", "c++", "c++11"),
+        ("clang", "c", "c99"),
+        ("clang++", "c++", "c++11"),
+    )
+    if shutil.which(name)
+]
+HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static float x[NL_HAIR_FEATURES];
+  static nl_hair_output out;
+  while (fread(x, sizeof(float), NL_HAIR_FEATURES, stdin) == NL_HAIR_FEATURES) {
+    nl_hair_turns(x, &out);
+    fwrite(&out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+INPUT_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_input in;
+  static float x[NL_HAIR_FEATURES];
+  while (fread(&in, sizeof in, 1, stdin) == 1) {
+    nl_hair_features(&in, x);
+    fwrite(x, sizeof x, 1, stdout);
+  }
+  return 0;
+}
+"""
+
+
+def compiled(folder, source, options=("-O2",), compiler=("gcc", "c", "c99")):
+    """Build a program beside the header."""
+    (folder / "main.src").write_text(source)
+    name, lang, std = compiler
+    command = [name, "-x", lang, f"-std={std}", *FLAGS, *options, "main.src", "-lm", "-o", "main"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder / "main"
+
+
+def run_c(program, inputs, width):
+    """Feed float32 rows, read float32 rows."""
+    done = subprocess.run([program], input=np.asarray(inputs, "<f4").tobytes(), capture_output=True, check=True)
+    return np.frombuffer(done.stdout, "<f4").reshape(-1, width)
+
+
+def random_features(model, count, seed=1):
+    """Features of random held poses, and a random history."""
+    rng = np.random.default_rng(seed)
+    relative = from_quaternion(rng.normal(size=(count, 2, 4)))
+    gravity = rng.normal(size=(count, 3))
+    features = held_features(model.spec, relative, gravity / np.linalg.norm(gravity, axis=1, keepdims=True))
+    features[:, 15:] = rng.normal(0, 0.5, features[:, 15:].shape)
+    return features
+
+
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_onnx_and_c_agree_with_numpy(tmp_path, dynamic):
+    """Within 1e-6 on 10,000 random inputs."""
+    ort = pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnx")
+    model = random_model(hidden=32 if dynamic else 16, spec=rig_spec(dynamic))
+    features = random_features(model, 10_000)
+    ours = model.evaluate(features)
+    session = ort.InferenceSession(rig_graph(model), providers=["CPUExecutionProvider"])
+    theirs = session.run(None, {"features": features})[0]
+    assert np.abs(ours - theirs).max() < 1e-6
+    assert np.abs(np.linalg.norm(ours, axis=-1) - 1).max() < 1e-6
+    if shutil.which("gcc") is None:
+        pytest.skip("no gcc to compile the header with")
+    export_c(model, tmp_path / "hair.h")
+    c = run_c(compiled(tmp_path, HARNESS), features, ours[0].size).reshape(ours.shape)
+    assert np.abs(c - theirs).max() < 1e-6
+
+
+@pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+@pytest.mark.parametrize("compiler", COMPILERS, ids=lambda c: c[0])
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_header_and_example_compile_without_a_warning(tmp_path, compiler, dynamic):
+    """As C99 and as C++; the worked example runs."""
+    export_c(random_model(spec=rig_spec(dynamic)), tmp_path / "hair.h")
+    source = (tmp_path / "hair_example.c").read_text()
+    for options in (("-O0",), ("-O3", "-march=native")):
+        program = compiled(tmp_path, source, options, compiler)
+        assert "hair_0_1 turns by" in subprocess.run([program], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_anything_gives_a_bounded_unit_quaternion(tmp_path):
+    """Huge, tiny and even infinite numbers, in C and in numpy."""
+    model = random_model()
+    export_c(model, tmp_path / "hair.h")
+    rng = np.random.default_rng(0)
+    wild = (rng.choice([0, 1e-38, 1, 1e10, 3.4e38], (500, 15)) * rng.choice([-1, 1], (500, 15))).astype(np.float32)
+    c = run_c(compiled(tmp_path, HARNESS), wild, 16 * 4).reshape(500, 16, 4)
+    for turns in (c, model.evaluate(wild)):
+        assert np.abs(np.linalg.norm(turns, axis=-1) - 1).max() < 1e-5
+        assert turns[..., 0].min() > np.cos(model.max_angle / 2) - 1e-5
+    raw = np.full((1, 27 - 12), 3.4e38, np.float32)
+    inputs = run_c(compiled(tmp_path, INPUT_HARNESS), raw, 15)
+    assert np.isfinite(run_c(compiled(tmp_path, HARNESS), inputs, 64)).all()
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_features_from_quaternions(tmp_path):
+    """The header's own features are those that training and baking use."""
+    model = random_model()
+    export_c(model, tmp_path / "hair.h")
+    rng = np.random.default_rng(3)
+    q = rng.normal(size=(200, 3, 4))
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    down = np.tile([0.0, -1.0, 0.0], (200, 1))
+    head, neck, chest = np.moveaxis(from_quaternion(q), 1, 0)
+    relative = np.swapaxes(head, -1, -2)[:, None] @ np.stack([neck, chest], axis=1)
+    wanted = held_features(model.spec, relative, np.einsum("nji,nj->ni", head, down))
+    rows = np.concatenate([q.reshape(200, 12), down], axis=1)
+    assert np.abs(run_c(compiled(tmp_path, INPUT_HARNESS), rows, 15) - wanted).max() < 2e-6
+
+
+def test_batch_and_single_agree():
+    """One avatar is a row of the batch."""
+    model = random_model()
+    features = random_features(model, 50)
+    np.testing.assert_allclose(model.evaluate(features)[7], model.evaluate(features[7]), atol=1e-6)
+
+
+def test_model_file_round_trip(tmp_path):
+    """Bit for bit, and damage is told in one line."""
+    pytest.importorskip("onnx")
+    model = random_model()
+    path = model.save(tmp_path / "m.neuralocks")
+    again = RigModel.load(path)
+    features = random_features(model, 20)
+    assert (again.evaluate(features) == model.evaluate(features)).all()
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(NeuralocksError, match="m.neuralocks"):
+        RigModel.load(path)
+    with pytest.raises(NeuralocksError, match="numbers per avatar"):
+        model.evaluate(np.zeros(7))
+
+
+HISTORY_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_history history;
+  static float row[8], out[6 * NL_HAIR_BINS];
+  const float down[3] = {0.0f, -1.0f, 0.0f};
+  nl_hair_history_reset(&history);
+  while (fread(row, sizeof row, 1, stdin) == 1) {
+    nl_hair_history_push(&history, (double)row[0], row + 1, row + 4);
+    nl_hair_history_read(&history, down, out);
+    fwrite(out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+@pytest.mark.parametrize("rate", [30, 60, 47])
+def test_the_headers_history_is_that_of_the_bake(tmp_path, rate):
+    """A nodding, swaying head, pushed at three frame rates."""
+    from neuralocks_core.motion import Clip
+    from neuralocks_core.rig import RigSampler
+    from neuralocks_core.rotation import from_vector, to_quaternion
+    from tests.core.rig.builders import character
+
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    who = character()
+    t = np.arange(0, 4, 1 / rate)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.6 * np.sin(4 * t) * np.minimum(t, 1), [1, 0.4, 0]))
+    joints[:, who.head, 0, 3] += 0.15 * np.sin(5 * t) * np.minimum(t, 1)
+    wanted = RigSampler(model.spec, who, Clip(t, joints)).features(t)[:, 15:]
+    quaternions = to_quaternion(joints[:, who.head, :3, :3])
+    rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
+    ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, wanted.shape[1])
+    late = t > 2
+    error = np.sqrt(np.square(ours - wanted)[late].mean() / np.square(wanted[late]).mean())
+    assert error < 0.1, error
