@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each choice of the paper's own training is worth: one table row per variant, same scene, seed and steps.
+
+    python benchmarks/selfsupervised.py OUT.neuralocks.training --character BODY.usd --groom GROOM.usd ... --steps 700
+
+The folder is what `neuralocks train --keep-work` leaves behind: strand codes, and the solver's rollouts of held-out
+strands and motion that all variants are measured on. Nothing of it is learned from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.physics.bend_twist import Cosserat
+from neuralocks_core.strands import scalp_local
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.farm import load
+from neuralocks_core.training.gauge import measure
+from neuralocks_core.training.lessons import MomentLesson, normalise
+from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.regression import RolloutBank
+from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
+from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary
+
+OURS, PAPER = SelfSupervisedOptions(), SelfSupervisedOptions.paper()
+ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {
+    "defaults": (OURS, None),
+    "the paper, all of it": (PAPER, paper_boundary()),
+    "the paper, direction output": (replace(PAPER, output="direction"), paper_boundary()),
+    "detached inertia only": (replace(OURS, undetached=0.0), None),
+    "displacement output": (replace(OURS, output="displacement"), None),
+    "static": (replace(OURS, static=True), None),
+    "no warm-up": (replace(OURS, warmup=0.0), None),
+    "straight transport": (replace(OURS, form=Cosserat.DIRECT), None),
+    "constant director (Quaffure)": (replace(OURS, form=Cosserat.CONSTANT), None),
+    "adhesion without rest distance": (replace(OURS, paper_adhesion=True), None),
+    "style held near the body": (replace(OURS, style=(2500.0,)), None),
+    "no self-collision": (replace(OURS, volume=0.0), None),
+}
+"""Variant -> options, and the boundary history where it is not the scene's."""
+
+
+def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
+    """Train and measure each variant; prints a Markdown table as it goes."""
+    coder = StrandAutoencoder()
+    checkpoint.load(work / "codes.npz", {"coder": coder})
+    codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
+    files = sorted((work / "held_out").glob("*.npz"))
+    names = "position static motion motion_static motion_ratio velocity droop penetration".split()
+    print(f"{steps} steps each, seed {scene.seed}; rigid hair: motion and velocity 1, motion ratio and droop 0\n")
+    print("| variant | s | " + " | ".join(names) + " |")
+    print("| --- |" + " ---: |" * (len(names) + 1))
+    for row in rows:
+        options, spec = ROWS[row]
+        options, own = replace(options, steps=steps), replace(scene, spec=spec or scene.spec)
+        held_scene = replace(own, held_out=True)
+        held = RolloutBank(held_scene, codes)
+        held.rollouts = [load(path) for path in files]
+        if spec is not None:
+            maker = RolloutMaker(held_scene)
+            held.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files, held.rollouts)]
+        start = time.monotonic()
+        teacher = MomentLesson(own, codes, options, None, lambda done, message: None)
+        torch.manual_seed(options.seed)
+        net = StrandNet(own.spec.size, motion=options.motion)
+        history = own.spec.slices["history"]
+        normalise(net, *teacher.samples(), history, options.static)
+        for _ in teacher.train(net, None):
+            pass
+        card = measure(net, held, options.output, history, options.supported).to_json()
+        cells = " | ".join(f"{card[name]:.3g}" for name in names)
+        print(f"| {row} | {time.monotonic() - start:.0f} | {cells} |", flush=True)
+
+
+def main() -> None:
+    """Command line."""
+    from usd.training import training_scene
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--character", required=True)
+    parser.add_argument("--groom", action="append", required=True)
+    parser.add_argument("--motion", action="append", default=[])
+    parser.add_argument("--steps", type=int, default=700)
+    parser.add_argument("--row", action="append", choices=list(ROWS))
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
+    run(scene, arguments.work, arguments.row or list(ROWS), arguments.steps)
+
+
+if __name__ == "__main__":
+    main()
