@@ -65,8 +65,8 @@ class Body:
     shapes: dict[str, np.ndarray] = field(default_factory=dict)
 
     def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
-        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`."""
-        if weights is None or not len(self.shapes):
+        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
+        if weights is None or not len(self.shapes) or not len(weights):
             return self.points
         return self.points + np.einsum(
             "b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values()))

@@ -57,7 +57,7 @@ def training_scene(
     found: list[StrandSet] = []
     for source in grooms or [str(character)]:
         found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, seed)
-    clips = tuple(_clip(path, rig.character) for path in motion)
+    clips = tuple(read_clip(path, rig.character) for path in motion)
     return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
 
 
@@ -101,7 +101,8 @@ def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
     return strands.subset(np.isin(strands.lock, kept))
 
 
-def _clip(path: str, character: Character) -> Clip:
+def read_clip(path: str, character: Character) -> Clip:
+    """Motion of a file on a character: BVH is retargeted, USD must animate the same joints."""
     if Path(path).suffix.lower() == ".bvh":
         from neuralocks_core.formats.bvh import read_bvh
         from neuralocks_core.retarget import retarget

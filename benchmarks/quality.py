@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the network's hair compares with the solver's: per kind of motion and per hairstyle, beside the baselines.
+
+    python benchmarks/quality.py [--model MODEL] [--static MODEL] [--floor] [--motion FILE.bvh ...] [--style NAME ...]
+
+Hair is grown with a seed that no model was trained on, and of it only the locks that training leaves out are looked
+at; the motion is the scripted clips, or files. Rigid hair has motion error 1 and velocity error 1 by definition.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import defaultdict
+
+import numpy as np
+
+from neuralocks_core import metrics
+from neuralocks_core.collider import Collider
+from neuralocks_core.locks import lock_mates
+from neuralocks_core.materials import Material
+from neuralocks_core.random_motion import KINDS, scripted_clip
+from neuralocks_core.reference import simulate, stateless_floor
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.training.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.rollouts import held_out_split
+
+SEED = 7001
+STRANDS = 48
+DT = 1 / 30
+
+
+class Bench:
+    """One character with hairstyles that no model has seen."""
+
+    def __init__(self, character_path: str, styles: list[str] | None):
+        from neuralocks_core.hairstyles import STYLES
+        from usd.training import training_scene
+
+        scene = training_scene(character_path, ["library"], seed=SEED)
+        self.character = scene.character
+        self.styles = {n: g for n, g in zip(STYLES, scene.grooms) if not styles or n in styles}
+        self.body = hair_body(scene.character, reach=0.9)
+        self.chosen = {name: self._locks(groom) for name, groom in self.styles.items()}
+
+    def _locks(self, groom) -> np.ndarray:
+        usable = held_out_split(groom, True)
+        order = np.random.default_rng(SEED).permutation(np.unique(groom.lock[usable]))
+        rank = np.argsort(order)[np.searchsorted(np.sort(order), groom.lock[usable])]
+        return np.sort(usable[np.argsort(rank, kind="stable")[:STRANDS]])
+
+    def setting(self, style: str, clip, times):
+        """What the solver needs: arguments and keywords of `simulate`."""
+        groom, chosen = self.styles[style], self.chosen[style]
+        rest = groom.rest[chosen].astype(float)
+        joints = clip.at(times)
+        posed = posed_over_time(self.body, joints @ self.character.inverse_bind)
+        to_bind = self.character.canonical_to_bind
+        bind_body = (self.body.points - to_bind[:3, 3]) @ to_bind[:3, :3]
+        heads = self.character.canonical_to_world(joints)
+        arguments = (rest, heads, posed, self.body.triangles, Material())
+        return arguments, {"dt": DT, "neighbours": lock_mates(rest, groom.lock[chosen]), "bind_body": bind_body}
+
+    def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times) -> np.ndarray:
+        """The network's displacement (T, n, 24, 3)."""
+        key = (id(model), style)
+        if key not in sessions:
+            sessions[key] = model.prepare(self.styles[style])
+        sampler = model.sampler(self.character, clip)
+        sessions[key].anchor(sampler.held_bind())
+        return np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in sampler.vectors(times)])
+
+
+def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarray, rest: np.ndarray) -> list[float]:
+    """Shares of vertices inside the body and deeper than 3 mm, percent, every 12th frame; those at rest inside left
+    out.
+    """
+    to_bind = bench.character.canonical_to_bind
+    bind = Collider((bench.body.points - to_bind[:3, 3]) @ to_bind[:3, :3], bench.body.triangles)
+    free = bind.distance(rest[:, 2:].reshape(-1, 3), limit=0.02)[0] >= 0
+    deep = []
+    for frame in range(0, len(points), 12):
+        world = points[frame, :, 2:].reshape(-1, 3)[free] @ heads[frame, :3, :3].T + heads[frame, :3, 3]
+        distance = Collider(posed[frame], bench.body.triangles).distance(world, limit=0.02)[0]
+        deep.append([100 * (distance < 0).mean(), 100 * (distance < -0.003).mean()])
+    return list(np.mean(deep, axis=0))
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", help="the shipped one if left out")
+    parser.add_argument("--static", help="a model trained without history, with the same budget")
+    parser.add_argument("--character", default="examples/shot/body.usdc")
+    parser.add_argument("--style", action="append")
+    parser.add_argument("--kind", action="append", choices=KINDS)
+    parser.add_argument("--motion", action="append", default=[], help="BVH or USD clips in place of the scripted ones")
+    parser.add_argument("--seconds", type=float, default=8.0, help="of each file")
+    parser.add_argument("--floor", action="store_true", help="also what forgetting costs the solver")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    bench = Bench(arguments.character, arguments.style)
+    models = {"network": StrandModel.load(arguments.model)}
+    if arguments.static:
+        models["static"] = StrandModel.load(arguments.static)
+    if arguments.motion:
+        from usd.training import read_clip
+
+        clips = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character) for path in arguments.motion}
+    else:
+        clips = {kind: scripted_clip(bench.character, kind) for kind in arguments.kind or KINDS}
+    rows = []
+    sessions: dict = {}
+    for kind, clip in clips.items():
+        times = np.arange(clip.start, min(clip.end, clip.start + arguments.seconds), DT)
+        for style in bench.styles:
+            rows.append(measured(bench, style, kind, clip, times, models, sessions, arguments.floor))
+    if arguments.json:
+        print(json.dumps(rows, indent=1))
+        return
+    for by in ("kind", "style"):
+        table(rows, by)
+
+
+def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bool) -> dict:
+    """All numbers of one style in one clip."""
+    given, keywords = bench.setting(style, clip, times)
+    rest, heads, posed = given[:3]
+    truth = simulate(*given, **keywords).points
+    length = bench.styles[style].length[bench.chosen[style]]
+    row = {"kind": kind, "style": style}
+    row["rigid position"] = metrics.position_error(np.broadcast_to(rest, truth.shape), truth, length)
+    for name, model in models.items():
+        moved = bench.predicted(sessions, style, model, clip, times)
+        points = rest + moved
+        error = metrics.motion_error(points, truth, length)
+        row[f"{name} position"] = metrics.position_error(points, truth, length)
+        row[f"{name} motion"], row[f"{name} motion rms"] = error["median"], error["rms"]
+        row[f"{name} velocity"] = metrics.velocity_error(points, truth, times)
+        row[f"{name} ratio"] = metrics.motion_ratio(points, truth, times)
+        if name == "network":
+            row["inside"], row["inside 3 mm"] = inside(bench, points, heads, posed, rest)
+            row["solver inside"] = inside(bench, truth, heads, posed, rest)[0]
+            row["still jitter mm"] = metrics.jitter(points[-10:])
+    if floor and len(times) > 70:
+        known = models["network"].spec.steps
+        least = stateless_floor(*given, history=min(known, len(times) - 20), every=10, truth=truth, **keywords)
+        row["floor motion"], row["floor motion rms"] = least.median, least.rms
+    return row
+
+
+def table(rows: list[dict], by: str) -> None:
+    """Means over the other column, as Markdown; motion errors of clips in which nothing moves are left out."""
+    groups = defaultdict(list)
+    for row in rows:
+        groups[row[by]].append(row)
+    names = [n for n in rows[0] if n not in ("kind", "style")]
+    print(f"\n| {by} | " + " | ".join(names) + " |\n| --- |" + " ---: |" * len(names))
+    for key, group in [*groups.items(), ("all", rows)]:
+        with np.errstate(all="ignore"):
+            means = [np.nanmean([row.get(n, np.nan) for row in group]) for n in names]
+        print(f"| {key} | " + " | ".join(f"{m:.3g}" for m in means) + " |")
+
+
+if __name__ == "__main__":
+    main()
