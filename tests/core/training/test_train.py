@@ -12,13 +12,13 @@ from tests.core.rigs import HEAD, bind, person
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.boundary import BoundarySpec  # noqa: E402
-from neuralocks_core.runtime import StrandModel  # noqa: E402
-from neuralocks_core.training import checkpoint  # noqa: E402
-from neuralocks_core.training.farm import load, save  # noqa: E402
-from neuralocks_core.training.regression import RegressionOptions  # noqa: E402
-from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split  # noqa: E402
-from neuralocks_core.training.train import train_strands  # noqa: E402
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.farm import load, save
+from neuralocks_core.training.regression import RegressionOptions
+from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
+from neuralocks_core.training.train import train_strands
 
 
 def straight_hair(count=200, seed=0):
