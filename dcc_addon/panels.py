@@ -81,6 +81,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         _training(layout, settings, "strands")
         row = layout.row()
         row.scale_y = 1.5
+        row.use_property_split = False
         row.prop(own, "live", toggle=True, icon="PLAY")
         message(layout, hair.name)
         column = layout.column(align=True)
@@ -95,9 +96,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
 def _training(layout, settings, kind: str) -> None:
     running = job()
     if running is None:
-        row = layout.row(align=True)
-        row.operator("neuralocks.train", icon="MODIFIER").kind = kind
-        row.prop(settings, "train_minutes", text="")
+        column = layout.column(align=True)
+        column.operator("neuralocks.train", icon="MODIFIER").kind = kind
+        column.prop(settings, "train_minutes")
         message(layout, "training")
         return
     left = running.seconds_left
@@ -133,6 +134,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         _training(layout, settings, "rig")
         row = layout.row()
         row.scale_y = 1.5
+        row.use_property_split = False
         row.prop(own, "rig_live", toggle=True, icon="PLAY")
         layout.prop(own, "rig_motion", slider=True)
         message(layout, armature.name)
@@ -194,9 +196,8 @@ def message(layout, name: str) -> None:
 
 def words(layout, text: str, icon: str) -> None:
     """A text of any length, broken into lines that fit the sidebar."""
-    width = max(
-        20, int(bpy.context.region.width / (7 * bpy.context.preferences.system.ui_scale)) if bpy.context.region else 40
-    )
+    region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale
+    width = max(20, int((region.width / scale - 70) / 6.5)) if region else 40
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, width) or [""]):

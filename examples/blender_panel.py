@@ -58,9 +58,9 @@ def _view(area, armature) -> None:
     head = armature.matrix_world @ armature.pose.bones[_head(armature)].matrix
     region = space.region_3d
     region.view_perspective = "PERSP"
-    region.view_location = head.to_translation() + Vector((0, 0, -0.03))
+    region.view_location = head.to_translation() + Vector((0, 0, 0.0))
     region.view_rotation = Quaternion((0.62, 0.64, 0.32, 0.31))
-    region.view_distance = 0.8
+    region.view_distance = 0.62
     for part in area.regions:
         if part.type == "UI" and hasattr(part, "active_panel_category"):
             try:
@@ -76,21 +76,20 @@ def _head(armature) -> str:
     return sampled.rig.bones[sampled.character.head]
 
 
-def click_tab() -> None:
-    """Widen the sidebar and click the tab, as an artist does; Python cannot before Blender 4.2."""
+def clicks() -> list:
+    """What an artist does to see the panel: click the tab, draw the sidebar wider. Python cannot before Blender 4.2.
+
+    One event a step: Blender takes a click to be where the pointer is when it comes to it, not where it was.
+    """
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
     side = next(r for r in area.regions if r.type == "UI")
     top = window.height - (side.y + side.height)
-    way = [
-        f"mousemove {side.x + side.width - 12} {top + TAB}",
-        "click 1",
-        f"mousemove {side.x} {top + 400}",
-        "mousedown 1",
-    ]
-    way += [f"mousemove {side.x - step} {top + 400}" for step in (20, 50, 80)] + ["mouseup 1", "mousemove 8 500"]
-    # In a process of its own: Blender must see each event before the next one comes.
-    subprocess.Popen(["sh", "-c", "; sleep 0.3; ".join(f"xdotool {step}" for step in way)])
+    tab, edge = f"mousemove {side.x + side.width - 12} {top + TAB}", f"mousemove {side.x} {top + 400}"
+    # The first click may only put the splash screen away.
+    way = ["mousemove 300 500", "click 1", tab, "click 1", edge, "mousedown 1"]
+    way += [f"mousemove {side.x - step} {top + 400}" for step in (30, 60, 90)] + ["mouseup 1", "mousemove 8 500"]
+    return [lambda step=step: subprocess.Popen(["xdotool", *step.split()]) for step in way]
 
 
 TAB = 130
@@ -100,7 +99,7 @@ TAB = 130
 def main() -> None:
     """Steps with pauses in between, so that the window can draw."""
     wanted = options()
-    steps = [lambda: prepare(wanted), click_tab, lambda: None, lambda: None, lambda: _shoot(wanted.out)]
+    steps = [lambda: prepare(wanted), lambda: steps.extend([*clicks(), lambda: None, lambda: _shoot(wanted.out)])]
 
     def tick():
         try:
@@ -109,7 +108,7 @@ def main() -> None:
             traceback.print_exc()
             os._exit(1)
         if steps:
-            return 3.0
+            return 1.5
         os._exit(0)
 
     bpy.context.preferences.view.show_splash = False

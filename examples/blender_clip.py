@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rendered clip of the shipped shot with live hair, without a display:
+
+    .venv-blender-4.5/bin/python examples/blender_clip.py OUT_FOLDER [--model FILE] [--frames 60:160:2] [--size 480]
+
+Writes `clip.mp4` (or `clip.gif`, where imageio has no encoder) and the single frames.
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import blender_shot
+import bpy
+from mathutils import Vector
+
+
+def main() -> None:
+    """Build, light, render."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--model", default="")
+    parser.add_argument("--frames", default="60:160:2")
+    parser.add_argument("--size", type=int, default=480)
+    parser.add_argument("--samples", type=int, default=8)
+    parser.add_argument("--engine", choices=["CYCLES", "EEVEE"], default="CYCLES")
+    wanted = parser.parse_args()
+    import dcc_addon
+
+    dcc_addon.register()
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    armature, _, hair = blender_shot.build()
+    hair.neuralocks_hair.model = wanted.model
+    bpy.ops.neuralocks.sample_motion()
+    hair.neuralocks_hair.live = True
+    stage(armature)
+    settings(wanted)
+    scene = bpy.context.scene
+    pictures = []
+    wanted.out.mkdir(parents=True, exist_ok=True)
+    numbers = [int(n) for n in wanted.frames.split(":")]
+    for frame in range(numbers[0], numbers[1] + 1, numbers[2] if len(numbers) > 2 else 1):
+        scene.frame_set(frame)
+        follow(armature)
+        scene.render.filepath = str(wanted.out / f"frame_{frame:04d}.png")
+        bpy.ops.render.render(write_still=True)
+        pictures.append(scene.render.filepath)
+    dcc_addon.unregister()
+    print(clip(wanted.out, pictures))
+
+
+def stage(armature) -> None:
+    """A soft grey room, a key light, a rim light that shows the hair, a camera."""
+    scene = bpy.context.scene
+    world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs[0].default_value = (0.16, 0.17, 0.19, 1)
+    background.inputs[1].default_value = 1.0
+    scene.world = world
+    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 90, 1.2), ("Rim", (1.6, 1.8, 2.4), 120, 0.6)):
+        light = bpy.data.lights.new(name, "AREA")
+        light.energy, light.size = power, size
+        lamp = bpy.data.objects.new(name, light)
+        lamp.parent_type = "OBJECT"
+        scene.collection.objects.link(lamp)
+        lamp["offset"] = where
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens = 60
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    follow(armature)
+
+
+def follow(armature) -> None:
+    """Camera and lights go with the hips, so that the head's own motion shows."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    posed = armature.evaluated_get(graph)
+    bone = posed.pose.bones[0]
+    place = (posed.matrix_world @ bone.matrix).to_translation()
+    target = Vector((place.x, place.y, 1.48))
+    camera = bpy.context.scene.camera
+    camera.location = target + Vector((-0.75, -1.75, 0.1))
+    camera.rotation_euler = (target - camera.location).to_track_quat("-Z", "Y").to_euler()
+    for lamp in bpy.data.objects:
+        if lamp.type == "LIGHT":
+            lamp.location = Vector((place.x, place.y, 0)) + Vector(lamp["offset"])
+            lamp.rotation_euler = (target - lamp.location).to_track_quat("-Z", "Y").to_euler()
+
+
+def settings(wanted) -> None:
+    """Few samples and a denoiser."""
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = wanted.size
+    scene.render.film_transparent = False
+    scene.view_settings.view_transform = "Filmic" if bpy.app.version < (4, 0) else "AgX"
+    if wanted.engine == "EEVEE":
+        scene.render.engine = "BLENDER_EEVEE_NEXT" if (4, 2) <= bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+        scene.eevee.taa_render_samples = wanted.samples
+        return
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.max_bounces = wanted.samples, 4
+    scene.cycles.use_denoising = True
+    scene.render.use_persistent_data = True
+
+
+def clip(folder: Path, pictures: list[str]) -> Path:
+    """The frames as a film."""
+    try:
+        import imageio.v2 as imageio
+    except ImportError:
+        return folder
+    frames = [imageio.imread(p) for p in pictures]
+    try:
+        out = folder / "clip.mp4"
+        imageio.mimwrite(out, frames, fps=12, macro_block_size=1)
+    except (ImportError, ValueError):
+        out = folder / "clip.gif"
+        imageio.mimwrite(out, frames, duration=1000 / 12, loop=0)
+    return out
+
+
+if __name__ == "__main__":
+    status = 1
+    try:
+        main()
+        status = 0
+    except Exception:
+        import traceback
+
+        traceback.print_exc()
+    sys.stdout.flush()
+    os._exit(status)  # some builds of bpy hang at exit
