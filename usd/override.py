@@ -57,22 +57,29 @@ class OverrideWriter:
         if velocities:
             Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
 
-    def sample(self, item: StageGroom, time_code: float, name: str, value: np.ndarray) -> None:
-        """Add one time sample of `points` (and of the extent with it) or `velocities`, (P, 3) float32."""
+    def sample(self, item: StageGroom, time_code: float, name: str, held: list[np.ndarray]) -> None:
+        """Add one time sample of `points` (and of the extent with it) or `velocities`.
+
+        Args:
+            item: the groom.
+            time_code: when.
+            name: "points" or "velocities".
+            held: one array (P, 3) float32; taken out of the list.
+        """
         with _named(self._out):
             if name == "points":
                 pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
-                extent = np.stack([value.min(axis=0) - pad, value.max(axis=0) + pad])
-                self._set(item, time_code, "extent", extent)
-            self._set(item, time_code, name, value)
+                extent = np.stack([held[0].min(axis=0) - pad, held[0].max(axis=0) + pad])
+                self._set(item, time_code, "extent", [extent])
+            self._set(item, time_code, name, held)
             if self._held >= SAVE_EVERY:
                 self._save()
 
-    def _set(self, item: StageGroom, time_code: float, name: str, value: np.ndarray) -> None:
+    def _set(self, item: StageGroom, time_code: float, name: str, held: list[np.ndarray]) -> None:
         # Flat arrays convert a fifth faster than rows of three.
-        array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value).reshape(-1))
+        array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(held.pop()).reshape(-1))
         self._layer.SetTimeSample(item.prim.GetPath().AppendProperty(name), float(time_code), array)
-        self._held += value.nbytes
+        self._held += 12 * len(array)
 
     def close(self) -> None:
         """Write what is held."""

@@ -51,6 +51,12 @@ class GroomPoser:
         """Let the threads go."""
         self._placer.close()
 
+    def __enter__(self) -> "GroomPoser":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
     def points(self, time_code: float) -> np.ndarray:
         """The groom's points (P, 3) float32 at a time code, in the prim's own space and units."""
         joints = self._rig.joints_at(time_code)

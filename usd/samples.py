@@ -123,8 +123,9 @@ def _frame(
     for name, array in zip(frames.names, arrays):
         if not there:
             behind.put(spool.write, number, code, name, array)
-        behind.put(writer.sample, item, code, name, array)
+        held = [array]  # the writer takes it out as soon as it has its own copy
         del array
+        behind.put(writer.sample, item, code, name, held)
     return there
 
 
