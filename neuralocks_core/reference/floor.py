@@ -46,8 +46,8 @@ def stateless_floor(
     """Restart the reference at rest `history` frames before each frame looked at, and compare.
 
     Hair that slid over a shoulder stays there; whoever sees only the last N frames cannot know. A network whose
-    error is near this one has nothing left to learn (docs/architecture.md, Reference). It costs `history / every` times a
-    simulation.
+    error is near this one has nothing left to learn (docs/architecture.md, Reference). It costs `history / every`
+    times a simulation.
 
     Args:
         rest, head, body, triangles, material: as in `simulate`.
