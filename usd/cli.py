@@ -26,7 +26,7 @@ Grooms = Annotated[
 Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
 Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]
 Frames = Annotated[
-    str | None, typer.Option("--frames", help="A:B or A:B:STEP in time codes; the shot's range if left out.")
+    str | None, typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out.")
 ]
 Materials = Annotated[
     list[str] | None,
