@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bake opens in a real Blender as moving hair, frame for frame."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from usd.bake import bake
+
+from .shots import Recipe, write_shot
+from .test_bake import world_points
+
+ROOT = Path(__file__).parents[2]
+PYTHON = next((p for p in sorted(ROOT.glob(".venv-blender-*/bin/python"))), None)
+
+SCRIPT = """
+import os, sys
+import bpy, numpy as np
+path, out = sys.argv[1:3]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.usd_import(filepath=path)
+hair = next(o for o in bpy.data.objects if o.type == "CURVES")
+# Blender before 4.5 reads stage units as metres.
+found = {"scaled": "apply_unit_conversion_scale" in bpy.ops.wm.usd_import.get_rna_type().properties}
+for frame in (1, 4, 9):
+    bpy.context.scene.frame_set(frame)
+    seen = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.empty(3 * len(seen.data.points), np.float32)
+    seen.data.attributes["position"].data.foreach_get("vector", points)
+    matrix = np.array(seen.matrix_world)
+    found[str(frame)] = points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+np.savez(out, **found)
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(PYTHON is None, reason="no .venv-blender-* with a Blender wheel (make test installs them)")
+@pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z", bound="mesh")], ids=["m_y_up", "cm_z_up"])
+def test_blender_shows_the_baked_points(tmp_path, model, recipe):
+    result = bake(write_shot(tmp_path, recipe), tmp_path / "bake.usdc", model)
+    out = tmp_path / "seen.npz"
+    command = [PYTHON, "-c", SCRIPT, result.path, out]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=240)
+    assert out.exists(), done.stdout[-2000:] + done.stderr[-2000:]
+    with np.load(out) as seen:
+        unit = 1.0 if seen["scaled"] else recipe.unit
+        for frame in (1, 4, 9):
+            x, y, z = world_points(result.path, float(frame)).T
+            assert np.abs(unit * seen[str(frame)] - np.stack([x, -z, y], axis=1)).max() < 2e-5
