@@ -9,7 +9,9 @@ NO_PLANE = wp.constant(wp.vec4d(0.0, 0.0, 0.0, -1.0e3))
 """n.x - d of this is 1 km wherever x is: no body near."""
 STILL = wp.constant(wp.float64(5e-4))
 FAR = wp.constant(wp.float64(0.02))
-"""[m] A vertex that moved less than STILL, or stays farther from the body than FAR, keeps its plane in a step."""
+FAR_AHEAD = wp.constant(wp.float64(0.05))
+"""[m] A vertex that moved less than STILL in a step keeps its plane; one farther from the body than FAR, or than
+FAR_AHEAD before it moves, needs none."""
 
 
 @wp.kernel(enable_backward=False)
@@ -103,8 +105,12 @@ def body_planes(
     mesh: wp.uint64,
     reach: wp.float32,
     moved: int,
+    turn: wp.quatd,
+    origin: wp.vec3d,
+    drift: wp.float64,
     x: array_vec,
     seen: array_vec,
+    clear: array_real,
     face: wp.array2d(dtype=wp.int32),
     corner: wp.array2d(dtype=wp.vec2),
     plane: wp.array2d(dtype=wp.vec4d),
@@ -112,19 +118,25 @@ def body_planes(
 ):
     """Nearest body element as a plane through its closest point; inside is negative.
 
-    The element found last, where it is now, bounds the search; a vertex that hardly moved on a body that stands still
-    (`moved` 0) keeps its plane, else its strand is woken.
+    drift: how far any point of the body has gone in the head's frame since the beginning, summed over steps. A vertex
+    that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`)
+    has no plane; one that hardly moved on a body that stands still (`moved` 0) keeps its plane; else its strand is
+    woken. The element found last, where it is now, bounds the search.
     """
     k, s = wp.tid()
     if k < 2:
         return
     p = x[k, s]
-    wall = plane[k, s]
-    if moved == 0:
-        shift = wp.length(p - seen[k, s])
-        distance = wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3]
-        if shift < STILL or distance - wp.float64(2.0) * shift > FAR:
-            return
+    home = wp.quat_rotate_inv(turn, p - origin)
+    shift = wp.length(home - seen[k, s])
+    far = FAR
+    if moved == 1:
+        far = FAR_AHEAD
+    if clear[k, s] - shift - drift > far:
+        plane[k, s] = NO_PLANE
+        return
+    if moved == 0 and shift < STILL:
+        return
     q = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
     bound = reach
     last = face[k, s]
@@ -133,6 +145,7 @@ def body_planes(
         bound = wp.min(reach, wp.length(wp.mesh_eval_position(mesh, last, uv[0], uv[1]) - q) + 1.0e-5)
     hit = wp.mesh_query_point_sign_normal(mesh, q, bound, 1.0e-3)
     found = NO_PLANE
+    free = wp.float64(reach)
     element = int(-1)  # noqa: UP018
     if hit.result:
         element = hit.face
@@ -140,6 +153,7 @@ def body_planes(
         near = wp.mesh_eval_position(mesh, hit.face, hit.u, hit.v)
         away = (q - near) * hit.sign
         gap = wp.length(away)
+        free = wp.float64(gap * hit.sign)
         # on the surface itself the difference has no direction: take the face's
         n = wp.mesh_eval_face_normal(mesh, hit.face)
         if gap > 1.0e-4:
@@ -149,7 +163,8 @@ def body_planes(
         found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at))
     wake[s] = 1
     face[k, s] = element
-    seen[k, s] = p
+    seen[k, s] = home
+    clear[k, s] = free + drift
     plane[k, s] = found
 
 

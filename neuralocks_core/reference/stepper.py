@@ -59,6 +59,7 @@ class Stepper:
         self.pull, self.tension = (self._empty(wp.float64, shape) for _ in range(2))
         self.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
         self.seen, self.corner = self._empty(wp.vec3d, shape), self._empty(wp.vec2, shape)
+        self.clear = wp.array(np.full(shape, -1e3), dtype=wp.float64, device=device)
         self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=device)
         self.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
         self.residual = self._empty(wp.float64, (self.strands,))
@@ -85,20 +86,23 @@ class Stepper:
             np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device
         )
         self.mesh = wp.Mesh(points=self.body, indices=faces)
+        self._pose(np.array([0, 0, 0, 1]), np.zeros(3))
+        self._body_in_head, self.drift = np.asarray(bind, float), 0.0
         self._look(self.rest, 1)
         self._run(self.kernels.rest_margin, (self.rest, self.plane, self.widest, self.margin))
 
     def move_body(self, points: np.ndarray) -> None:
         """Set the body's world points (V, 3)."""
-        staged = self.wp.array(self._body_points(points), dtype=self.wp.vec3, device="cpu", copy=False)
+        self._body_now = points = self._body_points(points)
+        staged = self.wp.array(points, dtype=self.wp.vec3, device="cpu", copy=False)
         self.wp.copy(self.body, staged)
         self.mesh.refit()
 
     def begin(self, turn: np.ndarray, origin: np.ndarray, points: np.ndarray) -> None:
         """Set the first pose and (S, K, 3) canonical points."""
         self._pose(turn, origin)
-        matrix = np.array(self.wp.quat_to_matrix(self.turn), np.float64).reshape(3, 3)
-        self.x.assign(np.ascontiguousarray(np.swapaxes(points @ matrix.T + origin, 0, 1)))
+        self.x.assign(np.ascontiguousarray(np.swapaxes(points @ self._matrix().T + origin, 0, 1)))
+        self._add_drift()
         self.carry, self.carry_origin = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
 
     def settle(self, dts: Sequence[float], iterations: int) -> None:
@@ -131,6 +135,7 @@ class Stepper:
             self.last, self.x = self.x, self.last
             self._moving = True
         if self.mesh is not None:
+            self._add_drift()
             # not at the predicted state, which may lie behind the body's far side
             self._run(self.kernels.carry_along, (self.carry, self.carry_origin, self.last, self.x))
             self._look(self.x, 1)
@@ -182,8 +187,21 @@ class Stepper:
         self.wp.launch(self.rod_kernels.newton, dim=self.strands, inputs=args, device=self.device)
 
     def _look(self, x: object, moved: int) -> None:
-        args = (self.mesh.id, REACH, moved, x, self.seen, self.face, self.corner, self.plane, self.wake)
+        args = (
+            self.mesh.id, REACH, moved, self.turn, self.origin, self.drift, x, self.seen, self.clear, self.face,
+            self.corner, self.plane, self.wake,
+        )  # fmt: skip
         self._run(self.kernels.body_planes, args)
+
+    def _add_drift(self) -> None:
+        """Count how far the body went in the head's frame: no vertex's distance from it can have shrunk by more."""
+        if self.mesh is not None:
+            now = (self._body_now - np.array(self.origin)) @ self._matrix()
+            self.drift += float(np.sqrt(np.square(now - self._body_in_head).sum(1).max()))
+            self._body_in_head = now
+
+    def _matrix(self) -> np.ndarray:
+        return np.array(self.wp.quat_to_matrix(self.turn), np.float64).reshape(3, 3)
 
     def _pose(self, turn: np.ndarray, origin: np.ndarray) -> None:
         self.turn = self.wp.quatd(*(float(v) for v in turn))
