@@ -157,7 +157,6 @@ def _ways(rig: StageRig, mesh: SkinnedMesh | None, placement: Placement) -> list
 def _some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
     """Up to `most` finite roots (n, 3) in the prim's own space."""
 
-
     points = rest_points(prim)
     counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
     starts = np.cumsum(counts) - counts
@@ -201,5 +200,6 @@ def _with_head(rig: StageRig, joint: int) -> Character:
     if rig.character.humanoid.get("head") == joint:
         return rig.character
     skeleton = rig.character.skeleton
-    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], {"head": skeleton.names[joint]})
+    by_hand = {**rig.by_hand, "head": skeleton.names[joint]}
+    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
     return replace(rig.character, humanoid=humanoid)

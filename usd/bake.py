@@ -49,6 +49,7 @@ def bake(
     head: str | None = None,
     frames=None,
     *,
+    joints: dict[str, str] | None = None,
     subframes: int = 1,
     material=None,
     strength: float = 1.0,
@@ -67,6 +68,7 @@ def bake(
         skeleton: prim path of the skeleton; found if left out.
         head: joint that carries grooms for which no binding says so.
         frames: `A:B[:STEP]`, or time codes in any order; the shot's range if left out.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
         subframes: samples per frame, for motion blur.
         material: a Material, or words NAME=VALUE.
         strength: motion strength from 0 (each pose as if held) to 1.
@@ -86,10 +88,14 @@ def bake(
     look = as_material(material)
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints)
     codes = time_codes(frames, shot.first, shot.last, subframes)
     options = {"strength": strength, "resolve": resolve}
-    inputs = {"model": _digest(strand_model), "material": look.log_ratios().tolist(), "carried": [skeleton, head]}
+    inputs = {
+        "model": _digest(strand_model),
+        "material": look.log_ratios().tolist(),
+        "carried": [skeleton, head, joints],
+    }
 
     def poser(item: StageGroom) -> GroomPoser:
         return GroomPoser(item, strand_model, look, jobs=jobs, **options)

@@ -25,8 +25,15 @@ Grooms = Annotated[
 ]
 Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
 Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]
+Joints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, where names do not tell; repeat for more."
+    ),
+]
 Frames = Annotated[
-    str | None, typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out.")
+    str | None,
+    typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out."),
 ]
 Materials = Annotated[
     list[str] | None,
@@ -71,6 +78,7 @@ def bake_command(
     groom: Grooms = None,
     skeleton: Skeleton = None,
     head: Head = None,
+    joint: Joints = None,
     frames: Frames = None,
     subframes: Annotated[int, typer.Option(help="Samples per frame, for motion blur.")] = 1,
     material: Materials = None,
@@ -91,7 +99,8 @@ def bake_command(
     with progress_bar("baking") as progress:
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
-            subframes=subframes, material=material, strength=strength, resolve=resolve, velocities=velocities,
+            joints=_pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
+            resolve=resolve, velocities=velocities,
             jobs=jobs, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
@@ -147,12 +156,13 @@ def import_command(
 def inspect_command(
     file: Annotated[Path, typer.Argument(help="A USD stage, a hair file, a model or a BVH file.")],
     head: Head = None,
+    joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what a file holds, and what would stop or spoil a bake of it."""
     from .inspect import as_text, inspect
 
-    facts = inspect(file, head)
+    facts = inspect(file, head, _pairs(joint, "--joint"))
     if as_json:
         print_json(facts)
     else:
@@ -212,6 +222,22 @@ def body_command(
     from .body import write_body
 
     typer.echo(str(write_body(out, phenotype=_numbers(phenotype, "--phenotype") or None)))
+
+
+@command("grow")
+def grow_command(
+    style: Annotated[str, typer.Argument(help="A style of the procedural library; a wrong one lists them.")],
+    character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
+    out: Out,
+    count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
+    seed: Annotated[int, typer.Option(help="The same seed grows the same groom.")] = 0,
+    skeleton: Skeleton = None,
+    head: Head = None,
+) -> None:
+    """Grow a hairstyle on a character and write it as a USD groom."""
+    from .grow import grow
+
+    typer.echo(str(grow(style, character, out, count, seed, skeleton=skeleton, head=head)))
 
 
 @command("demo")
@@ -296,16 +322,22 @@ def _bake_report(result, as_json: bool) -> None:
     )
 
 
+def _pairs(words: list[str] | None, option: str) -> dict[str, str]:
+    from neuralocks_core.errors import NeuralocksError
+
+    pairs = {}
+    for word in words or ():
+        name, equals, value = word.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise NeuralocksError(f"{option} {word}: is not NAME=VALUE; give both sides of '='")
+        pairs[name.strip()] = value.strip()
+    return pairs
+
+
 def _numbers(words: list[str] | None, option: str) -> dict[str, float]:
     from neuralocks_core.errors import NeuralocksError
 
-    values = {}
-    for word in words or ():
-        name, _, text = word.partition("=")
-        try:
-            values[name.strip()] = float(text)
-        except ValueError:
-            raise NeuralocksError(
-                f"{option} {word}: is not NAME=VALUE; write for example {name or 'age'}=0.5"
-            ) from None
-    return values
+    try:
+        return {name: float(text) for name, text in _pairs(words, option).items()}
+    except ValueError:
+        raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None

@@ -18,12 +18,13 @@ from .rig_source import read_rig
 from .stage import _composition, _groom_notes, _rig_notes, find_skeletons, frame_range, head_width
 
 
-def inspect(path, head: str | None = None) -> dict:
+def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:
     """Facts about a USD stage, a hair file, a model or a motion file, as plain values.
 
     Args:
         path: the file.
         head: the joint that would be given with `--head`.
+        joints: the joints that would be given with `--joint`.
 
     Returns:
         `file`, `kind`, facts by kind, `stops` (what would stop a bake) and `spoils` (what a user should know).
@@ -34,7 +35,7 @@ def inspect(path, head: str | None = None) -> dict:
     path = Path(path)
     kind = path.suffix.lower()
     if kind in USD:
-        return {"file": str(path), "kind": "stage", **_stage(path, head)}
+        return {"file": str(path), "kind": "stage", **_stage(path, head, joints)}
     if not path.is_file():
         raise NeuralocksError(f"{path}: no such file; check the path")
     if kind == ".neuralocks":
@@ -47,7 +48,7 @@ def inspect(path, head: str | None = None) -> dict:
     return {"file": str(path), "kind": "hair", "grooms": [_groom(groom)], "stops": [], "spoils": notes}
 
 
-def _stage(path: Path, head: str | None) -> dict:
+def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     stage = open_stage(path)
     stops: list[str] = []
     spoils = [f"{path.name}: {_composition(error)}" for error in stage.GetCompositionErrors()]
@@ -58,7 +59,7 @@ def _stage(path: Path, head: str | None) -> dict:
     rigs = []
     for prim in find_skeletons(stage):
         try:
-            rigs.append(read_rig(stage, prim, border, head, all_shapes=True))
+            rigs.append(read_rig(stage, prim, border, head, all_shapes=True, joints=joints))
         except NeuralocksError as error:
             stops.append(str(error))
     skeletons = [_rig(rig) for rig in rigs]

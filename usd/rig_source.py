@@ -33,6 +33,7 @@ class StageRig:
         clip: world joint transforms at the time codes `time_codes`.
         time_codes: (T,).
         notes: what a user should know about it.
+        by_hand: semantic joint -> joint, as the user named them.
     """
 
     path: str
@@ -44,6 +45,7 @@ class StageRig:
     clip: Clip = field(repr=False)
     time_codes: np.ndarray = field(repr=False)
     notes: list[str] = field(repr=False)
+    by_hand: dict[str, str] = field(default_factory=dict, repr=False)
 
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
@@ -74,7 +76,7 @@ def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:
 
 
 def read_rig(
-    stage: Usd.Stage, prim: Usd.Prim, border: Border, head: str | None = None, *, all_shapes: bool = False
+    stage: Usd.Stage, prim: Usd.Prim, border: Border, head: str | None = None, *, all_shapes: bool = False, joints=None
 ) -> StageRig:
     """Read a skeleton, its meshes and its motion.
 
@@ -84,6 +86,7 @@ def read_rig(
         border: the stage's units.
         head: joint that is the head; found by name and hierarchy if left out.
         all_shapes: keep blend shapes that the animation does not use.
+        joints: semantic joint -> joint path or its last part, where names do not tell.
 
     Raises:
         NeuralocksError: something in it cannot be used; the message names the prim.
@@ -93,7 +96,7 @@ def read_rig(
     time_codes = _time_codes(source)
     posed = source.posed(time_codes)
     meshes = bound_meshes(stage, source, notes)
-    by_hand = {"head": head} if head else None
+    by_hand = {**(joints or {}), **({"head": head} if head else {})}
     to_bind = _to_bind(source, border, posed, by_hand)
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
@@ -108,7 +111,7 @@ def read_rig(
         border.to_core @ posed @ trim,
         weights[:, [names.index(n) for n in names if n in used]],
     )
-    return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes)
+    return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes, by_hand)
 
 
 def _time_codes(source: JointSource) -> np.ndarray:

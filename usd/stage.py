@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdSkel
 
+from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
@@ -68,7 +69,7 @@ class Shot:
     notes: tuple[str, ...]
 
 
-def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None) -> Shot:
+def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Shot:
     """Read a shot for a bake.
 
     Args:
@@ -76,6 +77,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         grooms: prim paths of the grooms wanted; all if left out.
         skeleton: prim path of the skeleton that carries them; found if left out.
         head: joint (path, or its last part) that carries grooms for which no binding says so.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -89,7 +91,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         raise NeuralocksError(
             f"{path}: holds no groom (no BasisCurves prim); add one, or import a hair file with 'neuralocks import'"
         )
-    rigs = _rigs(stage, border, skeleton, head, path)
+    rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs, path)
     found = []
     for prim in curves:
@@ -135,7 +137,7 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
 
 
-def _rigs(stage, border, skeleton, head, path, *, all_shapes=False) -> list[StageRig]:
+def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None) -> list[StageRig]:
     prims = find_skeletons(stage)
     names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
     if skeleton is not None:
@@ -147,7 +149,7 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False) -> list[Stag
     rigs, errors = [], []
     for prim in prims:
         try:
-            rigs.append(read_rig(stage, prim, border, head, all_shapes=all_shapes))
+            rigs.append(read_rig(stage, prim, border, head, all_shapes=all_shapes, joints=joints))
         except NeuralocksError as error:
             errors.append(error)
     if errors and (not rigs or skeleton):
@@ -177,6 +179,12 @@ def _rig_notes(rig: StageRig) -> list[str]:
     notes = []
     if len(rig.time_codes) == 1:
         notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
+    missing = [name for name in POSE_JOINTS if name not in rig.character.humanoid]
+    if missing:
+        notes.append(
+            f"{rig.path}: no joint found for {', '.join(missing)}; "
+            "the next one towards the trunk serves, or name it with --joint"
+        )
     width = head_width(rig)
     if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
         notes.append(

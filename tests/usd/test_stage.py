@@ -136,3 +136,14 @@ def test_crossing_the_border_and_back_changes_nothing(unit, up, rate):
     assert np.allclose(there @ border.from_core[:3, :3].T, points)
     assert np.allclose(np.linalg.norm(there, axis=1), unit * np.linalg.norm(points, axis=1))
     assert np.allclose(border.to_core[:3, :3] @ ([0, 1, 0] if up == "Y" else [0, 0, 1]), [0, unit, 0])
+
+
+def test_joints_named_by_hand_serve_and_missing_ones_are_said(tmp_path):
+    path = write_shot(tmp_path)
+    plain = read_shot(path)
+    assert any("left_shoulder" in note and "--joint" in note for note in plain.notes)
+    told = read_shot(path, joints={"left_shoulder": "arm_L", "right_shoulder": "hips/spine/arm_R"})
+    assert told.rigs[0].character.humanoid["left_shoulder"] == 4
+    for joints, fact in (({"left_shoulder": "nose"}, "nose"), ({"tail": "hips"}, "tail")):
+        with pytest.raises(NeuralocksError, match=fact):
+            read_shot(path, joints=joints)
