@@ -197,7 +197,7 @@ def message(layout, name: str) -> None:
 def words(layout, text: str, icon: str) -> None:
     """A text of any length, broken into lines that fit the sidebar."""
     region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale
-    width = max(20, int((region.width / scale - 70) / 6.5)) if region else 40
+    width = max(20, int((region.width / scale - 60) / 6)) if region else 40
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, width) or [""]):

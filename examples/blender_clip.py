@@ -58,10 +58,10 @@ def stage(armature) -> None:
     world = bpy.data.worlds.new("World")
     world.use_nodes = True
     background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs[0].default_value = (0.16, 0.17, 0.19, 1)
+    background.inputs[0].default_value = (0.10, 0.11, 0.13, 1)
     background.inputs[1].default_value = 1.0
     scene.world = world
-    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 90, 1.2), ("Rim", (1.6, 1.8, 2.4), 120, 0.6)):
+    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 55, 1.2), ("Rim", (1.4, 1.6, 2.4), 150, 0.6)):
         light = bpy.data.lights.new(name, "AREA")
         light.energy, light.size = power, size
         lamp = bpy.data.objects.new(name, light)
@@ -81,9 +81,9 @@ def follow(armature) -> None:
     posed = armature.evaluated_get(graph)
     bone = posed.pose.bones[0]
     place = (posed.matrix_world @ bone.matrix).to_translation()
-    target = Vector((place.x, place.y, 1.48))
+    target = Vector((place.x, place.y, 1.52))
     camera = bpy.context.scene.camera
-    camera.location = target + Vector((-0.75, -1.75, 0.1))
+    camera.location = target + Vector((-0.62, -1.3, 0.1))
     camera.rotation_euler = (target - camera.location).to_track_quat("-Z", "Y").to_euler()
     for lamp in bpy.data.objects:
         if lamp.type == "LIGHT":

@@ -10,9 +10,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-import bpy  # noqa: E402
-import numpy as np  # noqa: E402
-from mathutils import Matrix  # noqa: E402
+import bpy
+import numpy as np
+from mathutils import Matrix
 
 SHOT = ROOT / "examples" / "shot" / "shot.usda"
 
@@ -99,7 +99,7 @@ def _body(armature, names, rig, up):
                 groups[joint].add([vertex], weight, "REPLACE")
     body.parent = armature
     body.modifiers.new("Armature", "ARMATURE").object = armature
-    mesh.materials.append(_material("Skin", (0.62, 0.42, 0.34, 1), 0.5))
+    mesh.materials.append(_material("Skin", (0.52, 0.30, 0.22, 1), 0.45))
     return body
 
 

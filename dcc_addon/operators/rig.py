@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rigged hair: chains, keyframes, export."""
 
+from pathlib import Path
+
 import bpy
 from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig import RigModel
 
 from ..live_rig import bind, rest
 from ..scene import actions
@@ -84,8 +87,6 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     )
 
     def steps(self, context):
-        from pathlib import Path
-
         from usd.rig_bake import bake_rig
 
         from ..live import model_path
@@ -99,7 +100,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
                 yield done, total, f"Sampling the motion of {name}"
         shot = out.with_name(f"{out.stem}_shot.usdc")
         write_shot(shot, bpy.data.objects[name], scene, session.rigs[name], [])
-        bake_rig(shot, out, model_path(settings.rig_model, "rig"))
+        bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion)
         return f"{name}: hair bones written to {out}"
 
 
@@ -122,7 +123,8 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         armature = shown_armature(context)
         if self.filepath.startswith("//") and not bpy.data.filepath:
             raise NeuralocksError(f"{self.filepath}: this file is not saved yet; save it or choose a full path")
-        out = export_c(model_path(armature.neuralocks_character.rig_model, "rig"), bpy.path.abspath(self.filepath))
+        model = RigModel.load(model_path(armature.neuralocks_character.rig_model, "rig"))
+        out = export_c(model, Path(bpy.path.abspath(self.filepath)))
         return f"C header written to {out}"
 
 

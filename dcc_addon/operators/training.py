@@ -76,6 +76,7 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
             "character": str(character),
             "out": out,
             "minutes": context.scene.neuralocks.train_minutes,
+            "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
         stop()

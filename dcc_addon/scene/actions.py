@@ -75,7 +75,10 @@ def _curves(action, armature):
 
 
 def _new_curve(curves, path: str, index: int, group: str):
-    try:
-        return curves.new(path, index=index, group_name=group)
-    except TypeError:
-        return curves.new(path, index=index, action_group=group)
+    """A curve in a group of its bone; how the group is named has changed twice."""
+    for named in ({"group_name": group}, {"action_group": group}, {}):
+        try:
+            return curves.new(path, index=index, **named)
+        except TypeError:
+            continue
+    raise RuntimeError(f"no F-curve for {path}")

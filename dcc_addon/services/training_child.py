@@ -5,6 +5,7 @@ object a line.
 
 import importlib
 import json
+import os
 import sys
 
 
@@ -31,7 +32,11 @@ def main() -> int:
 
 
 def _printer(stream):
+    parent = os.getppid()
+
     def say(done: int, total: int, message: str) -> None:
+        if os.getppid() != parent:  # Blender is gone, and nobody waits for the model
+            sys.exit(1)
         print(json.dumps({"done": done / max(total, 1), "message": message}), file=stream, flush=True)
 
     return say
@@ -60,7 +65,14 @@ def _train_rig(settings: dict, say) -> None:
     from usd.rig_train import train_rig
 
     say(0, 1, "Reading the character")
-    train_rig(settings["character"], settings["out"], minutes=settings["minutes"], progress=say)
+    train_rig(
+        settings["character"],
+        settings["out"],
+        seconds=60 * settings["minutes"],
+        chains=settings.get("chains") or None,
+        head=settings.get("head"),
+        progress=say,
+    )
 
 
 if __name__ == "__main__":

@@ -327,8 +327,24 @@ def bones(folder: Path) -> None:
     track = rig.animation_data.nla_tracks["Neuralocks Hair"]
     keyed = {c.data_path.split('"')[1] for c in scenes.fcurves_of(track.strips[0].action)}
     assert keyed == {"hair.01", "hair.02"}, keyed
-    track.mute = True
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+    assert bpy.ops.neuralocks.export_skel(filepath=str(folder / "skel.usdc")) == {"FINISHED"}
+    from usd.stage import read_rigs
+
+    written = read_rigs(folder / "skel.usdc")[0]
+    leaves = [name.split("/")[-1] for name in written.character.skeleton.names]
+    order = [leaves.index(bone.name.replace(".", "_")) for bone in rig.pose.bones]
+    z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for f in live:
+        scene.frame_set(f)
+        joints = written.joints_at(f)[order]
+        place = np.array(rig.matrix_world)
+        world = place @ live[f]
+        assert _apart(z_up @ joints[:, :3, :3], world[:, :3, :3]) < SAME
+        assert _apart(joints[:, :3, 3] @ z_up.T, world[:, :3, 3]) < SAME
+    assert bpy.ops.neuralocks.export_c(filepath=str(folder / "hair.h")) == {"FINISHED"}
+    assert "hair_02" in (folder / "hair.h").read_text()
     for f in still:
         assert _apart(turns(f)[others], still[f][others]) < 1e-6
 

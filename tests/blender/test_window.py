@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel in a real window under a virtual screen: a script clicks the tab and Live, scrubs, bakes, takes a
+picture.
+"""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from .test_blender import ROOT, random_model
+
+__all__ = ["random_model"]
+
+
+def test_panel_in_a_window(random_model, tmp_path):
+    """Live by a click of the mouse, hair that follows the time line, a bake from the panel, a picture."""
+    for program in ("blender", "xvfb-run", "xdotool"):
+        if not shutil.which(program):
+            pytest.skip(f"{program} is not installed")
+    packages = next((ROOT / ".venv-blender-4.2" / "lib").glob("python*"), None)
+    if packages is None:
+        pytest.skip("the add-on's packages for Python 3.11 are not installed (.venv-blender-4.2 is missing)")
+    window = [
+        "blender",
+        "--factory-startup",
+        "-p",
+        "0",
+        "0",
+        "1280",
+        "960",
+        "--python",
+        str(Path(__file__).with_name("window.py")),
+    ]
+    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x960x24", *window, "--", str(tmp_path)]
+    environment = os.environ | {
+        "PYTHONPATH": str(packages / "site-packages"),
+        "NEURALOCKS_TEST_MODEL": str(random_model),
+        "OMP_NUM_THREADS": "1",
+    }
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=240)
+    assert "all steps done" in done.stdout, done.stdout[-4000:] + done.stderr[-4000:]
+    assert (tmp_path / "panel.png").stat().st_size > 20_000
+    assert (tmp_path / "bake.usdc").stat().st_size > 10_000

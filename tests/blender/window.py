@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window by `test_window`: the steps of an artist, one a tick, so that Blender draws and takes events in
+between.
+"""
+
+import os
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import bpy  # noqa: E402
+import numpy as np  # noqa: E402
+
+FOLDER = Path(sys.argv[-1])
+TAB, LIVE = 130, 334
+"""How far below the top of the sidebar the third tab and the Live button lie."""
+state = {}
+
+
+def build():
+    """A moving character with hair that is not live yet."""
+    import dcc_addon
+    from tests.blender import scenes
+
+    dcc_addon.register()
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 24
+    rig = scenes.armature()
+    scenes.dance(rig)
+    hair = scenes.hair(rig, 300)
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
+    hair.neuralocks_hair.model = os.environ["NEURALOCKS_TEST_MODEL"]
+    scene.frame_set(12)
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        if area.type == "VIEW_3D":
+            area.spaces.active.show_region_ui = True
+    state["rest"] = shown()
+
+
+def shown() -> np.ndarray:
+    """Points of the hair as they are."""
+    data = bpy.data.objects["Hair"].data
+    values = np.empty((len(data.points), 3), np.float32)
+    data.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values
+
+
+def mouse(below=None, click=False):
+    """Move the pointer below the sidebar's top, or click where it is."""
+    if click:
+        subprocess.Popen(["xdotool", "click", "1"])
+        return
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    side = next(r for r in area.regions if r.type == "UI")
+    top = window.height - (side.y + side.height)
+    x, y = (side.x + side.width - 12, top + TAB) if below == TAB else (side.x + side.width // 2, top + (below or 500))
+    subprocess.Popen(["xdotool", "mousemove", str(x if below else 300), str(y)])
+
+
+def is_live():
+    """The click on Live has reached the hair, and sampling goes on in the background."""
+    assert bpy.data.objects["Hair"].neuralocks_hair.live, "the click on Live has not arrived"
+
+
+def sampled():
+    """The background has sampled the motion while Blender was idle: the hair moves."""
+    from dcc_addon.session import session
+
+    assert session.rigs and not session.rigs["Rig"].stale and session.sampling is None, session.messages
+    assert np.abs(shown() - state["rest"]).max() > 1e-3
+    state["twelve"] = shown()
+
+
+def scrub():
+    """Away and back: the same hair."""
+    scene = bpy.context.scene
+    scene.frame_set(20)
+    assert np.abs(shown() - state["twelve"]).max() > 1e-3
+    scene.frame_set(12)
+    assert np.abs(shown() - state["twelve"]).max() == 0
+
+
+def bake():
+    """From the panel's operator, with progress."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.neuralocks.bake("INVOKE_DEFAULT", filepath=str(FOLDER / "bake.usdc"))
+
+
+def baked():
+    """The bake ended, the frame is where it was, the view as before."""
+    assert (FOLDER / "bake.usdc").exists()
+    assert bpy.context.scene.frame_current == 12
+    assert np.abs(shown() - state["twelve"]).max() < 1e-6
+
+
+def picture():
+    """Of the whole window."""
+    bpy.ops.screen.screenshot(filepath=str(FOLDER / "panel.png"))
+
+
+def _idle():
+    """Time to draw."""
+
+
+STEPS = [build, _idle, mouse, lambda: mouse(click=True), lambda: mouse(TAB), lambda: mouse(click=True), _idle,
+         lambda: mouse(LIVE), lambda: mouse(click=True), _idle, picture, is_live, _idle, _idle, sampled, scrub, bake,
+         _idle, _idle, _idle, _idle, baked, picture]  # fmt: skip
+
+
+def tick():
+    """Do the next step; leave hard, for a window has nobody to close it."""
+    try:
+        STEPS.pop(0)()
+    except Exception:
+        traceback.print_exc()
+        sys.stdout.flush()
+        os._exit(1)
+    if STEPS:
+        return 1.2
+    print("all steps done", flush=True)
+    os._exit(0)
+
+
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(tick, first_interval=2.0)
