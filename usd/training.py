@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `neuralocks train` learns from: a character, grooms and motion, out of files."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
-from neuralocks_core.hairstyles import STYLES, Obstacle, from_head, grow
+from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands import StrandSet, strand_set
 from neuralocks_core.training.rollouts import TrainingScene
@@ -17,6 +16,7 @@ from neuralocks_core.training.rollouts import TrainingScene
 from .attach import attach
 from .border import open_stage
 from .curves import find_curves, read_groom
+from .grow import Barber
 from .placement import Placement
 from .stage import StageRig, read_rigs
 
@@ -75,19 +75,10 @@ def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[Stran
 
 
 def _library(character: Character, seed: int) -> list[StrandSet]:
-    if character.body is None:
-        raise NeuralocksError(f"{LIBRARY}: hair needs a head to grow on; give a character with skin, or a groom")
-    # Styles are grown facing +Z, around the head's own place.
-    points, facing = character.body.points @ character.facing.T, character.facing
-    centre = facing @ character.canonical_to_bind[:3, 3] + character.head_centre
-    scalp = from_head(points, character.body.triangles, centre)
-    obstacle = Obstacle(scalp, (points, character.body.triangles))
-    sets = []
-    for i, style in enumerate(STYLES):
-        groom = grow(style, scalp, MOST_STRANDS, seed + i, obstacle)
-        groom = replace(groom, points=(groom.points @ facing).astype(np.float32))
-        sets.append(_strands(groom, character, seed))
-    return sets
+    barber = Barber(character)
+    return [
+        _strands(barber.grow(style, MOST_STRANDS, seed + i), character, seed) for i, style in enumerate(STYLES)
+    ]
 
 
 def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
