@@ -444,3 +444,40 @@ def bad_input(folder: Path) -> None:
     assert operators.sample_motion() == {"FINISHED"}, "what is excluded is still evaluated, as the hair depends on it"
     scene.frame_set(4)
     assert not _messages(), _messages()
+
+
+def ways_of_parenting(folder: Path) -> None:
+    """Hair parented to the armature, to its head bone, or grown on a deformed surface moves in the same way."""
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    scene = bpy.context.scene
+    by_object = scenes.hair(rig, 30, name="ByObject")
+    by_bone = scenes.hair(rig, 30, name="ByBone")
+    rest = rig.data.bones["head"]
+    by_bone.parent_type, by_bone.parent_bone = "BONE", "head"
+    # Bone parents count from the bone's tail.
+    tail = rest.matrix_local @ scenes.translation((0, rest.length, 0))
+    by_bone.matrix_parent_inverse = tail.inverted()
+    on_surface = scenes.hair(rig, 30, name="OnSurface")
+    on_surface.parent = skin
+    on_surface.data.surface = skin
+    deform = scenes.surface_deform(on_surface)
+    scene.neuralocks.armature = rig
+    for hair in (by_object, by_bone, on_surface):
+        hair.neuralocks_hair.model = MODEL
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for hair in (by_object, by_bone, on_surface):
+        hair.neuralocks_hair.live = True
+    assert not deform.show_viewport and not deform.show_render
+    for frame in (1, 9, 22):
+        scene.frame_set(frame)
+        assert not _messages(), _messages()
+        points = {h.name: scenes.points(h) for h in (by_object, by_bone, on_surface)}
+        assert _apart(points["ByBone"], points["ByObject"]) < SAME
+        assert _apart(points["OnSurface"], points["ByObject"]) < SAME
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "three.usdc")) == {"FINISHED"}
+    for name, shown in points.items():
+        assert _apart(_baked(folder / "three.usdc", f"/Character/Hair_{name}", 22), shown) < SAME
+    on_surface.neuralocks_hair.live = False
+    assert deform.show_viewport and deform.show_render

@@ -182,3 +182,27 @@ def rig_model(rig, path):
         "limits": made.limits.tolist(),
     }
     return model.write(path, meta, {"rig.onnx": b"unused"})
+
+
+def translation(offset):
+    """A Blender matrix."""
+    from mathutils import Matrix
+
+    return Matrix.Translation(offset)
+
+
+def surface_deform(hair):
+    """The modifier that Blender puts on new hair: curves follow their deformed surface."""
+    tree = bpy.data.node_groups.new("Surface Deform", "GeometryNodeTree")
+    if hasattr(tree, "interface"):
+        for way in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    else:
+        tree.inputs.new("NodeSocketGeometry", "Geometry")
+        tree.outputs.new("NodeSocketGeometry", "Geometry")
+    deform = tree.nodes.new("GeometryNodeDeformCurvesOnSurface")
+    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], deform.inputs[0])
+    tree.links.new(deform.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    modifier = hair.modifiers.new("Surface Deform", "NODES")
+    modifier.node_group = tree
+    return modifier
