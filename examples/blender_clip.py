@@ -61,7 +61,7 @@ def stage(armature) -> None:
     background.inputs[0].default_value = (0.10, 0.11, 0.13, 1)
     background.inputs[1].default_value = 1.0
     scene.world = world
-    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 55, 1.2), ("Rim", (1.4, 1.6, 2.4), 150, 0.6)):
+    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 80, 1.2), ("Rim", (1.4, 1.6, 2.4), 150, 0.6)):
         light = bpy.data.lights.new(name, "AREA")
         light.energy, light.size = power, size
         lamp = bpy.data.objects.new(name, light)
@@ -69,7 +69,7 @@ def stage(armature) -> None:
         scene.collection.objects.link(lamp)
         lamp["offset"] = where
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens = 60
+    camera.data.lens = 80
     scene.collection.objects.link(camera)
     scene.camera = camera
     follow(armature)
@@ -81,7 +81,7 @@ def follow(armature) -> None:
     posed = armature.evaluated_get(graph)
     bone = posed.pose.bones[0]
     place = (posed.matrix_world @ bone.matrix).to_translation()
-    target = Vector((place.x, place.y, 1.52))
+    target = Vector((place.x, place.y, 1.58))
     camera = bpy.context.scene.camera
     camera.location = target + Vector((-0.62, -1.3, 0.1))
     camera.rotation_euler = (target - camera.location).to_track_quat("-Z", "Y").to_euler()
@@ -96,7 +96,7 @@ def settings(wanted) -> None:
     scene = bpy.context.scene
     scene.render.resolution_x = scene.render.resolution_y = wanted.size
     scene.render.film_transparent = False
-    scene.view_settings.view_transform = "Filmic" if bpy.app.version < (4, 0) else "AgX"
+    scene.view_settings.view_transform = "Standard"
     if wanted.engine == "EEVEE":
         scene.render.engine = "BLENDER_EEVEE_NEXT" if (4, 2) <= bpy.app.version < (5, 0) else "BLENDER_EEVEE"
         scene.eevee.taa_render_samples = wanted.samples

@@ -97,10 +97,10 @@ def bake_steps(context, armature, hairs, path: str):
 
 
 class _Threaded:
-    """A bake in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
+    """Work in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
 
-    def __init__(self, function):
-        self._function = function
+    def __init__(self, function, title: str = "Baking the hair"):
+        self._function, self._title = function, title
 
     def steps(self, parts: int, part: int):
         import threading
@@ -114,7 +114,7 @@ class _Threaded:
 
         def run():
             try:
-                self._function(say)
+                state["result"] = self._function(say)
             except BaseException as error:
                 state["error"] = error
 
@@ -125,12 +125,13 @@ class _Threaded:
                 thread.join(0.02)
                 done, total, _ = state["done"]
                 share = (part + done / max(total, 1)) / parts
-                yield 0.5 + 0.5 * share, 1, "Baking the hair"
+                yield 0.5 + 0.5 * share, 1, self._title
         finally:
             state["cancel"] = True
             thread.join()
         if "error" in state:
             raise state["error"]
+        return state["result"]
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
@@ -203,7 +204,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         folder = tempfile.mkdtemp(prefix="neuralocks_")
         try:
             baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
-            session.cards[name] = _card(baked[name][0])
+            session.cards[name] = yield from _card(baked[name][0])
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         for line in session.cards[name]:
@@ -211,12 +212,14 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         return f"{name}: report card made"
 
 
-def _card(path: str) -> list[str]:
+def _card(path: str):
+    """Steps of measuring a bake; returns the lines of its card."""
     from usd.evaluate import evaluate
 
     from ..services.card import lines_of
 
-    return lines_of(evaluate(path))
+    measuring = _Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
+    return lines_of((yield from measuring.steps(1, 0)))
 
 
 CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)
