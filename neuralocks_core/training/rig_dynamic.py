@@ -149,10 +149,10 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict, kinds=KINDS
     rigid = np.broadcast_to(rest, true.shape)
     times = motions[0].start + np.arange(true.shape[1]) / RATE
     heads = np.stack([rig.character.canonical_to_world(m.at(times)) for m in motions])
-    fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.1, 0.25, 0.4) for g in (0.0, 0.3, 1.0)]
+    fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
     springs = [_ends(rig, spring_bones(rig.chains, heads, 1 / RATE, fit)) for fit in fits]
     best = int(np.argmin([np.square(s - true).sum(-1).mean() for s in springs]))
-    candidates = {"spring bones, best of 27 settings": springs[best]}
+    candidates = {"spring bones, best of 12 settings": springs[best]}
     candidates["spring bones, VRM's defaults"] = _ends(rig, spring_bones(rig.chains, heads, 1 / RATE))
     for name, model in models.items():
         candidates[name] = np.stack([_model_ends(rig, model, m, times) for m in motions])
@@ -169,7 +169,7 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict, kinds=KINDS
     result["spring_settings"] = asdict(fits[best])
     fine = scripted_clip(rig.character, "shake", 4.0, 120.0)
     shared = np.arange(0, 4.0001, 0.5)
-    for name in ["spring bones, best of 27 settings", *models]:
+    for name in ["spring bones, best of 12 settings", *models]:
         result["rates"][name] = {}
         runs = {}
         for rate in (24, 30, 60):
