@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Warp, started quietly, or a clear word that it is missing."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from types import ModuleType
 
 from neuralocks_core.errors import NeuralocksError
@@ -21,9 +24,28 @@ def start_warp(device: str) -> ModuleType:
         raise NeuralocksError("reference: needs warp; pip install 'neuralocks[compare]'") from missing
     wp.config.log_level = wp.LOG_ERROR
     wp.config.enable_backward = False
-    wp.init()
+    with _quiet() if device == "cpu" else nullcontext():
+        wp.init()
     try:
         wp.get_device(device)
     except Exception as unknown:
         raise NeuralocksError(f"device {device}: not found by warp; use cpu") from unknown
     return wp
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep warp's native start from telling a user of the CPU that there is no GPU: it writes past Python."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # a process without a console
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

@@ -3,7 +3,7 @@
 
 import warp as wp
 
-from neuralocks_core.reference.rod_kernels import array_real, array_vec
+from neuralocks_core.reference.banded_kernels import array_real, array_vec
 
 NO_PLANE = wp.constant(wp.vec4d(0.0, 0.0, 0.0, -1.0e3))
 """n.x - d of this is 1 km wherever x is: no body near."""

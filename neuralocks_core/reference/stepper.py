@@ -32,7 +32,7 @@ class Stepper:
         device: str,
     ):
         self.wp = wp = start_warp(device)
-        from neuralocks_core.reference import rod_kernels, step_kernels
+        from neuralocks_core.reference import banded_kernels, rod_kernels, step_kernels
 
         self.rod_kernels, self.kernels = rod_kernels, step_kernels
         self.device = wp.get_device(device)
@@ -69,7 +69,7 @@ class Stepper:
         # a CPU runs its threads one after the other: one scratch column stays in the cache
         self.stride = 0 if self.device.is_cpu else 1
         column = (self.vertices, self.strands if self.stride else 1)
-        self.scratch = rod_kernels.Scratch()
+        self.scratch = banded_kernels.Scratch()
         for name in ("now", "trial", "frame"):
             setattr(self.scratch, name, self._empty(wp.vec3d, column))
         for name in ("step", "right"):
