@@ -94,7 +94,7 @@ def bake(
     inputs = {
         "model": _digest(strand_model),
         "material": look.log_ratios().tolist(),
-        "carried": [skeleton, head, joints],
+        "carried": [skeleton, head, joints or {}],
     }
 
     def poser(item: StageGroom) -> GroomPoser:

@@ -3,9 +3,13 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
+from neuralocks_core.character import Character
+from neuralocks_core.groom import Groom
+from neuralocks_core.locks import lock_of_roots
 from neuralocks_core.strands import Carrier, StrandSet, strand_set
 
 from .curves import rest_points
@@ -13,6 +17,9 @@ from .stage import StageGroom
 
 BLOCK = 4096
 """Strands that one thread takes at a time; a multiple of what the runtime takes."""
+
+PART = 4 * BLOCK
+"""Strands prepared at a time: what that needs besides its result does not grow with the groom."""
 
 STILL = 1e-6
 """A groom moved by less than this [m] has not moved: its points are then written bit for bit."""
@@ -24,7 +31,6 @@ class GroomPlacer:
     Attributes:
         item: the groom.
         strands: as the network sees it.
-        carrier: the way back to the groom's own vertices.
 
     Args:
         item: the groom.
@@ -34,10 +40,10 @@ class GroomPlacer:
     def __init__(self, item: StageGroom, jobs: int = 1):
         self.item = item
         character = item.attachment.character
-        self.strands: StrandSet = strand_set(
-            item.groom, character.canonical_to_bind[:3, 3], character.head_centre, character.facing
-        )
-        self.carrier = Carrier(item.groom, self.strands)
+        self._parts = _parts(item.groom)
+        self.strands = _strands(self._parts, character)
+        slices = (slice(low, low + PART) for low in range(0, item.groom.strand_count, PART))
+        self._carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
         self._pool = ThreadPoolExecutor(max(1, jobs), thread_name_prefix="place")
         self._ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
         self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
@@ -66,7 +72,9 @@ class GroomPlacer:
 
         def block(strands: slice) -> None:
             here = slice(self._ends[strands.start], self._ends[strands.stop])
-            out = self.carrier.carry(displacement(strands), out=result[here], strands=strands)
+            within = slice(strands.start % PART, strands.start % PART + strands.stop - strands.start)
+            carrier = self._carriers[strands.start // PART]
+            out = carrier.carry(displacement(strands), out=result[here], strands=within)
             if rest is not None:
                 # What the network did not move keeps the author's own bits.
                 out -= groom.points[here]
@@ -86,3 +94,24 @@ class GroomPlacer:
         shift = self._corners @ (to_local - home)[:3, :3].T + (to_local - home)[:3, 3]
         scale = np.cbrt(abs(np.linalg.det(home[:3, :3])))
         return rest_points(self.item.prim) if np.abs(shift).max() < STILL * scale else None
+
+
+def _parts(groom: Groom) -> list[Groom]:
+    """The groom cut into PART strands each; the points are not copied."""
+    ends = np.append(groom.starts, len(groom.points))
+    edges = [*range(0, groom.strand_count, PART), groom.strand_count]
+    return [
+        Groom(groom.name, groom.points[ends[low] : ends[high]], groom.counts[low:high])
+        for low, high in zip(edges, edges[1:])
+    ]
+
+
+def _strands(parts: list[Groom], character: Character) -> StrandSet:
+    """What `strand_set` gives for the whole groom, made part by part."""
+    place = character.canonical_to_bind[:3, 3], character.head_centre, character.facing
+    if len(parts) == 1:
+        return strand_set(parts[0], *place)
+    sets = [strand_set(part, *place, locks=1) for part in parts]
+    fields = ("rest", "valid", "uv", "root_frame", "length")
+    joined = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
+    return replace(sets[0], lock=lock_of_roots(joined["rest"][:, 0]), **joined)

@@ -6,6 +6,7 @@ import numpy as np
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 
+from .memory import give_back
 from .placing import GroomPlacer
 from .stage import StageGroom
 
@@ -46,6 +47,7 @@ class GroomPoser:
             from neuralocks_core.resolve import Resolver
 
             self._resolver = Resolver(character, self._placer.strands)
+        give_back()  # 60 MB of a large groom
 
     def close(self) -> None:
         """Let the threads go."""
