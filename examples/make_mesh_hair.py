@@ -3,8 +3,8 @@
 
     python examples/make_mesh_hair.py [-o examples/mesh_hair]
 
-writes `character.usda` (body, hair mesh and hair joints, at rest) and `shot.usda` (the same with a loop of head and body motion; the hair
-joints rest), both on top of `examples/shot/body.usdc`. Then:
+writes `character.usda` (body, hair mesh and hair joints, at rest) and `shot.usda` (the same with a loop of head
+and body motion; the hair joints rest), both on top of `examples/shot/body.usdc`. Then:
 
     neuralocks rig train examples/mesh_hair/character.usda -o hair.neuralocks
     neuralocks rig bake examples/mesh_hair/shot.usda -o baked.usda --model hair.neuralocks

@@ -88,7 +88,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
 
 def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
     """Outer products: the inner loop has a constant length and vectorises. Blocks keep the sums in registers."""
-    block = 16 if columns % 16 == 0 else 8 if columns % 8 == 0 else 4 if columns % 4 == 0 else 1
+    block = next(size for size in (48, 32, 24, 16, 8, 4, 1) if columns % size == 0)
     lines = [
         f"  for (j = 0; j < {columns}; j += {block}) {{",
         f"    float s[{block}];",

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bake rigged mesh hair: one SkelAnimation in an override layer, the body's joints as they were, the hair's from the network."""
+"""Bake rigged mesh hair: one SkelAnimation in an override layer, the body's joints as they were, the hair's from
+the network.
+"""
 
 import os
 import tempfile
@@ -141,7 +143,9 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
 
 
 def _columns(source, model: RigModel, hair: RiggedHair):
-    """The animation's joint order with missing hair joints appended, and for each hair joint its place and local bind rotation."""
+    """The animation's joint order with missing hair joints appended, and for each hair joint its place and local
+    bind rotation.
+    """
     animated = UsdSkel.Animation(source.animation) if source.animation is not None and source.animated else None
     own = [str(name) for name in animated.GetJointsAttr().Get() or ()] if animated else []
     usable = bool(own) and source._columns is not None

@@ -123,7 +123,9 @@ def _check_authored(prim: Usd.Prim) -> None:
 
 
 def _check_mirrored(hair: RiggedHair) -> None:
-    """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written without the latter."""
+    """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written
+    without the latter.
+    """
     source = hair.source.source
     below = hair.rig.chains.joints
     involved = np.unique(np.concatenate([below, np.maximum(source.parents[below], 0)]))

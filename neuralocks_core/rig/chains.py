@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The hair joints of a rig: a forest of bones that hangs below the head.
 
-A *chain* is one tree of the forest; it may branch. Everything is kept in canonical space (origin at the head joint, Y up, +Z face, metres),
-where joint orients, units and up axes of the rig are gone.
+A *chain* is one tree of the forest; it may branch. Everything is kept in canonical space (origin at the head
+joint, Y up, +Z face, metres), where joint orients, units and up axes of the rig are gone.
 """
 
 from dataclasses import dataclass
@@ -118,7 +118,8 @@ class HairChains:
         return np.array([places[name][0] for name in self.names], int)
 
     def check_same(self, other: "HairChains") -> None:
-        """Refuse a model that was trained for chains of another shape: bones off by more than 2 % or a hierarchy that differs.
+        """Refuse a model that was trained for chains of another shape: bones off by more than 2 % or a
+        hierarchy that differs.
 
         Raises:
             NeuralocksError: names the joint.

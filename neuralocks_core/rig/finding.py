@@ -12,7 +12,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rotation import rotation_part
 
-HAIR_WORDS = "hair|pony|braid|bang|fringe|tress|strand|lock|curl|pigtail|twintail|ahoge|kami|mane|plait|dread|bun|forelock|sideburn|tuft"
+HAIR_WORDS = (
+    "hair|pony|braid|bang|fringe|tress|strand|lock|curl|pigtail|twintail|ahoge|kami|mane|plait|dread|bun|forelock"
+    "|sideburn|tuft"
+)
 FACE_WORDS = (
     "eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead|pupil|iris"
     "|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
@@ -57,9 +60,9 @@ def find_chains(
 ) -> HairChains:
     """The hair chains of a character.
 
-    Without patterns, a subtree below the head is hair if its joints are named like hair, or if they are not named like a face and drive
-    no mesh that a joint outside the head drives too. With patterns (shell wildcards, matched against joint paths and their last parts)
-    it is hair if its first joint matches.
+    Without patterns, a subtree below the head is hair if its joints are named like hair, or if they are not
+    named like a face and drive no mesh that a joint outside the head drives too. With patterns (shell
+    wildcards, matched against joint paths and their last parts) it is hair if its first joint matches.
 
     Args:
         character: skeleton and head.
@@ -88,8 +91,8 @@ def find_chains(
 def split_meshes(meshes: list[SkinnedMesh], skeleton_parents: np.ndarray, head: int, moving: np.ndarray):
     """Which triangles are body and which vertices are hair.
 
-    A mesh that moving joints drive and nothing outside the head's subtree does is hair as a whole, with the cap that is tied to the head;
-    in one that is both, triangles that a moving joint touches are hair.
+    A mesh that moving joints drive and nothing outside the head's subtree does is hair as a whole, with the cap
+    that is tied to the head; in one that is both, triangles that a moving joint touches are hair.
 
     Returns:
         for each mesh (triangles of the body (F', 3), mask of hair vertices that move (V,)).
@@ -209,7 +212,9 @@ def _measured(character, children, tops, meshes) -> HairChains:
 
 
 def _free_end(character, joint, is_top, meshes, places) -> np.ndarray | None:
-    """Where the bone of a last joint ends: as far as its skin reaches. None if it drives nothing, that is, if it is an end marker."""
+    """Where the bone of a last joint ends: as far as its skin reaches. None if it drives nothing, that is, if it
+    is an end marker.
+    """
     parent = int(character.skeleton.parents[joint])
     to_canonical = np.linalg.inv(character.canonical_to_bind)
     points = [
@@ -250,7 +255,9 @@ def _leaf(name: str) -> str:
 
 
 def _named(name: str, words: str) -> bool:
-    """Whether a part of the name begins with one of the words; `earring` is no hair, `Hair_L.001` and `frontHair2` are."""
+    """Whether a part of the name begins with one of the words; `earring` is no hair, `Hair_L.001` and `frontHair2`
+    are.
+    """
     name = _leaf(name).rsplit(":", 1)[-1]
     parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
     return any(re.match(f"(?:{words})", part.lower()) for part in parts) or (

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Posing hair chains and their skin in the head's frame, for many poses at once.
 
-A joint's turn D is measured from its bind pose relative to its carrier, in canonical axes: G_j = G_parent D_j, with G = 1 for the head. In
-the joint's own bind axes B it is B^T D B, which is what an animation system multiplies to the joint's local bind rotation from the right.
+A joint's turn D is measured from its bind pose relative to its carrier, in canonical axes: G_j = G_parent D_j,
+with G = 1 for the head. In the joint's own bind axes B it is B^T D B, which is what an animation system
+multiplies to the joint's local bind rotation from the right.
 """
 
 import numpy as np
@@ -11,10 +12,12 @@ from neuralocks_core.rig.chains import HairChains
 
 
 def half_turns(raw: np.ndarray, max_angle: float) -> np.ndarray:
-    """Quaternions (..., 4) wxyz of any finite vectors (..., 3): vector part raw * s / sqrt(1 + |raw|^2), s = sin(max_angle / 2).
+    """Quaternions (..., 4) wxyz of any finite vectors (..., 3): vector part raw * s / sqrt(1 + |raw|^2), s =
+    sin(max_angle / 2).
 
-    Smooth and without singularity, zero for zero, and bounded by `max_angle` [rad] whatever the input; needs square roots only, so
-    that it costs next to nothing in C. A rotation vector under a tanh would need a sine and a tanh per joint.
+    Smooth and without singularity, zero for zero, and bounded by `max_angle` [rad] whatever the input; needs
+    square roots only, so that it costs next to nothing in C. A rotation vector under a tanh would need a sine
+    and a tanh per joint.
     """
     vector = raw * (np.sin(max_angle / 2) / np.sqrt(1 + np.sum(raw * raw, axis=-1, keepdims=True)))
     scalar = np.sqrt(np.maximum(1 - np.sum(vector * vector, axis=-1, keepdims=True), 0))

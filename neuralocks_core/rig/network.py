@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tiny network of rigged mesh hair: what it reads, what it gives, and its file (paper section 4.4: two layers of 16).
+"""The tiny network of rigged mesh hair: what it reads, what it gives, and its file (paper section 4.4: two
+layers of 16).
 
-It reads neck and upper chest relative to the head (the first two columns of each rotation), gravity in the head's frame and, in the dynamic
-variant, the history of effective gravity and angular velocity. It gives one bounded rotation per hair joint, in the joint's own bind
-axes, and exactly none for the bind pose at rest.
+It reads neck and upper chest relative to the head (the first two columns of each rotation), gravity in the
+head's frame and, in the dynamic variant, the history of effective gravity and angular velocity. It gives one
+bounded rotation per hair joint, in the joint's own bind axes, and exactly none for the bind pose at rest.
 """
 
 from dataclasses import dataclass, field, replace
@@ -92,7 +93,8 @@ class RigModel:
             features: as `RigSampler.features` or the exported header give them; anything finite is allowed.
 
         Returns:
-            unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind local rotation * this.
+            unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind
+            local rotation * this.
         """
         features = np.asarray(features, np.float32)
         if features.shape[-1:] != (self.inputs,):
@@ -157,7 +159,9 @@ class RigModel:
 
 
 class RigSampler:
-    """What a rig model reads of one character in one clip, at any time: the same whatever the clip's rate and the order of asking."""
+    """What a rig model reads of one character in one clip, at any time: the same whatever the clip's rate and the
+    order of asking.
+    """
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         # The network does not read the body's shape: measuring it would be most of the work.

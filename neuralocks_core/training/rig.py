@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training the tiny quasi-static network of a rig without any data: random neck poses, energy as loss (paper section 4.4)."""
+"""Training the tiny quasi-static network of a rig without any data: random neck poses, energy as loss (paper
+section 4.4).
+"""
 
 import time
 from collections.abc import Callable
@@ -99,7 +101,9 @@ def train_static(
 
 
 def total_energy(energy: RigEnergy, pool: PosePool, poses, quaternions, gravity, some=None) -> torch.Tensor:
-    """Energy (B,) of turns (B, N, 4) in poses of the pool with gravity directions (B, 3); planes are those of the state itself."""
+    """Energy (B,) of turns (B, N, 4) in poses of the pool with gravity directions (B, 3); planes are those of the
+    state itself.
+    """
     rotation, position, ends = energy.pose(quaternions)
     down = torch.as_tensor(gravity, dtype=ends.dtype) * 9.81
     result = energy.elastic(quaternions, down, ends)
@@ -149,7 +153,9 @@ class TinyNet(torch.nn.Module):
         return bounded_turns(raw.reshape(len(features), self.joints, 3), self.max_angle)
 
     def plain_layers(self, axes: np.ndarray) -> tuple:
-        """Weights and biases with the normalisation, the bind pose and the joints' axes (N, 3, 3) folded in; summed in float64."""
+        """Weights and biases with the normalisation, the bind pose and the joints' axes (N, 3, 3) folded in;
+        summed in float64.
+        """
         w = [layer.weight.detach().double().numpy() for layer in self.layers]
         b = [layer.bias.detach().double().numpy() for layer in self.layers]
         b[0] = b[0] - w[0] @ (self.mean * self.scale).double().numpy()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training the dynamic variant of a rig's network: regression on simulations of its chains under random motion.
 
-The network stays a pure function of the boundary history; what it learns to answer is what the simulation did after the same history.
+The network stays a pure function of the boundary history; what it learns to answer is what the simulation did
+after the same history.
 """
 
 import time
@@ -138,9 +139,10 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict, kinds=KINDS
     """Held-out scripted clips: errors against the simulation of models, spring bones and hair carried rigidly.
 
     Returns:
-        `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1); `motion_error_by_kind` the same for each kind of
-        motion; `motion_ratio`: mean speed in the head's frame over the simulation's; `rates`: rms difference at shared times of 24 and 30 fps
-        from 60 fps sampling of the same motion [mm].
+        `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1);
+            `motion_error_by_kind` the same for each kind of
+        motion; `motion_ratio`: mean speed in the head's frame over the simulation's; `rates`: rms difference at
+        shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm].
     """
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)

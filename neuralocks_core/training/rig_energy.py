@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Energy of hair joint chains as rods, with the collision of the skinned mesh (paper section 4.4), differentiable.
 
-Per unit of mass [m^2/s^2], zero at rest. Bones do not stretch, so what is left of the rod potentials is gravity, and bend-twist with the
-joints' own rotations as the material frame: Omega = 2 / l Im(q), q the turn of a joint from rest (paper eq. 6 with q^0 = 1).
+Per unit of mass [m^2/s^2], zero at rest. Bones do not stretch, so what is left of the rod potentials is
+gravity, and bend-twist with the joints' own rotations as the material frame: Omega = 2 / l Im(q), q the turn of
+a joint from rest (paper eq. 6 with q^0 = 1).
 """
 
 from dataclasses import dataclass

@@ -74,7 +74,9 @@ class PosePool:
         self._trees = [cKDTree(p[self.kept], balanced_tree=False, compact_nodes=False) for p in points]
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
-        """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs upside down."""
+        """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
+        upside down.
+        """
         count = len(poses)
         lean = np.abs(self._rng.normal(0, np.radians(25), count))
         lean = np.where(self._rng.random(count) < 0.08, self._rng.uniform(0, np.pi, count), lean)
@@ -88,7 +90,9 @@ class PosePool:
         return held_features(spec, self.relative[poses], gravity)
 
     def planes(self, poses: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Plane of the body vertex nearest to each point (n, V, 3): normals (n, V, 3) and offsets (n, V), distance = n.x - d."""
+        """Plane of the body vertex nearest to each point (n, V, 3): normals (n, V, 3) and offsets (n, V), distance
+        = n.x - d.
+        """
         normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
         for row, pose in enumerate(poses):
             nearest = self._trees[pose].query(points[row])[1]
@@ -103,7 +107,9 @@ class PosePool:
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:
-    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less; the first is the bind pose."""
+    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less; the first
+    is the bind pose.
+    """
     turns = {}
     # Evenly in an ellipsoid that is a tenth larger than what a neck can do; its corners no neck can reach.
     direction = rng.normal(size=(count, 3))
@@ -147,7 +153,9 @@ def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tuple[np.ndarray, np.ndarray] | None:
-    """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in canonical space of the head."""
+    """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
+    canonical space of the head.
+    """
     body, character = rig.character.body, rig.character
     if body is None:
         return None

@@ -105,7 +105,9 @@ def _optimise(energy, pool, poses, gravity, max_angle, start, steps: int = 250):
 
 
 def _distances(pool: PosePool, poses, points: np.ndarray, exact: bool = True) -> np.ndarray:
-    """Signed distances (B, V) [m] to the body where a vertex may be in it, 1 elsewhere; to planes of vertices if not `exact`."""
+    """Signed distances (B, V) [m] to the body where a vertex may be in it, 1 elsewhere; to planes of vertices if
+    not `exact`.
+    """
     normals, offsets = pool.planes(poses, points)
     plane = np.einsum("bvi,bvi->bv", normals, points) - offsets
     result = np.where(plane < 2e-3, plane, 1.0)
@@ -117,7 +119,8 @@ def _distances(pool: PosePool, poses, points: np.ndarray, exact: bool = True) ->
         hits = pool.around(pose, at, 0.045)
         reach = np.zeros(len(body), bool)
         reach[np.unique(np.concatenate([np.asarray(h, int) for h in hits]))] = True
-        # Around vertices at the surface a patch of it is enough; one that is far from it needs the whole to tell its side.
+        # Around vertices at the surface a patch of it is enough; one that is far from it needs the whole to tell
+        # its side.
         whole = any(len(h) == 0 for h in hits)
         faces = pool.triangles if whole else pool.triangles[reach[pool.triangles].any(axis=1)]
         result[row, near] = Collider(body, faces).distance(at)[0]
