@@ -140,19 +140,17 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
         "Mul", ["change", graph.constant("free", free)], "o" if output == "direction" else "displacement"
     )
     if output == "direction":
-        graph.constant("rows", np.array([-1, count, 3]))
-        graph.constant("flat", np.array([-1, width]))
-        graph.constant("axis", np.array([2]))
+        # Sums over x, y, z as a matrix product, so that all arrays stay (S, 72): three times as fast as sums over
+        # rows of three.
+        graph.constant("trio", np.kron(np.eye(count), np.ones((3, 3))).astype(np.float32))
         graph.constant("tiny", np.float32(1e-18))
-        for name in ("o", "edges"):
-            graph.node("Reshape", [name, "rows"], f"{name}3")
-        for name, source in (("l", "edges3"), ("n", "v")):
+        for name, source in (("l", "edges"), ("n", "v")):
             if name == "n":
-                graph.node("Add", ["edges3", graph.node("Mul", ["l", "o3"], "lo")], "v")
-            graph.node("ReduceSum", [graph.node("Mul", [source, source], f"{name}2"), "axis"], f"{name}sum")
+                graph.node("Add", ["edges", graph.node("Mul", ["l", "o"], "lo")], "v")
+            graph.node("MatMul", [graph.node("Mul", [source, source], f"{name}2"), "trio"], f"{name}sum")
             graph.node("Sqrt", [graph.node("Max", [f"{name}sum", "tiny"], f"{name}max")], name)
         graph.node("Mul", ["v", graph.node("Div", ["l", "n"], "stretch")], "turned")
-        graph.node("Reshape", [graph.node("Sub", ["turned", "edges3"], "d3"), "flat"], "d")
+        graph.node("Sub", ["turned", "edges"], "d")
         # A running sum along the strand as one matrix product, which runtimes do faster than a scan.
         running = np.kron(np.triu(np.ones((count, count))), np.eye(3)).astype(np.float32)
         graph.node("MatMul", ["d", graph.constant("running", running)], "displacement")
