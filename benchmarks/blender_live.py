@@ -55,6 +55,7 @@ def live(scenes, model: str, count: int) -> dict[str, float]:
     hair = scenes.hair(rig, count)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = model
+    bpy.context.view_layer.update()  # from now on there is something that a frame must evaluate
     plain = _median(scene, FRAMES)
     began = time.perf_counter()
     bpy.ops.neuralocks.sample_motion()

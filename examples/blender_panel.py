@@ -10,8 +10,10 @@ importable (install the extension, or set PYTHONPATH).
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import traceback
 from pathlib import Path
 
@@ -41,7 +43,12 @@ def prepare(wanted) -> None:
         bpy.data.objects.remove(thing)
     armature, _, hair = blender_shot.build(strands=wanted.strands)
     armature.hide_set(True)
-    hair.neuralocks_hair.model = wanted.model
+    # As an artist has it: the file saved, the model beside it.
+    folder = Path(tempfile.mkdtemp())
+    if wanted.model:
+        shutil.copy(wanted.model, folder / "hair.neuralocks")
+        hair.neuralocks_hair.model = "//hair.neuralocks"
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     bpy.ops.neuralocks.sample_motion()
     hair.neuralocks_hair.live = True
     bpy.context.scene.frame_set(wanted.frame)

@@ -481,3 +481,47 @@ def ways_of_parenting(folder: Path) -> None:
         assert _apart(_baked(folder / "three.usdc", f"/Character/Hair_{name}", 22), shown) < SAME
     on_surface.neuralocks_hair.live = False
     assert deform.show_viewport and deform.show_render
+
+
+def training(folder: Path) -> None:
+    """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused."""
+    import shutil
+    import sys
+    import time
+
+    from dcc_addon.operators import training as operator
+    from dcc_addon.services import training_job
+
+    child = folder / "child.py"
+    child.write_text(
+        "import json, shutil, sys, time\n"
+        "if '--check' not in sys.argv:\n"
+        "    settings = json.load(sys.stdin)\n"
+        "    assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
+        "    print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
+        "    time.sleep(1)\n"
+        f"    shutil.copy({MODEL!r}, settings['out'])\n"
+    )
+    training_job.CHILD = child
+    operator.training_python = lambda: shutil.which("python3") or sys.executable
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    try:
+        bpy.ops.neuralocks.train()
+    except RuntimeError as error:
+        assert "one is running already" in str(error)
+    else:
+        raise AssertionError("two trainings at a time")
+    end = time.monotonic() + 60
+    while operator.finish() is None and time.monotonic() < end:
+        time.sleep(0.1)
+    assert "trained" in _messages()["training"], _messages()
+    assert Path(strands.neuralocks_hair.model).parent == folder
+    strands.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(9)
+    assert "Hair" not in _messages(), _messages()
