@@ -200,3 +200,19 @@ def test_the_example_and_its_command_line(tmp_path):
         [*command, "--model", str(tmp_path / "no.neuralocks")], capture_output=True, text=True, cwd=EXAMPLE.parents[1]
     )
     assert done.returncode == 1 and done.stderr.count("\n") == 1
+
+
+def test_a_vrm_avatar_through_blender(tmp_path):
+    """Its seven hair chains of one joint and an end are found, as its spring-bone groups name them."""
+    avatar = EXAMPLE.parents[2] / "shared" / "data" / "rigged" / "godette.vrm"
+    blender = next(iter(sorted(EXAMPLE.parents[1].glob(".venv-blender-*/bin/python"))), None)
+    if not avatar.is_file() or blender is None:
+        pytest.skip("needs ../shared/data/rigged/godette.vrm and a Python with bpy in .venv-blender-*")
+    script = EXAMPLE.parent / "vrm_to_usd.py"
+    command = [str(blender), str(script), str(avatar), "-o", str(tmp_path / "g.usdc")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    hair = read_rigged_hair(tmp_path / "g.usdc")
+    named = done.stdout.strip().splitlines()[-1].replace("--chains", "").split()
+    assert sorted(hair.rig.chains.names) == sorted(named) and len(named) == 7
+    assert len(hair.rig.points) > 50

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Energy, simulation and training of rigs: exact where it can be, better than rigid where it is learnt."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from neuralocks_core.reference.chains import ChainSolver  # noqa: E402
+from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones  # noqa: E402
+from neuralocks_core.rig import find_chains  # noqa: E402
+from neuralocks_core.rig.kinematics import (  # noqa: E402
+    bone_ends,
+    half_turns,
+    pose_chains,
+    quaternion_matrices,
+    skin,
+)
+from neuralocks_core.rig.rigging import HairRig  # noqa: E402
+from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns  # noqa: E402
+from tests.core.rig.builders import character, tail  # noqa: E402
+
+
+def branched() -> HairRig:
+    """A chain that forks, with a few skinned points."""
+    fork = tail("hair_a", 3, at=(0.05, 1.44, -0.1), parent="hair_2")
+    fork += tail("hair_b", 3, at=(-0.05, 1.44, -0.1), parent="hair_2")
+    who = character([*tail("hair", 2), *fork])
+    chains = find_chains(who)
+    rng = np.random.default_rng(0)
+    weights = rng.random((7, len(chains) + 1))
+    return HairRig(
+        who, chains, rng.normal(0, 0.1, (7, 3)), weights / weights.sum(1, keepdims=True), np.zeros((0, 3), int)
+    )
+
+
+def test_torch_and_numpy_pose_alike():
+    """Positions, bone ends and skin of a branching chain."""
+    rig = branched()
+    energy = RigEnergy(rig, RigMaterial(), dtype=torch.float64)
+    raw = np.random.default_rng(1).normal(0, 0.5, (4, len(rig.chains), 3))
+    turns = half_turns(raw, 2.4)
+    np.testing.assert_allclose(bounded_turns(torch.as_tensor(raw), 2.4).numpy(), turns, atol=1e-12)
+    rotation, position, ends = energy.pose(torch.as_tensor(turns))
+    ours = pose_chains(rig.chains, quaternion_matrices(turns))
+    np.testing.assert_allclose(position.numpy(), ours[1], atol=1e-12)
+    np.testing.assert_allclose(ends.numpy(), bone_ends(rig.chains, *ours), atol=1e-12)
+    np.testing.assert_allclose(
+        energy.skin(rotation, position).numpy(), skin(rig.chains, *ours, rig.points, rig.weights)
+    )
+
+
+def test_gradient_of_the_energy():
+    """Against finite differences in float64."""
+    rig = branched()
+    energy = RigEnergy(rig, RigMaterial(), dtype=torch.float64)
+    raw = torch.tensor(np.random.default_rng(2).normal(0, 0.4, (2, len(rig.chains), 3)), requires_grad=True)
+    gravity = torch.tensor([[0.0, -9.81, 0.0], [5.0, 0.0, 8.0]], dtype=torch.float64)
+
+    def total(u):
+        turns = bounded_turns(u, 2.4)
+        return energy.elastic(turns, gravity, energy.pose(turns)[2]).sum()
+
+    assert torch.autograd.gradcheck(total, (raw,))
+
+
+def test_the_bind_pose_is_at_rest():
+    """The simulation leaves it alone, and a hanging chain swings back to it."""
+    rig = branched()
+    material = RigMaterial()
+    solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping)
+    heads = np.tile(np.eye(4), (1, 10, 1, 1))
+    turns = solver.simulate(heads, 1 / 30)
+    assert np.abs(turns[..., 1:]).max() < 1e-5
+
+
+def test_a_loose_tail_swings_as_a_pendulum():
+    """One stiff bone without bend: period 2 pi sqrt(L / g) of a point mass, within the damping of the integrator."""
+    who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.3, 0))])
+    chains = find_chains(who)
+    material = RigMaterial(bend=1e-9, damping=0.0)
+    solver = ChainSolver(chains, RodTree(chains, material), 0.0)
+    rate = 120
+    heads = np.tile(np.eye(4), (1, 3 * rate, 1, 1))
+    heads[0, 1:, 0, 3] = 0.03  # a sudden step aside sets it going
+    turns = solver.simulate(heads, 1 / rate, substeps=2, warm_up=2)
+    angle = 2 * turns[0, 2:, 0, 3]
+    crossings = np.flatnonzero(np.diff(np.sign(angle)) != 0)
+    period = 2 * np.diff(crossings).mean() / rate
+    assert period == pytest.approx(2 * np.pi * np.sqrt(0.3 / 9.81), rel=0.05)
+
+
+def test_spring_bones_rest_and_depend_on_the_frame_rate():
+    """Still in the bind pose; after the same motion at 30 and 60 fps they are elsewhere, as specified."""
+    chains = branched().chains
+    still = spring_bones(chains, np.tile(np.eye(4), (1, 20, 1, 1)), 1 / 60)
+    assert np.abs(still[..., 1:]).max() < 1e-5
+    ends = []
+    for rate in (30, 60):
+        heads = np.tile(np.eye(4), (1, rate, 1, 1))
+        heads[0, :, 0, 3] = 0.2 * np.sin(8 * np.arange(rate) / rate)
+        ends.append(spring_bones(chains, heads, 1 / rate, SpringSettings())[0, -1])
+    assert np.abs(ends[0] - ends[1]).max() > 1e-3
