@@ -31,6 +31,7 @@ def train(
     seconds: Annotated[float, typer.Option(help="How long to train [s].")] = 75.0,
     steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 16, and 32 for --dynamic.")] = None,
+    clips: Annotated[int, typer.Option(help="Simulated motions to learn from; for --dynamic.")] = 96,
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density [m^4/s^2].")] = None,
     weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
     damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]; for --dynamic.")] = None,
@@ -47,6 +48,8 @@ def train(
         raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
     if hidden is not None and not 1 <= hidden <= 256:
         raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
+    if not 2 <= clips <= 10000:
+        raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
     changed = {"bend": bend, "weight": weight, "damping": damping}
     for name, value in changed.items():
         if value is not None and not 1e-6 < value < 1e4:
@@ -61,6 +64,7 @@ def train(
             seconds=seconds,
             steps=steps,
             hidden=hidden,
+            clips=clips,
             material={name: value for name, value in changed.items() if value is not None},
             seed=seed,
             chains=chains,

@@ -16,6 +16,7 @@ def train_rig(
     seconds: float = 75.0,
     steps: int | None = None,
     hidden: int | None = None,
+    clips: int = 96,
     material: dict | None = None,
     seed: int = 0,
     chains: list[str] | None = None,
@@ -31,6 +32,7 @@ def train_rig(
         out: `.neuralocks` file to write.
         dynamic: learn from a simulation of the chains instead of the energy alone.
         seconds, steps, hidden, seed: see `training.rig.train_static`.
+        clips: see `training.rig_dynamic.train_dynamic`.
         material: fields of `training.rig_energy.RigMaterial`.
         chains, head, skeleton: see `read_rigged_hair`.
         command: for the model card.
@@ -57,7 +59,7 @@ def train_rig(
     if dynamic:
         from neuralocks_core.training.rig_dynamic import train_dynamic
 
-        model = train_dynamic(hair.rig, values, hidden=hidden or 32, **options)
+        model = train_dynamic(hair.rig, values, hidden=hidden or 32, clips=clips, **options)
     else:
         from neuralocks_core.training.rig import train_static
 
