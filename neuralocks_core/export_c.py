@@ -92,12 +92,14 @@ def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str
     lines = [
         f"  for (j = 0; j < {columns}; j += {block}) {{",
         f"    float s[{block}];",
-        f"    for (k = 0; k < {block}; ++k) s[k] = b{index}[j + k];",
+        f"    for (k = 0; k < {block}; ++k) s[k] = 0.0f;",
         f"    for (i = 0; i < {rows}; ++i)",
         f"      for (k = 0; k < {block}; ++k) s[k] += w{index}[i][j + k] * {below}[i];",
-        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = {'s[k] > 0.0f ? s[k] : 0.0f' if hidden else 's[k]'};",
+        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = s[k] + b{index}[j + k];",
         "  }",
     ]
+    if hidden:
+        lines.append(f"  for (j = 0; j < {columns}; ++j) h{index}[j] = h{index}[j] > 0.0f ? h{index}[j] : 0.0f;")
     return "\n".join(lines)
 
 
