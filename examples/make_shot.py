@@ -15,15 +15,15 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdSkel, Vt
 
 sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[1])]
 
-from acting import SECONDS, act  # noqa: E402
+from acting import SECONDS, act
 
-from neuralocks_core.arclength import resample  # noqa: E402
-from neuralocks_core.groom import Groom  # noqa: E402
-from neuralocks_core.hairstyles import grow  # noqa: E402
-from neuralocks_core.hairstyles.scalp import Scalp  # noqa: E402
-from usd.animation import write_animation  # noqa: E402
-from usd.body import MESH, ROOT, SKELETON, write_body  # noqa: E402
-from usd.stage import read_rigs  # noqa: E402
+from neuralocks_core.arclength import resample
+from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles import grow
+from neuralocks_core.hairstyles.scalp import Scalp
+from usd.animation import write_animation
+from usd.body import MESH, ROOT, SKELETON, write_body
+from usd.stage import read_rigs
 
 RATE = 24.0
 VERTICES = 24
