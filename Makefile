@@ -51,8 +51,11 @@ $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
 # wheel is missing, the tests that need it say so and are skipped.
 BLENDER_NEEDS = onnxruntime usd-core scipy trimesh
-PYTHON_3_11 = $(firstword $(wildcard $(shell command -v python3.11) $(HOME)/.pyenv/versions/3.11*/bin/python3.11))
-PYTHON_3_13 = $(firstword $(wildcard $(shell command -v python3.13) $(HOME)/.pyenv/versions/3.13*/bin/python3.13))
+# The first of that version that really runs: a version manager's stand-in may only say that it does not.
+find-python = $(shell for p in python$(1) $(HOME)/.pyenv/versions/$(1)*/bin/python$(1); do \
+    if "$$p" -c 0 2>/dev/null; then echo "$$p"; break; fi; done)
+PYTHON_3_11 = $(call find-python,3.11)
+PYTHON_3_13 = $(call find-python,3.13)
 
 blender: .venv-blender-4.2/installed .venv-blender-5.2/installed
 
