@@ -58,7 +58,7 @@ class Carrier:
         place = arc / np.where(strands.valid, length, 1.0)[owner] * segments
         segment = np.clip(place.astype(np.int32), 0, segments - 1)
         self._weight = np.clip(place - segment, 0.0, 1.0).astype(np.float32)[:, None]
-        self._segment = owner.astype(np.int64) * (segments + 1) + segment
+        self._segment = owner.astype(np.int32) * (segments + 1) + segment
         flat = strands.rest.reshape(-1, 3).astype(np.float64)
         on_line = flat[self._segment] * (1.0 - self._weight) + flat[self._segment + 1] * self._weight
         residual = canonical - on_line
@@ -67,7 +67,7 @@ class Carrier:
         bent = np.linalg.norm(residual, axis=1) > _RESIDUAL_FLOOR
         self._bent = np.zeros(groom.strand_count, np.bool_)
         self._bent[owner[bent]] = True
-        self._residual = residual.astype(np.float32)
+        self._residual = residual.astype(np.float32) if bent.any() else None
 
     def carry(
         self, displacement: np.ndarray, out: np.ndarray | None = None, strands: slice | None = None

@@ -115,9 +115,6 @@ class StrandSession:
         self._strand_part = self._by_chunk(
             lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256
         )
-        edges = np.zeros((count, K, 3), np.float32)
-        edges[:, 1:] = np.diff(strands.rest, axis=1)
-        self._edges = edges.reshape(count, 3 * K)
         self._anchor = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None
 
@@ -150,7 +147,7 @@ class StrandSession:
 
     def _tail(self, output, vector, strands: slice = slice(None), out=None) -> np.ndarray:
         frame = self.model.frame_part(vector)
-        start, stop, _ = strands.indices(len(self._edges))
+        start, stop, _ = strands.indices(len(self.strands.rest))
         result = (
             np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
         )
@@ -165,12 +162,12 @@ class StrandSession:
                 strand_part=self._strand_part[chunk],
                 frame_part=frame,
                 anchor=self._anchor[chunk],
-                edges=self._edges[chunk],
+                edges=_edges(self.strands.rest[chunk]),
             )
             a, b = max(chunk.start, start), min(chunk.stop, stop)
             result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
 
-        self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self._edges)), start)
+        self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self.strands.rest)), start)
         return result
 
     def _by_chunk(self, function, width: int) -> np.ndarray:
@@ -185,7 +182,14 @@ class StrandSession:
     @cached_property
     def nbytes(self) -> int:
         """Memory held for this groom [bytes]."""
-        return self._strand_part.nbytes + self._edges.nbytes + self._anchor.nbytes + self.codes.nbytes
+        return self._strand_part.nbytes + self._anchor.nbytes + self.codes.nbytes
+
+
+def _edges(rest: np.ndarray) -> np.ndarray:
+    """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
+    edges = np.zeros(rest.shape, np.float32)
+    np.subtract(rest[:, 1:], rest[:, :-1], out=edges[:, 1:])
+    return edges.reshape(len(rest), -1)
 
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
