@@ -274,7 +274,7 @@ def train_command(
     motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
     steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted training.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")] = False,
     skeleton: Skeleton = None,
     head: Head = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,

@@ -30,16 +30,17 @@ def progress_bar(title: str) -> Iterator:
     )
     bar = Progress(*columns, console=console, transient=True)
     began, shown = time.monotonic(), None
-    logged = began
+    logged, first = began, None  # a resumed job begins in the middle: only what is done here tells the speed
     drawn = sys.stderr.isatty()
 
     def callback(done: int, total: int, message: str = "") -> None:
-        nonlocal shown, logged
+        nonlocal shown, logged, first
         now = time.monotonic()
+        first = done if first is None else first
         if not drawn:
             if now - logged > LOG_EVERY:
                 logged = now
-                left = f", {(now - began) * (total - done) / done / 60:.1f} min left" if done else ""
+                left = f", {(now - began) * (total - done) / (done - first) / 60:.1f} min left" if done > first else ""
                 print(f"{title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
             return
         if shown is None and now - began < QUIET_FOR:

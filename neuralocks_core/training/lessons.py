@@ -107,7 +107,12 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
     """Strand inputs (n, 70) and boundary vectors (m, F) of a bank's rollouts."""
     strands = np.concatenate([bank.inputs[r.groom][r.strands] for r in bank.rollouts])
     strands = np.concatenate([strands, *(inputs[:: max(1, len(inputs) // 500)] for inputs in bank.inputs)])
-    return strands, np.concatenate([r.vectors for r in bank.rollouts])
+    frames = []
+    for r in bank.rollouts:
+        frames.append(r.vectors.copy())
+        if r.materials is not None:
+            frames[-1][:, bank.material] = r.materials[np.arange(len(r.vectors)) % len(r.materials)]
+    return strands, np.concatenate(frames)
 
 
 def normalise(net: StrandNet, strands: np.ndarray, frames: np.ndarray, history: slice, static: bool) -> None:

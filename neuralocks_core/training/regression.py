@@ -73,6 +73,7 @@ class RolloutBank:
         self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
         self.lengths = [groom.length for groom in scene.grooms]
         self.rollouts: list[Rollout] = []
+        self.material = scene.spec.slices["material"]
         self._seen: set[Path] = set()
 
     def add(self, files: list[Path]) -> int:
@@ -83,6 +84,15 @@ class RolloutBank:
                 self.rollouts.append(load(path))
         return len(self.rollouts)
 
+    @staticmethod
+    def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Random strands of one material: they share the frame's part of the first layer."""
+        strands = np.arange(len(rollout.strands))
+        if rollout.materials is not None:
+            same = (rollout.materials == rollout.materials[rng.integers(len(strands))]).all(axis=1)
+            strands = np.flatnonzero(same)
+        return rng.choice(strands, count, replace=len(strands) < count)
+
     def batch(self, rng: np.random.Generator, options: RegressionOptions) -> dict[str, Tensor]:
         """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's
         vector last.
@@ -90,15 +100,17 @@ class RolloutBank:
         rows: dict[str, list] = {name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")}
         for index in rng.integers(len(self.rollouts), size=options.clips):
             rollout = self.rollouts[index]
-            count = len(rollout.strands)
-            pick = rng.choice(count, options.strands, replace=count < options.strands)
+            pick = self._alike(rollout, rng, options.strands)
             late = rng.integers(max(rollout.first, 1), len(rollout.vectors), size=options.moments)
             moments = np.stack([late - 1, late], axis=1).ravel()
             chosen = rollout.strands[pick]
             rows["strands"].append(self.inputs[rollout.groom][chosen])
             rows["rest"].append(rollout.rest[pick])
             rows["length"].append(self.lengths[rollout.groom][chosen])
-            rows["frames"].append(np.concatenate([rollout.vectors[moments], rollout.bind[None]]))
+            frames = np.concatenate([rollout.vectors[moments], rollout.bind[None]])
+            if rollout.materials is not None:
+                frames[:, self.material] = rollout.materials[pick[0]]
+            rows["frames"].append(frames)
             rows["moved"].append(rollout.moved[moments[:, None], pick])
             rows["planes"].append(rollout.planes[moments[:, None], pick])
         batch = {name: torch.from_numpy(np.stack(values)).to(options.device) for name, values in rows.items()}
@@ -198,11 +210,21 @@ def predicted(
     chosen = rollout.strands
     device = next(net.parameters()).device
     strands = net.strand_part(torch.from_numpy(bank.inputs[rollout.groom][chosen]).to(device))
-    frames = torch.from_numpy(np.concatenate([rollout.vectors, rollout.bind[None]])).to(device)
-    offsets = net.tail(strands[None], net.frame_part(frames)[:, None])
-    offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
-    rest = torch.from_numpy(rollout.rest).to(device)
-    return deform(offsets[:-1], rest, offsets[-1:] if anchored else None, output).cpu().numpy()
+    frames = np.concatenate([rollout.vectors, rollout.bind[None]])
+    result = np.empty((len(rollout.vectors), len(chosen), 24, 3), np.float32)
+    groups = [np.arange(len(chosen))]
+    if rollout.materials is not None:
+        kinds, kind = np.unique(rollout.materials, axis=0, return_inverse=True)
+        groups = [np.flatnonzero(kind.ravel() == i) for i in range(len(kinds))]
+    for group in groups:
+        if rollout.materials is not None:
+            frames[:, bank.material] = rollout.materials[group[0]]
+        offsets = net.tail(strands[None, group], net.frame_part(torch.from_numpy(frames).to(device))[:, None])
+        offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
+        rest = torch.from_numpy(rollout.rest[group]).to(device)
+        anchor = offsets[-1:] if anchored else None
+        result[:, group] = deform(offsets[:-1], rest, anchor, output).cpu().numpy()
+    return result
 
 
 def _norm(vectors: Tensor) -> Tensor:

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.locks import lock_mates
-from neuralocks_core.materials import Material
+from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
@@ -75,6 +75,8 @@ class Rollout:
         planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest
             vertex.
         residual: of the solver, rms relative to weight.
+        materials: log-ratios of each strand's material (n, 4) float32, the same within a lock; `vectors` and `bind`
+            have the first strand's.
     """
 
     groom: int
@@ -86,15 +88,26 @@ class Rollout:
     moved: np.ndarray
     planes: np.ndarray
     residual: float
+    materials: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What chance decides of a rollout."""
+    """What chance decides of a rollout.
+
+    Attributes:
+        groom: index into the scene's grooms.
+        strands: (n,) indices of its strands.
+        materials: of each strand, the same within a lock: one motion shows many materials for the price of one.
+        shape: blend shape weights.
+        clip: the motion.
+        times: (T,) [s].
+        first: first frame to learn from.
+    """
 
     groom: int
     strands: np.ndarray
-    material: Material
+    materials: tuple[Material, ...]
     shape: np.ndarray
     clip: Clip
     times: np.ndarray
@@ -128,7 +141,7 @@ class RolloutMaker:
             scene.character.canonical_to_world(joints),
             None if self.body is None else posed_over_time(self.body, joints @ scene.character.inverse_bind, shape),
             None if self.body is None else self.body.triangles,
-            draw.material,
+            {name: np.array([getattr(m, name) for m in draw.materials]) for name in RANGES},
             dt=scene.spec.dt,
             substeps=scene.substeps,
             rest_support=scene.rest_support,
@@ -149,6 +162,7 @@ class RolloutMaker:
             np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
             np.clip(planes, -1000, 1000).astype(np.float16),
             float(np.median(result.residual)),
+            np.stack([m.log_ratios() for m in draw.materials]),
         )
 
     def reread(self, index: int, rollout: Rollout, spec: BoundarySpec) -> Rollout:
@@ -161,13 +175,18 @@ class RolloutMaker:
         rng = np.random.default_rng([self.scene.seed, self.scene.held_out, index])
         which = int(rng.integers(len(self.scene.grooms)))
         strands = self._locks(which, rng)
-        material = Material.random(rng)
+        locks, lock = np.unique(self.scene.grooms[which].lock[strands], return_inverse=True)
+        by_lock = [Material.random(rng)]
+        # From a generator of their own, so that motion does not depend on the number of locks.
+        others = np.random.default_rng([self.scene.seed, self.scene.held_out, index, 1])
+        by_lock += [Material.random(others) for _ in locks[1:]]
+        by_lock[lock[0]], by_lock[0] = by_lock[0], by_lock[lock[0]]
         shape = self._shape(rng)
-        return Draw(which, strands, material, shape, *self._motion(rng, shape))
+        return Draw(which, strands, tuple(by_lock[i] for i in lock), shape, *self._motion(rng, shape))
 
     def vectors(self, draw: Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
         sampler = BoundarySampler(spec, self.scene.character, draw.clip)
-        log = draw.material.log_ratios()
+        log = draw.materials[0].log_ratios()
         return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
 
     def canonical(self, points: np.ndarray) -> np.ndarray:

@@ -57,7 +57,7 @@ def train_strands(
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
         processes: that make rollouts; the network's training uses what is left.
         work: folder for checkpoint and rollouts; `OUT.training` beside the model where left out.
-        resume: go on from the checkpoint in `work`.
+        resume: go on from the checkpoint in `work`; with a larger budget than before, a finished run trains longer.
         keep_work: leave `work` behind after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
@@ -102,7 +102,10 @@ def train_strands(
         gauge = None
 
         def refill(optimiser):
-            return checkpoint.load(saved, modules, optimiser)
+            kept = checkpoint.load(saved, modules, optimiser)
+            # Against today's budget: a finished run goes on when it is given more time.
+            spent = kept["step"] / options.steps if options.steps else kept["seconds"] / (60 * options.minutes)
+            return {**kept, "done": min(spent, 1.0)}
 
         def look():
             held.add(held_farm.files())
