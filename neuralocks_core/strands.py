@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arclength import resample
-from .carrier import Carrier
 from .centreline import centre_lines
 from .groom import Groom
 from .locks import lock_of_roots
@@ -19,7 +18,7 @@ K = 24
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""
 
-__all__ = ["Carrier", "K", "StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set"]
+__all__ = ["K", "StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set"]
 
 
 @dataclass(frozen=True, eq=False)

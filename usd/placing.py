@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from neuralocks_core.carrier import Carrier
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.locks import lock_of_roots
-from neuralocks_core.strands import Carrier, StrandSet, strand_set
+from neuralocks_core.strands import StrandSet, strand_set
 
 from .curves import rest_points
 from .stage import StageGroom

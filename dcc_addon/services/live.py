@@ -6,11 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.carrier import Carrier
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strands import Carrier, strand_set
+from neuralocks_core.strands import strand_set
 
 BLOCK_POINTS = 24_576
 """Points worked on at a time: they stay in a core's cache, and a product of so few rows by a 3x3 matrix stays on its

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from neuralocks_core.carrier import Carrier
 from neuralocks_core.centreline import centre_lines
 from neuralocks_core.groom import Groom
-from neuralocks_core.strands import Carrier, K, root_frames, root_uv, scalp_local, strand_set
+from neuralocks_core.strands import K, root_frames, root_uv, scalp_local, strand_set
 
 ORIGIN = np.array([0.0, 1.5, 0.02])
 CENTRE = np.array([0.0, 0.1, 0.0])
