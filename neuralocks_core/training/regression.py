@@ -179,8 +179,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     """Weighted losses of a batch, each a mean over vertices in units of strand length.
 
     `position` |x - x*|, `velocity` the same of frame differences, `collision` how far x lies under the plane
-    of the body next to x*,
-    beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])
