@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Carrying along what lies off the network's polyline, the turns of a coil, say, by the turns of its segments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def turned(
+    rest: np.ndarray, displacement: np.ndarray, segment: np.ndarray, weight: np.ndarray, residual: np.ndarray
+) -> np.ndarray:
+    """Displacement of own vertices: that of the polyline at their place, and their distance from it turned.
+
+    It is turned by the smallest rotations that take the polyline's rest segments to the deformed ones.
+
+    Args:
+        rest, displacement: (N, K, 3) float32 [m].
+        segment: (P,) first vertex of the segment each own vertex lies at, counted through all strands.
+        weight: (P, 1) float32 share of the way to the next vertex.
+        residual: (P, 3) float32 [m] from the polyline to the own vertex, at rest.
+
+    Returns:
+        (P, 3) float32 [m].
+    """
+    steps = np.zeros_like(displacement)
+    np.subtract(displacement[:, 1:], displacement[:, :-1], out=steps[:, :-1])
+    moved = displacement.reshape(-1, 3).take(segment, axis=0)
+    moved += weight * steps.reshape(-1, 3).take(segment, axis=0)
+    turns = _turns(rest, steps).reshape(-1, 4)
+    turn = turns.take(segment, axis=0)
+    turn += weight * (turns.take(segment + 1, axis=0) - turn)
+    x, y, z, w = np.ascontiguousarray(turn.T)
+    a, b, c = np.ascontiguousarray(residual.T)
+    # A quaternion of any length turns r by 2 (w q x r + q x (q x r)) / |q|^2: nothing where q is zero.
+    once = y * c - z * b, z * a - x * c, x * b - y * a
+    scale = np.float32(2.0) / np.maximum(x * x + y * y + z * z + w * w, np.float32(1e-12))
+    moved[:, 0] += scale * (w * once[0] + y * once[2] - z * once[1])
+    moved[:, 1] += scale * (w * once[1] + z * once[0] - x * once[2])
+    moved[:, 2] += scale * (w * once[2] + x * once[1] - y * once[0])
+    return moved
+
+
+def _turns(rest: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Smallest rotations of the segments at rest to the deformed ones, blended at each vertex.
+
+    Blended, so that what lies off the polyline is not torn where two segments meet.
+
+    Args:
+        rest: (N, K, 3) [m].
+        steps: (N, K, 3) [m], difference of displacement along each segment (last row unused).
+
+    Returns:
+        (N, K, 4) float32 quaternions x y z w, not of unit length, x y z exactly zero where nothing moved.
+    """
+    edges = rest[:, 1:] - rest[:, :-1]
+    # One array a coordinate: three to a row leave a processor's vectors mostly empty.
+    a, b, c = np.ascontiguousarray(np.moveaxis(edges, -1, 0))
+    p, q, r = np.ascontiguousarray(np.moveaxis(edges + steps[:, :-1], -1, 0))
+    lengths = np.sqrt((a * a + b * b + c * c) * (p * p + q * q + r * r))
+    # Half way between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
+    segment = np.empty((4, *a.shape), np.float32)
+    segment[0], segment[1], segment[2] = b * r - c * q, c * p - a * r, a * q - b * p
+    segment[3] = lengths + (a * p + b * q + c * r)
+    segment /= np.sqrt(np.maximum((segment * segment).sum(axis=0), np.float32(1e-30)))
+    turns = np.empty((*rest.shape[:2], 4), np.float32)
+    turns[:, 0], turns[:, -1] = np.moveaxis(segment[:, :, 0], 0, -1), np.moveaxis(segment[:, :, -1], 0, -1)
+    middle = segment[:, :, :-1] + segment[:, :, 1:]
+    middle *= np.float32(0.5)
+    turns[:, 1:-1] = np.moveaxis(middle, 0, -1)
+    return turns
