@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 POINTS = 16_384
 """Points carried at a time, about: what is touched for them stays in the processor's second-level cache."""
 
-_PREPARED = 512
-"""Strands prepared at a time, so that preparing takes little memory beside its result."""
+BLOCK = 512
+"""Strands prepared together, so that preparing takes little memory beside its result, and at most carried at once."""
 
 
 class Carrier:
@@ -45,9 +45,9 @@ class Carrier:
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
         self._negative_zero = bool((np.signbit(groom.points) & (groom.points == 0)).any())
 
-        # A power of two, so that no chunk reaches across a border of _PREPARED.
+        # A power of two, so that no chunk reaches across a border of BLOCK.
         each = POINTS * groom.strand_count / max(len(groom.points), 1)
-        self._chunk = 2 ** int(np.clip(np.log2(max(each, 1.0)), 4, np.log2(_PREPARED)))
+        self._chunk = 2 ** int(np.clip(np.log2(max(each, 1.0)), 4, np.log2(BLOCK)))
         vertices = strands.rest.shape[1]
         canonical = (groom.points - strands.head_origin) @ strands.facing.T
         self._direct = bool((groom.counts == vertices).all()) and bool(
@@ -61,38 +61,19 @@ class Carrier:
         groom, count, vertices = self._groom, *self._rest.shape[:2]
         arc, length = arc_lengths(groom)
         place = arc / np.where(self._valid, length, 1.0)[groom.strand_of_point] * (vertices - 1)
-        self._fine = np.zeros(count, np.bool_)
-        means, fine = [], []
-        for low in range(0, count, _PREPARED):
-            high = min(low + _PREPARED, count)
-            here = slice(self._ends[low], self._ends[high])
-            strand = groom.strand_of_point[here] - low
-            means_here, fine_here = self._prepared(low, high, canonical[here], strand, place[here])
-            means.append(means_here)
-            fine.append(fine_here)
-        self._first, self._weights = (np.concatenate(parts) for parts in zip(*means, strict=True))
-        self._segment, self._share, self._residual = (np.concatenate(parts) for parts in zip(*fine, strict=True))
-        self._rank = np.concatenate([[0], np.cumsum(self._fine)])
-        self._fine_ends = np.concatenate([[0], np.cumsum(np.where(self._fine, groom.counts, 0))])
-
-    def _prepared(self, low: int, high: int, own: np.ndarray, strand: np.ndarray, place: np.ndarray):
-        """The same for the strands from `low` to `high`: arrays of those that are means, and of those that turn."""
-        rest, valid, vertices = self._rest[low:high], self._valid[low:high], self._rest.shape[1]
-        first, weights, fine = spans.weights(rest, own, strand, place)
-        fine &= valid
-        self._fine[low:high] = fine
-        of_fine = fine[strand]
-        first += (strand * vertices).astype(np.int32)
-        means = first[~of_fine], weights[~of_fine]
-
-        own, strand, place = own[of_fine], strand[of_fine], place[of_fine]
-        segment = np.clip(place.astype(np.int32), 0, vertices - 2)
-        share = np.clip(place - segment, 0.0, 1.0)[:, None]
-        flat, at = rest.reshape(-1, 3).astype(np.float64), strand * vertices + segment
-        residual = own - (flat[at] * (1.0 - share) + flat[at + 1] * share)
-        rank = (np.cumsum(fine) - 1)[strand]
-        at = (rank * vertices + segment).astype(np.int32)
-        return means, (at, share.astype(np.float32), residual.astype(np.float32))
+        self._blocks = []
+        for low in range(0, count, BLOCK):
+            strands = slice(low, min(low + BLOCK, count))
+            own = slice(self._ends[low], self._ends[strands.stop])
+            self._blocks.append(
+                _Block(
+                    self._rest[strands],
+                    self._valid[strands],
+                    canonical[own],
+                    groom.strand_of_point[own] - low,
+                    place[own],
+                )
+            )
 
     def carry(
         self,
@@ -141,34 +122,64 @@ class Carrier:
         if self._direct:
             moved = displacement.reshape(-1, 3)
         else:
-            fine = self._fine[start:stop]
-            turning = self._rank[stop] - self._rank[start]
-            if not turning:
-                moved = self._means(displacement, start, stop)
-            elif turning == stop - start:
-                moved = self._turned(displacement, self._rest[start:stop], start, stop)
-            else:
-                own = np.repeat(fine, self._groom.counts[start:stop])
-                moved = np.empty((len(own), 3), np.float32)
-                moved[~own] = self._means(displacement, start, stop)
-                moved[own] = self._turned(displacement[fine], self._rest[start:stop][fine], start, stop)
+            low = start - start % BLOCK
+            own = slice(self._ends[start] - self._ends[low], self._ends[stop] - self._ends[low])
+            moved = self._blocks[low // BLOCK].moved(displacement, start - low, own)
         # The inverse of a rotation: rows times R are columns times its transpose.
         return moved if self._facing is None else moved @ self._facing
 
-    def _means(self, displacement: np.ndarray, start: int, stop: int) -> np.ndarray:
-        here = slice(*(int(self._ends[s] - self._fine_ends[s]) for s in (start, stop)))
-        first = self._first[here] - np.int32(start % _PREPARED * displacement.shape[1])
-        weights, flat = self._weights[here], displacement.reshape(-1, 3)
+
+class _Block:
+    """How the own vertices of some strands follow the network's.
+
+    Args:
+        rest: (N, K, 3) [m]; valid: (N,).
+        own: (P, 3) [m] own vertices; strand: (P,) which strand each belongs to; place: (P,) see `spans.weights`.
+    """
+
+    def __init__(self, rest, valid, own, strand, place) -> None:
+        vertices = rest.shape[1]
+        self._rest = rest
+        first, weights, fine = spans.weights(rest, own, strand, place)
+        self._fine = fine & valid
+        if not self._fine.all():
+            self._first, self._weights = first + (strand * vertices).astype(np.int32), weights
+        self._own = np.flatnonzero(self._fine[strand]).astype(np.int32)
+        own, strand, place = own[self._own], strand[self._own], place[self._own]
+        segment = np.clip(place.astype(np.int32), 0, vertices - 2)
+        share = np.clip(place - segment, 0.0, 1.0)[:, None]
+        flat, at = rest.reshape(-1, 3).astype(np.float64), strand * vertices + segment
+        self._residual = (own - (flat[at] * (1.0 - share) + flat[at + 1] * share)).astype(np.float32)
+        self._share = share.astype(np.float32)
+        self._segment = ((np.cumsum(self._fine) - 1)[strand] * vertices + segment).astype(np.int32)
+
+    def moved(self, displacement: np.ndarray, start: int, own: slice) -> np.ndarray:
+        """Displacement of own vertices, canonical axes.
+
+        Args:
+            displacement: (n, K, 3) of the strands from `start` on.
+            own: their own vertices.
+        """
+        vertices = displacement.shape[1]
+        fine = self._fine[start : start + len(displacement)]
+        coils = slice(*np.searchsorted(self._own, (own.start, own.stop))) if len(self._own) else slice(0, 0)
+        if fine.all():
+            return self._turned(displacement, self._rest[start : start + len(fine)], start, coils)
+        first, weights = self._first[own], self._weights[own]
+        if start:
+            first = first - np.int32(start * vertices)
+        flat = displacement.reshape(-1, 3)
         moved = flat.take(first, axis=0)
         moved *= weights[:, :1]
         for node in range(1, spans.NODES):
             part = flat[node:].take(first, axis=0)
             part *= weights[:, node : node + 1]
             moved += part
+        if coils.stop > coils.start:
+            rest = self._rest[start : start + len(fine)][fine]
+            moved[self._own[coils] - own.start] = self._turned(displacement[fine], rest, start, coils)
         return moved
 
-    def _turned(self, displacement: np.ndarray, rest: np.ndarray, start: int, stop: int) -> np.ndarray:
-        here = slice(self._fine_ends[start], self._fine_ends[stop])
-        before = self._rank[start] - self._rank[start - start % _PREPARED]
-        segment = self._segment[here] - np.int32(before * displacement.shape[1])
-        return turned(rest, displacement, segment, self._share[here], self._residual[here])
+    def _turned(self, displacement: np.ndarray, rest: np.ndarray, start: int, coils: slice) -> np.ndarray:
+        segment = self._segment[coils] - np.int32(self._fine[:start].sum() * displacement.shape[1])
+        return turned(rest, displacement, segment, self._share[coils], self._residual[coils])

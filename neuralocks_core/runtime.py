@@ -156,19 +156,37 @@ class StrandSession:
         # groom's
         # end: the sums in a matrix product may depend on its height, and a bake must not depend on its split.
         def work(chunk: slice) -> None:
-            values = self.model.run(
-                "tail.onnx",
-                output,
-                strand_part=self._strand_part[chunk],
-                frame_part=frame,
-                anchor=self._anchor[chunk],
-                edges=_edges(self.strands.rest[chunk]),
-            )
+            values = self._chunk(output, chunk, frame)
             a, b = max(chunk.start, start), min(chunk.stop, stop)
             result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
 
         self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self.strands.rest)), start)
         return result
+
+    def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
+        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
+        computed it and still has it in its cache.
+        """
+        frame, valid = self.model.frame_part(vector), self.strands.valid
+
+        def work(chunk: slice) -> None:
+            values = self._chunk("displacement", chunk, frame)
+            if not valid[chunk].all():
+                values[~valid[chunk]] = 0
+            function(chunk, values.reshape(-1, K, 3))
+
+        self.model.by_chunk(work, len(self.strands.rest))
+
+    def _chunk(self, output: str, chunk: slice, frame: np.ndarray) -> np.ndarray:
+        """(n, 72) of one whole chunk."""
+        return self.model.run(
+            "tail.onnx",
+            output,
+            strand_part=self._strand_part[chunk],
+            frame_part=frame,
+            anchor=self._anchor[chunk],
+            edges=_edges(self.strands.rest[chunk]),
+        )
 
     def _by_chunk(self, function, width: int) -> np.ndarray:
         result = np.empty((len(self.strands.rest), width), np.float32)

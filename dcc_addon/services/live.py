@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One hairstyle on one character, ready to give its points at any time: what the live view draws."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
@@ -10,14 +8,13 @@ from neuralocks_core.carrier import Carrier
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.resolve import Resolver
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands import strand_set
 
-BLOCK_POINTS = 24_576
-"""Points worked on at a time: they stay in a core's cache, and a product of so few rows by a 3x3 matrix stays on its
-core instead of waking BLAS threads that wait for each other."""
-CHUNK = 512
-"""Strands that the runtime takes at a time; blocks are made of whole ones."""
+ROWS = 24_576
+"""Points multiplied by a 3x3 matrix at a time: so few stay on their core instead of waking BLAS threads that wait for
+each other."""
 
 
 class LiveHair:
@@ -32,17 +29,17 @@ class LiveHair:
     def __init__(self, groom: Groom, character: Character, model: StrandModel):
         self.groom, self.character, self.model = groom, character, model
         origin = character.skeleton.bind[character.head, :3, 3]
-        strands = strand_set(groom, origin, character.head_centre, character.facing)
-        self._carrier = Carrier(groom, strands)
-        self._session = model.prepare(strands)
+        self._strands = strand_set(groom, origin, character.head_centre, character.facing)
+        self._carrier = Carrier(groom, self._strands)
+        self._session = model.prepare(self._strands)
+        self._resolver: Resolver | None = None
         self._sampler: BoundarySampler | None = None
         self._clip: Clip | None = None
         self._points = np.empty((len(groom.points), 3), np.float32)
-        count = groom.strand_count
-        step = CHUNK * max(1, int(BLOCK_POINTS / max(len(groom.points) / count, 1)) // CHUNK)
-        self._blocks = [slice(low, min(low + step, count)) for low in range(0, count, step)]
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
-        self._pool = ThreadPoolExecutor(model.threads, thread_name_prefix="live")
+        # About the head's own place, so that coordinates far from the origin cost no digits.
+        self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
+        self._about_head = groom.points - self._centre
 
     def follow(self, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
@@ -50,7 +47,13 @@ class LiveHair:
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
 
     def points(
-        self, time: float, joints: np.ndarray, to_local: np.ndarray, material=(0.0,) * 4, strength: float = 1.0
+        self,
+        time: float,
+        joints: np.ndarray,
+        to_local: np.ndarray,
+        material=(0.0,) * 4,
+        strength: float = 1.0,
+        resolve: bool = False,
     ) -> np.ndarray:
         """Points of the groom at one time.
 
@@ -60,6 +63,7 @@ class LiveHair:
             to_local: transform (4, 4) from the core's world space to the space wanted.
             material: log-ratios (4,).
             strength: motion strength, 0 for a held pose.
+            resolve: push hair out of the body.
 
         Returns:
             (P, 3) float32, valid until the next call.
@@ -68,20 +72,23 @@ class LiveHair:
         self._session.anchor(self._sampler.held_bind(material))
         matrix = to_local @ self.character.carrying(joints)
         linear = np.ascontiguousarray(matrix[:3, :3].T, np.float32)
-        # From the head's own place, so that coordinates far from the origin cost no digits.
-        centre = self.character.canonical_to_bind[:3, 3].astype(np.float32)
-        origin = (matrix[:3, :3] @ centre.astype(float) + matrix[:3, 3]).astype(np.float32)
+        origin = np.empty((min(ROWS, len(self._points)), 3), np.float32)
+        origin[:] = matrix[:3, :3] @ self._centre.astype(float) + matrix[:3, 3]
 
-        def work(strands: slice) -> None:
-            out = self._points[self._ends[strands.start] : self._ends[strands.stop]]
-            self._carrier.carry(self._session.displacement(vector, strands), out, strands)
-            out -= centre
-            np.matmul(out, linear, out=out)
-            out += origin
+        def place(strands: slice, displacement: np.ndarray) -> None:
+            begin, end = self._ends[strands.start], self._ends[strands.stop]
+            moved = self._carrier.carry(displacement, strands=strands, onto=self._about_head)
+            for low in range(begin, end, ROWS):
+                out = self._points[low : min(low + ROWS, end)]
+                np.matmul(moved[low - begin : low - begin + ROWS], linear, out=out)
+                out += origin[: len(out)]
 
-        if len(self._blocks) == 1:
-            work(self._blocks[0])
+        if resolve and self.character.body is not None:
+            if self._resolver is None:
+                self._resolver = Resolver(self.character, self._strands)
+            shape = self._clip.shape_at([time])[0]
+            free = self._resolver.displacement(self._session.displacement(vector), joints, shape)
+            self.model.by_chunk(lambda strands: place(strands, free[strands]), len(free))
         else:
-            for _ in self._pool.map(work, self._blocks):
-                pass
+            self._session.each(vector, place)
         return self._points

@@ -101,8 +101,9 @@ def test_rigid_motion_is_carried_exactly(make):
     # polyline may end on the other side of it, but as far from it. Means of the network's vertices follow exactly but
     # for what they leave over, and but for the first segment, which the network never moves.
     off = np.linalg.norm(carried - expected, axis=1)
-    fine = carrier._fine[groom.strand_of_point]
-    assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(carrier._residual, axis=1)).all()
+    fine = np.concatenate([block._fine for block in carrier._blocks])[groom.strand_of_point]
+    residual = np.concatenate([block._residual for block in carrier._blocks])
+    assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(residual, axis=1)).all()
     arc, length = arc_lengths(groom)
     beyond = ~fine & (arc * (K - 1) >= length[groom.strand_of_point])
     assert (off[beyond] <= 2e-6 + 1.2 * LEFT_OVER).all()
@@ -119,7 +120,7 @@ def test_corners_of_a_smooth_groom_turn_with_it():
     groom = Groom("/arcs", (arcs + [0.0, 1.7, 0.05]).reshape(-1, 3), np.full(20, 16))
     strands = strand_set(groom, ORIGIN, CENTRE)
     carrier = Carrier(groom, strands)
-    assert not carrier._fine.any()
+    assert not carrier._blocks[0]._fine.any()
     edges = np.diff(strands.rest, axis=1)
     more = np.linspace(0.0, 1.6, K - 1)[None, :] * np.linspace(0.7, 1.3, 20)[:, None]
     more[:, 0] = 0.0
