@@ -8,6 +8,7 @@ from pxr import UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.rig.rigging import assemble_rig
 
 from .attach import attach, rig_joint
 from .border import Border, open_stage
@@ -15,6 +16,7 @@ from .curves import find_curves, read_groom
 from .groom import USD
 from .placement import Placement
 from .rig_source import read_rig
+from .rig_stage import core_meshes, describe_chains, weight_notes
 from .stage import _composition, _groom_notes, _rig_notes, find_skeletons, frame_range, head_width
 
 
@@ -62,7 +64,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
             rigs.append(read_rig(stage, prim, border, head, all_shapes=True, joints=joints))
         except NeuralocksError as error:
             stops.append(str(error))
-    skeletons = [_rig(rig) for rig in rigs]
+    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
         spoils += rig.notes + _rig_notes(rig)
     moving = [rig for rig in rigs if rig.source.animated]
@@ -80,7 +82,9 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
             grooms.append(_curves(prim, rigs, border, head, spoils, stops))
         except NeuralocksError as error:
             stops.append(str(error))
-    if not grooms and not any("groom" in s for s in stops):
+    if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
+        spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
+    elif not grooms and not any("groom" in s for s in stops):
         stops.append(f"{path.name}: holds no groom (no BasisCurves prim); add one, or import a hair file")
     return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
 
@@ -104,6 +108,20 @@ def _rig(rig) -> dict:
         "blend shapes": [] if body is None else list(body.shapes),
         "mapping": found,
     }
+
+
+def _chains(rig, spoils: list[str]) -> list[dict]:
+    """Hair joints of rigged mesh hair; none is nothing to report."""
+    try:
+        chains = assemble_rig(rig.character, core_meshes(rig)).chains
+    except NeuralocksError as error:
+        if "no hair chains" not in str(error):
+            spoils.append(f"{rig.path}: rigged hair: {error}")
+        return []
+    spoils += weight_notes(rig)
+    return [
+        {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
+    ]
 
 
 def _height(rig) -> float | None:
@@ -189,7 +207,13 @@ def as_text(facts: dict, indent: int = 0) -> str:
         if isinstance(value, dict):
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and isinstance(value[0], dict):
+            if len(value[0]) <= 3:
+                lines.append(f"{pad}{name}:")
             for entry in value:
+                if len(entry) <= 3:  # a line each
+                    first, *others = entry.items()
+                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
+                    continue
                 lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
         elif isinstance(value, list):
             lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")

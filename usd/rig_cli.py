@@ -167,7 +167,7 @@ def inspect(
     from .rig_stage import describe_chains, read_rigged_hair, weight_notes
 
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains)
-    rows = describe_chains(hair)
+    rows = describe_chains(hair.rig.chains)
     if as_json:
         print_json({"skeleton": hair.source.path, "chains": rows, "notes": weight_notes(hair.source)})
         return

@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import SkinnedMesh
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 
@@ -148,9 +149,8 @@ def _with_path(prim: Usd.Prim, error: Exception) -> str:
     return text if text.startswith((path, "--", "model")) else f"{path}: {text.removeprefix('skeleton: ')}"
 
 
-def describe_chains(hair: RiggedHair) -> list[dict]:
+def describe_chains(chains: HairChains) -> list[dict]:
     """Name, number of moving joints and length [m] of every chain."""
-    chains = hair.rig.chains
     return [
         {
             "name": chains.chain_name(i),

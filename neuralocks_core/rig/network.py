@@ -22,7 +22,8 @@ from neuralocks_core.rig.kinematics import half_turns
 
 DYNAMIC_BINS = (1,) * 6 + (2,) * 4 + (3,) * 4 + (4,) * 2 + (6,) * 2
 """46 steps of 1/30 s: a second and a half, finest where it is newest."""
-_POSE = 15
+POSE = 15
+"""Numbers of the pose and of gravity's direction; the history follows."""
 _CHUNK = 1024
 
 
@@ -181,8 +182,8 @@ def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray)
         gravity: its direction in the head's frame, (n, 3).
     """
     result = np.zeros((len(relative), len(feature_columns(spec))), np.float32)
-    result[:, : _POSE - 3] = np.swapaxes(relative[..., :2], -1, -2).reshape(len(relative), -1)
-    result[:, _POSE - 3 : _POSE] = gravity
+    result[:, : POSE - 3] = np.swapaxes(relative[..., :2], -1, -2).reshape(len(relative), -1)
+    result[:, POSE - 3 : POSE] = gravity
     return result
 
 
@@ -190,7 +191,7 @@ def input_limits(spec: BoundarySpec) -> np.ndarray:
     """Largest sensible magnitude of each input (F,): what a damaged caller sends beyond is cut off."""
     history = np.tile([6.0] * 3 + [25.0] * 3, len(spec.bins))
     # The sampler lists the bins one after another, each with effective gravity [g], then angular velocity [rad/s].
-    return np.concatenate([np.full(_POSE, 1.25), history]).astype(np.float32)
+    return np.concatenate([np.full(POSE, 1.25), history]).astype(np.float32)
 
 
 def _bounded(raw: np.ndarray, size: np.float32, out: np.ndarray) -> None:

@@ -13,6 +13,7 @@ import torch
 
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.training.rig_poses import PosePool, rest_distances
 
 
 @dataclass(frozen=True)
@@ -95,15 +96,16 @@ class RigEnergy(torch.nn.Module):
         keep("rest_ends", chains.origins[chains.bone_joint] + chains.bones)
         keep("points", rig.points[chosen])
         keep("weights", rig.weights[chosen])
-        keep("margins", np.full(len(chosen), material.margin))
+        # What rests on the skin, or in it, is not pushed.
+        keep("margins", np.minimum(material.margin, rest_distances(rig, rig.points[chosen])))
         self.bone_joint = torch.as_tensor(chains.bone_joint.astype(np.int64))
         self.levels = [torch.as_tensor(level) for level in chains.levels()]
         self.ups = [torch.as_tensor(chains.parents[level].astype(np.int64)) for level in chains.levels()]
         self.order = torch.argsort(torch.cat(self.levels))
 
-    def set_rest_distances(self, distances: np.ndarray) -> None:
-        """Distances from the body at rest (V,) [m] cap the margins: what rests on the skin, or in it, is not pushed."""
-        self.margins.copy_(torch.minimum(self.margins, torch.as_tensor(distances, dtype=self.margins.dtype)))
+    def draw(self, rng: np.random.Generator, count: int) -> torch.Tensor:
+        """Indices of at most `count` of the vertices that collide, without repetition."""
+        return torch.as_tensor(rng.choice(len(self.chosen), min(count, len(self.chosen)), replace=False))
 
     def pose(self, quaternions: torch.Tensor):
         """Turns (B, N, 4) wxyz, canonical -> rotations (B, N, 3, 3), positions (B, N, 3), bone ends (B, M, 3) [m]."""
@@ -134,6 +136,21 @@ class RigEnergy(torch.nn.Module):
         rest = torch.eye(3, 4, dtype=moved.dtype).reshape(1, 1, 12).expand(count, 1, 12)
         blended = (weights @ torch.cat([rest, moved], dim=1)).reshape(count, -1, 3, 4)
         return torch.einsum("bvij,vj->bvi", blended[..., :3], points) + blended[..., 3]
+
+    def parts(self, pool: PosePool, poses, quaternions, gravity, some=None) -> tuple[torch.Tensor, torch.Tensor]:
+        """Elastic and collision energy (B,) each, of turns (B, N, 4) in poses (B,) of the pool.
+
+        Args:
+            gravity: its directions in the head's frame, (B, 3) numpy.
+            some: which hair vertices collide; all if left out. Their planes are those of the state itself.
+        """
+        rotation, position, ends = self.pose(quaternions)
+        elastic = self.elastic(quaternions, torch.as_tensor(gravity, dtype=ends.dtype) * 9.81, ends)
+        if not pool.collides:
+            return elastic, torch.zeros_like(elastic)
+        points = self.skin(rotation, position, some)
+        normals, offsets = pool.planes(poses, points.detach().numpy())
+        return elastic, self.collision(points, torch.as_tensor(normals), torch.as_tensor(offsets), some)
 
     def elastic(self, quaternions, gravity, ends) -> torch.Tensor:
         """Gravity and bend-twist (B,) [m^2/s^2]; `gravity` (B, 3) in the head's frame [m/s^2]."""

@@ -4,74 +4,71 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.collider import Collider
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Most nod, turn and tilt of the head against the chest that people have [rad]."""
+_SIEVE = 5e-3
+"""Points farther than this [m] outside the plane of the nearest body vertex are not asked for exactly."""
 
 
 class PosePool:
-    """Posed bodies, prepared once: every training step draws from them.
+    """Posed bodies to draw from; renewed bit by bit, so that no network learns their shapes by heart.
 
     Args:
         rig: hair and body.
-        count: how many poses.
+        count: how many poses are held at a time.
         rng: decides all of them.
         most_points: body vertices kept of each (nearest-vertex planes need no more).
+        whole: keep each whole body around the head too, for exact distances.
 
     Attributes:
         relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
-        points, normals: body vertices around the head, canonical space of the head, (P, Vb, 3) float32 [m].
-        triangles: of the body around the head, into all its kept vertices (before thinning), for exact distances.
+        shapes: blend shape weights of each, (P, B).
     """
 
-    def __init__(self, rig: HairRig, count: int, rng: np.random.Generator, most_points: int = 2000):
-        self.rig, self.count, self._rng = rig, count, rng
-        character = rig.character
-        skinning = _random_skinning(character, count, rng)
+    def __init__(
+        self, rig: HairRig, count: int, rng: np.random.Generator, most_points: int = 2000, whole: bool = False
+    ):
+        self.rig, self.count, self._rng, self._oldest = rig, count, rng, 0
+        self.relative = np.empty((count, 2, 3, 3))
+        self._patch = _BodyPatch(rig, rng, most_points) if rig.character.body is not None and len(rig.points) else None
+        self.shapes = np.zeros((count, len(self._patch.offsets) if self._patch else 0))
+        self._bodies = [None] * count if self._patch and whole else None
+        self._trees = [None] * count
+        kept = len(self._patch.kept) if self._patch else 0
+        self._points, self._normals = np.empty((2, count, kept, 3), np.float32)
+        self.renew(count)
+
+    @property
+    def collides(self) -> bool:
+        """Whether there is a body to collide with."""
+        return self._patch is not None
+
+    def renew(self, count: int) -> None:
+        """Put new poses in the place of the oldest."""
+        character = self.rig.character
+        skinning = _random_skinning(character, count, self._rng)
+        rows = (self._oldest + np.arange(count)) % self.count
+        self._oldest = (self._oldest + count) % self.count
         facing, head = character.facing, character.head
-        to_head = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)
         indices = [character.humanoid.nearest(name) for name in ("neck", "upper_chest")]
         turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
-        self.relative = facing @ turns @ facing.T
-        self.points = self.normals = None
-        self.shapes = np.zeros((count, 0))
-        if character.body is not None and len(rig.points):
-            self._pose_bodies(to_head[:, None] @ skinning, rng, most_points)
-
-    def _pose_bodies(self, skinning, rng, most_points) -> None:
-        body, character = self.rig.character.body, self.rig.character
-        to_canonical = np.linalg.inv(character.canonical_to_bind)
-        canonical = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-        reach = np.linalg.norm(self.rig.points, axis=1).max() + 0.2
-        near = np.linalg.norm(canonical, axis=1) < reach
-        faces = body.triangles[near[body.triangles].all(axis=1)]
-        used = np.unique(faces)
-        place = np.zeros(len(body.points), int)
-        place[used] = np.arange(len(used))
-        self.triangles = place[faces]
-        shapes = list(body.shapes.values())
-        self.shapes = np.clip(rng.normal(0, 0.35, (self.count, len(shapes))), -0.8, 0.8)
-        offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
-        # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(body.joint_weights[used] * (body.joint_indices[used] == character.head), axis=1)
-        mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
-        offsets = (offsets - mean) * (1 - on_head)[:, None]
-        points = np.empty((self.count, len(used), 3), np.float32)
-        for pose in range(self.count):
-            shaped = body.points[used] + np.tensordot(self.shapes[pose], offsets, 1)
-            blended = np.einsum("vi,vixy->vxy", body.joint_weights[used], skinning[pose][body.joint_indices[used], :3])
-            points[pose] = np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
-        self.points = points
-        self.kept = np.sort(rng.permutation(len(used))[:most_points])
-        # Where the rest of the body was cut off, a plane says nothing about inside and outside.
-        cut = np.zeros(len(body.points), bool)
-        cut[body.triangles[~near[body.triangles].all(axis=1)]] = True
-        self._cut = cut[used][self.kept]
-        self.normals = np.stack([_normals(p, self.triangles)[self.kept] for p in points])
-        self._trees = [cKDTree(p[self.kept], balanced_tree=False, compact_nodes=False) for p in points]
+        self.relative[rows] = facing @ turns @ facing.T
+        if self._patch is None:
+            return
+        self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
+        skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
+        for row, matrices in zip(rows, skinning):
+            body, normals = self._patch.posed(matrices, self.shapes[row])
+            self._points[row] = body[self._patch.kept]
+            self._normals[row] = normals[self._patch.kept]
+            self._trees[row] = cKDTree(self._points[row], balanced_tree=False, compact_nodes=False)
+            if self._bodies is not None:
+                self._bodies[row] = body
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
         """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
@@ -96,20 +93,73 @@ class PosePool:
         normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
         for row, pose in enumerate(poses):
             nearest = self._trees[pose].query(points[row])[1]
-            normals[row] = self.normals[pose][nearest]
-            offsets[row] = np.einsum("vi,vi->v", normals[row], self.points[pose][self.kept[nearest]])
-            offsets[row][self._cut[nearest]] = -1e3
+            normals[row] = self._normals[pose][nearest]
+            offsets[row] = np.einsum("vi,vi->v", normals[row], self._points[pose][nearest])
+            # Where the rest of the body was cut off, a plane says nothing about inside and outside.
+            offsets[row][self._patch.rim[nearest]] = -1e3
         return normals, offsets
 
-    def around(self, pose: int, points: np.ndarray, reach: float) -> list:
-        """For each point (n, 3), the kept body vertices within `reach` [m], as indices into `points[pose]`."""
-        return [self.kept[hits] for hits in self._trees[pose].query_ball_point(points, reach)]
+    def distances(self, poses: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be in it, 1 elsewhere; needs `whole`."""
+        normals, offsets = self.planes(poses, points)
+        near = np.einsum("nvi,nvi->nv", normals, points) - offsets < _SIEVE
+        result = np.ones(near.shape)
+        for row, pose in enumerate(poses):
+            if near[row].any():
+                collider = Collider(self._bodies[pose], self._patch.triangles)
+                result[row, near[row]] = collider.distance(points[row][near[row]])[0]
+        return result
+
+
+class _BodyPatch:
+    """The part of the body around the head that hair can reach.
+
+    Attributes:
+        triangles: into its vertices.
+        kept: vertices whose planes are used.
+        rim: which of these touch the cut, (kept,).
+        offsets: of its blend shapes, (B, vertices, 3).
+    """
+
+    def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
+        body, character = rig.character.body, rig.character
+        reach = np.linalg.norm(rig.points, axis=1).max() + 0.2
+        near = np.linalg.norm(_canonical(rig), axis=1) < reach
+        inside = near[body.triangles].all(axis=1)
+        used = np.unique(body.triangles[inside])
+        place = np.zeros(len(body.points), int)
+        place[used] = np.arange(len(used))
+        self.triangles = place[body.triangles[inside]]
+        self.points, self.weights, self.indices = body.points[used], body.joint_weights[used], body.joint_indices[used]
+        shapes = list(body.shapes.values())
+        offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
+        # The hair was fitted to its own head: other bodies vary below it.
+        on_head = np.sum(self.weights * (self.indices == character.head), axis=1)
+        mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
+        self.offsets = (offsets - mean) * (1 - on_head)[:, None]
+        self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        cut = np.zeros(len(body.points), bool)
+        cut[body.triangles[~inside]] = True
+        self.rim = cut[used][self.kept]
+
+    def posed(self, skinning: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and normals (V, 3) float32 under skinning matrices (J, 4, 4) and blend shape weights (B,)."""
+        shaped = self.points + np.tensordot(shape, self.offsets, 1)
+        blended = np.einsum("vi,vixy->vxy", self.weights, skinning[self.indices, :3])
+        points = (np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]).astype(np.float32)
+        return points, _normals(points, self.triangles)
+
+
+def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Signed distances (V,) [m] of canonical points (V, 3) to the body in bind pose; infinite without one."""
+    body = rig.character.body
+    if body is None:
+        return np.full(len(points), np.inf)
+    return Collider(_canonical(rig), body.triangles).distance(points)[0]
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:
-    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less; the first
-    is the bind pose.
-    """
+    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less."""
     turns = {}
     # Evenly in an ellipsoid that is a tenth larger than what a neck can do; its corners no neck can reach.
     direction = rng.normal(size=(count, 3))
@@ -134,10 +184,8 @@ def _random_skinning(character, count, rng) -> np.ndarray:
         if joint not in turns:
             skinning[:, joint] = carrier
             continue
-        vectors = turns[joint].copy()
-        vectors[0] = 0
         own = np.broadcast_to(np.eye(4), (count, 4, 4)).copy()
-        own[:, :3, :3] = character.facing.T @ from_vector(vectors) @ character.facing
+        own[:, :3, :3] = character.facing.T @ from_vector(turns[joint]) @ character.facing
         origin = character.skeleton.bind[joint, :3, 3]
         own[:, :3, 3] = origin - own[:, :3, :3] @ origin
         skinning[:, joint] = carrier @ own
@@ -159,8 +207,7 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tup
     body, character = rig.character.body, rig.character
     if body is None:
         return None
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
-    canonical = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    canonical = _canonical(rig)
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
@@ -174,3 +221,9 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tup
         points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
         turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
     return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
+def _canonical(rig: HairRig) -> np.ndarray:
+    """The body's vertices in bind pose (V, 3) [m], canonical."""
+    to_canonical = np.linalg.inv(rig.character.canonical_to_bind)
+    return rig.character.body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]

@@ -187,7 +187,7 @@ def test_a_model_for_another_rig_is_refused(tmp_path):
 def test_the_example_and_its_command_line(tmp_path):
     """Eight chains of four joints; the baked layer has no validation finding."""
     hair = read_rigged_hair(EXAMPLE / "shot.usda")
-    rows = describe_chains(hair)
+    rows = describe_chains(hair.rig.chains)
     assert len(rows) == 8 and all(row["joints"] == 4 and 0.15 < row["length"] < 0.4 for row in rows)
     pytest.importorskip("onnx")
     model = model_for(hair).save(tmp_path / "m.neuralocks")

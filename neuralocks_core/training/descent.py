@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The loop under every training here: a budget of time or steps, warm-up, cosine, clipped gradients."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+Losses = Callable[[float], dict[str, torch.Tensor]]
+"""Share of the budget that is used (0..1) -> named, weighted losses of one batch; their sum is minimised."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long and how fast.
+
+    Attributes:
+        minutes: wall-clock budget; `steps` wins where it is given.
+        steps: number of steps, which makes a run repeatable.
+        rate: largest step size.
+        floor: share of it that is left at the end of the cosine.
+        warm_up: steps in which the step size grows to `rate`.
+        clip: largest norm of a step's gradient.
+        smoothing: steps over which the losses that are shown are averaged.
+    """
+
+    minutes: float = 10.0
+    steps: int | None = None
+    rate: float = 1e-3
+    floor: float = 0.005
+    warm_up: int = 200
+    clip: float = 1.0
+    smoothing: float = 100.0
+
+    def rate_at(self, step: int, done: float) -> float:
+        """Step size of a step (from 0) when a share `done` of the budget is used."""
+        cosine = 0.5 * (1 + np.cos(np.pi * min(max(done, 0.0), 1.0)))
+        return self.rate * min(1.0, (step + 1) / max(self.warm_up, 1)) * (self.floor + (1 - self.floor) * cosine)
+
+
+@dataclass(frozen=True)
+class Descended:
+    """Where a descent stands: steps taken, share of the budget used (0..1), running means of the losses."""
+
+    step: int
+    done: float
+    losses: dict[str, float]
+
+
+def descend(
+    optimiser: torch.optim.Optimizer, losses: Losses, schedule: Schedule, *, step: int = 0, done: float = 0.0
+) -> Iterator[Descended]:
+    """Minimise the sum of `losses` over what `optimiser` holds; stop it by leaving the loop.
+
+    Args:
+        optimiser: its step sizes are set anew before each step.
+        losses: called once a step; whatever else should happen now and then may happen in it.
+        schedule: see there.
+        step, done: where an earlier run with the same budget stopped.
+
+    Yields:
+        about once a second, and after the last step.
+    """
+    parameters = [p for group in optimiser.param_groups for p in group["params"]]
+    before, start = done, time.monotonic()
+    shown, running = start, {}
+    while done < 1.0:
+        for group in optimiser.param_groups:
+            group["lr"] = schedule.rate_at(step, done)
+        values = losses(done)
+        optimiser.zero_grad(set_to_none=True)
+        sum(values.values()).backward()
+        torch.nn.utils.clip_grad_norm_(parameters, schedule.clip)
+        optimiser.step()
+        step += 1
+        now = time.monotonic()
+        done = step / schedule.steps if schedule.steps else before + (now - start) / (60 * schedule.minutes)
+        for name, value in values.items():
+            value = float(value.detach())
+            running[name] = running.get(name, value) + (value - running.get(name, value)) / schedule.smoothing
+        if now - shown > 1.0 or done >= 1.0:
+            shown = now
+            yield Descended(step, min(done, 1.0), dict(running))
