@@ -61,6 +61,11 @@ class JointSource:
         """Whether a SkelAnimation, or a parent's transform, drives it."""
         return self._columns is not None or bool(self.placement.samples)
 
+    @property
+    def moves_joints(self) -> bool:
+        """Whether a SkelAnimation gives the pose; else UsdSkel shows the rest pose."""
+        return self._columns is not None
+
     def posed(self, time_codes) -> np.ndarray:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
         local = self._local(time_codes)

@@ -9,7 +9,7 @@ from pxr import Sdf, Tf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
 
-from .border import first_line
+from .border import Border, first_line
 from .stage import Shot, StageGroom
 
 SAVE_EVERY = 32 << 20
@@ -34,7 +34,7 @@ class OverrideWriter:
         part.unlink(missing_ok=True)
         with _named(out):
             self._layer = Sdf.Layer.CreateNew(str(part), {"format": "usdc"})
-            self._metadata(shot, codes)
+            write_header(self._layer, shot.stage, shot.border, shot.path, out, codes)
         self._held = 0
 
     def groom(self, item: StageGroom, velocities: bool) -> None:
@@ -91,28 +91,29 @@ class OverrideWriter:
         self._layer.Save()
         self._held = 0
 
-    def _metadata(self, shot: Shot, codes: list[float]) -> None:
-        layer, stage = self._layer, shot.stage
-        source = os.path.realpath(shot.path)
-        try:
-            relative = os.path.relpath(source, os.path.realpath(self._out.parent)).replace(os.sep, "/")
-        except ValueError:  # another drive
-            relative = source.replace(os.sep, "/")
-        if not relative.startswith((".", "/")) and ":" not in relative:
-            relative = f"./{relative}"
-        layer.subLayerPaths.append(relative)
-        root = layer.pseudoRoot
-        root.SetInfo("metersPerUnit", shot.border.metres_per_unit)
-        root.SetInfo("upAxis", shot.border.up_axis)
-        layer.timeCodesPerSecond = shot.border.rate
-        layer.framesPerSecond = stage.GetFramesPerSecond()
-        ranged = stage.HasAuthoredTimeCodeRange()
-        layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
-        layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
-        default = stage.GetDefaultPrim()
-        if not default:
-            default = next(iter(stage.GetPseudoRoot().GetChildren()))
-        layer.defaultPrim = default.GetName()
+
+def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
+    """Sublayer the shot by a path relative to `out`, and repeat its units, rates, range and default prim."""
+    source = os.path.realpath(shot)
+    try:
+        relative = os.path.relpath(source, os.path.realpath(out.parent)).replace(os.sep, "/")
+    except ValueError:  # another drive
+        relative = source.replace(os.sep, "/")
+    if not relative.startswith((".", "/")) and ":" not in relative:
+        relative = f"./{relative}"
+    layer.subLayerPaths.append(relative)
+    root = layer.pseudoRoot
+    root.SetInfo("metersPerUnit", border.metres_per_unit)
+    root.SetInfo("upAxis", border.up_axis)
+    layer.timeCodesPerSecond = border.rate
+    layer.framesPerSecond = stage.GetFramesPerSecond()
+    ranged = stage.HasAuthoredTimeCodeRange()
+    layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
+    layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
+    default = stage.GetDefaultPrim()
+    if not default:
+        default = next(iter(stage.GetPseudoRoot().GetChildren()))
+    layer.defaultPrim = default.GetName()
 
 
 def to_text(crate: Path, text: Path, out: Path) -> None:

@@ -4,22 +4,18 @@ the network.
 """
 
 import os
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdSkel, Vt
+from pxr import UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigModel, RigSampler
-from neuralocks_core.rotation import rotation_part, to_quaternion
 
+from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
 from .time_codes import time_codes
-
-NAME = "NeuralocksHair"
-"""The SkelAnimation, a child of the skeleton."""
 
 
 @dataclass(frozen=True)
@@ -89,11 +85,8 @@ def bake_rig(
         raise NeuralocksError(f"{out}: the output is part of the shot; choose another name")
     _check_moves(hair)
     codes = _codes(hair, frames, subframes)
-    joints = _columns(source, model, hair)
     turns = _turns(hair, model, codes, loop, strength, progress)
-    layer = _layer(hair, shot, out, codes, joints, turns)
-    _save(layer, out)
-    animation = str(source.prim.GetPath().AppendChild(NAME))
+    animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
@@ -142,21 +135,6 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
     return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
 
 
-def _columns(source, model: RigModel, hair: RiggedHair):
-    """The animation's joint order with missing hair joints appended, and for each hair joint its place and local
-    bind rotation.
-    """
-    animated = UsdSkel.Animation(source.animation) if source.animation is not None and source.animated else None
-    own = [str(name) for name in animated.GetJointsAttr().Get() or ()] if animated else []
-    usable = bool(own) and source._columns is not None
-    order = list(own) if usable else list(source.names)
-    indices = model.chains.match(source.names)
-    order += [source.names[j] for j in indices if source.names[j] not in order]
-    above = source.parents[indices]
-    local = np.linalg.inv(source.bind[above]) @ source.bind[indices]
-    return order, usable, indices, [order.index(source.names[j]) for j in indices], to_quaternion(rotation_part(local))
-
-
 def _turns(hair, model, codes, loop, strength, progress) -> np.ndarray:
     """Turns of the hair joints (T, N, 4) wxyz in their own bind axes."""
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
@@ -174,148 +152,13 @@ def _turns(hair, model, codes, loop, strength, progress) -> np.ndarray:
     return turns
 
 
-def _layer(hair, shot, out, codes, joints, turns) -> Sdf.Layer:
-    order, usable, indices, places, rest = joints
-    source, stage = hair.source.source, hair.stage
-    layer = Sdf.Layer.CreateAnonymous(out.suffix)
-    _metadata(layer, hair, shot, out, codes)
-    path = source.prim.GetPath()
-    over = Sdf.CreatePrimInLayer(layer, path)
-    for above in path.GetPrefixes():
-        if stage.GetPrimAtPath(above).IsInstance():
-            layer.GetPrimAtPath(above).instanceable = False  # what lies inside an instance cannot be overridden
-    if not source.prim.HasAPI(UsdSkel.BindingAPI):
-        over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
-    relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)
-    relation.targetPathList.explicitItems = [path.AppendChild(NAME)]
-    prim = Sdf.PrimSpec(over, NAME, Sdf.SpecifierDef, "SkelAnimation")
-    names = Sdf.ValueTypeNames
-    joint_list = Sdf.AttributeSpec(prim, "joints", names.TokenArray, Sdf.VariabilityUniform)
-    joint_list.default = Vt.TokenArray(order)
-    kinds = {
-        "translations": (names.Float3Array, Vt.Vec3fArray, 3),
-        "rotations": (names.QuatfArray, None, 4),
-        "scales": (names.Half3Array, None, 3),
-    }
-    own = UsdSkel.Animation(source.animation) if usable else None
-    fallback = _bind_channels(source, order)
-    for name, (kind, _, _) in kinds.items():
-        Sdf.AttributeSpec(prim, name, kind)
-        target = prim.path.AppendProperty(name)
-        attribute = own.GetPrim().GetAttribute(name) if own else None
-        if name == "rotations":
-            for code, turn in zip(codes, turns):
-                values = _joined(attribute, code, fallback[name], order)
-                final = _product(rest, turn)
-                for place, q in zip(places, final):
-                    values[place] = Gf.Quatf(*map(float, q))
-                layer.SetTimeSample(target, float(code), Vt.QuatfArray(values))
-            continue
-        samples = list(attribute.GetTimeSamples()) if attribute else []
-        array = Vt.Vec3fArray if name == "translations" else Vt.Vec3hArray
-        if not samples:
-            prim.attributes[name].default = array(_joined(attribute, Usd.TimeCode.Default(), fallback[name], order))
-        for code in samples:
-            layer.SetTimeSample(target, float(code), array(_joined(attribute, code, fallback[name], order)))
-    if source.animation is not None:
-        _blend_shapes(layer, prim, UsdSkel.Animation(source.animation))
-    return layer
-
-
-def _bind_channels(source, order) -> dict:
-    """Local bind transforms in this joint order, as lists of Gf values."""
-    place = {name: i for i, name in enumerate(source.names)}
-    known = [place.get(name, -1) for name in order]
-    above = np.where((source.parents >= 0)[:, None, None], source.bind[source.parents], np.eye(4))
-    local = np.linalg.inv(above) @ source.bind
-    size = np.linalg.norm(local[:, :3, :3], axis=1)
-    size[np.linalg.det(local[:, :3, :3]) < 0, 0] *= -1
-    turn = to_quaternion(local[:, :3, :3] / size[:, None, :])
-    still = (Gf.Vec3f(0), Gf.Quatf(1), Gf.Vec3h(1))
-    rows = [
-        (Gf.Vec3f(*map(float, local[j, :3, 3])), Gf.Quatf(*map(float, turn[j])), Gf.Vec3h(*map(float, size[j])))
-        if j >= 0
-        else still
-        for j in known
-    ]
-    return {name: [row[i] for row in rows] for i, name in enumerate(("translations", "rotations", "scales"))}
-
-
-def _joined(attribute, code, fallback, order) -> list:
-    """The animation's own values, bit for bit, and bind values for what was appended."""
-    values = attribute.Get(code) if attribute and attribute.HasValue() else None
-    if values is None and attribute and attribute.HasValue():
-        values = attribute.Get(Usd.TimeCode.EarliestTime())
-    values = list(values) if values is not None else []
-    return values + fallback[len(values) :]
-
-
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Quaternion products (N, 4) wxyz. The second factors keep w > 0, so no sign flips between samples."""
-    aw, av, bw, bv = a[:, :1], a[:, 1:], b[:, :1], b[:, 1:]
-    product = np.concatenate(
-        [aw * bw - np.sum(av * bv, axis=1, keepdims=True), aw * bv + bw * av + np.cross(av, bv)], axis=1
-    )
-    return product / np.linalg.norm(product, axis=1, keepdims=True)
-
-
-def _blend_shapes(layer, prim, animation) -> None:
-    names, weights = animation.GetBlendShapesAttr(), animation.GetBlendShapeWeightsAttr()
-    if not names.HasAuthoredValue():
-        return
-    spec = Sdf.AttributeSpec(prim, "blendShapes", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-    spec.default = names.Get()
-    if weights.HasAuthoredValue():
-        spec = Sdf.AttributeSpec(prim, "blendShapeWeights", Sdf.ValueTypeNames.FloatArray)
-        if weights.Get(Usd.TimeCode.Default()) is not None:
-            spec.default = weights.Get(Usd.TimeCode.Default())
-        for code in weights.GetTimeSamples():
-            layer.SetTimeSample(spec.path, code, weights.Get(code))
-
-
-def _metadata(layer, hair, shot, out, codes) -> None:
-    stage = hair.stage
-    relative = os.path.relpath(os.path.realpath(shot), os.path.realpath(out.parent)).replace(os.sep, "/")
-    layer.subLayerPaths.append(relative if relative.startswith((".", "/")) else f"./{relative}")
-    root = layer.pseudoRoot
-    root.SetInfo("metersPerUnit", hair.border.metres_per_unit)
-    root.SetInfo("upAxis", hair.border.up_axis)
-    layer.timeCodesPerSecond = hair.border.rate
-    layer.framesPerSecond = stage.GetFramesPerSecond()
-    ranged = stage.HasAuthoredTimeCodeRange()
-    layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
-    layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
-    default = stage.GetDefaultPrim() or next(iter(stage.GetPseudoRoot().GetChildren()))
-    layer.defaultPrim = default.GetName()
-
-
 def _name_notes(source) -> list[str]:
-    """Blender reads no bone at all of a skeleton with a ':' in a joint's name, and cuts long or equal names."""
+    """Blender names a bone after the last part of its joint's path, and cuts that at 63 characters."""
     leaves = [name.rsplit("/", 1)[-1] for name in source.names]
-    odd = next((n for n in leaves if ":" in n), None)
-    if odd:
-        return [
-            f"{source.path}: joint '{odd}' has ':' in its name; Blender would import no bones, rename it in the rig"
-        ]
+    long = next((n for n in leaves if len(n) > 63), None)
+    if long:
+        return [f"{source.path}: joint '{long}' has more than 63 characters; Blender cuts its name"]
     double = next((n for n in leaves if leaves.count(n) > 1), None)
     if double:
         return [f"{source.path}: several joints are named '{double}'; Blender renames all but one"]
     return []
-
-
-def _save(layer: Sdf.Layer, out: Path) -> None:
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{out.stem}.", suffix=out.suffix, dir=out.parent)
-        os.close(handle)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
-    try:
-        if not layer.Export(temporary, args={"format": "usda" if out.suffix == ".usda" else "usdc"}):
-            raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, out)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
-    finally:
-        Path(temporary).unlink(missing_ok=True)

@@ -27,14 +27,16 @@ Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one 
 def train(
     character: Annotated[Path, typer.Argument(help="USD file with a skinned character and hair joints.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write, *.neuralocks.")],
-    dynamic: Annotated[bool, typer.Option(help="Learn lag, swing and settling too.")] = False,
-    seconds: Annotated[float, typer.Option(help="How long to train [s].")] = 75.0,
+    dynamic: Annotated[
+        bool, typer.Option("--dynamic/--quasi-static", help="Learn lag, swing and settling, or held poses only.")
+    ] = True,
+    seconds: Annotated[float | None, typer.Option(help="How long to descend [s]; 120, and 75 quasi-static.")] = None,
     steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
-    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 16, and 32 for --dynamic.")] = None,
-    clips: Annotated[int, typer.Option(help="Simulated motions to learn from; for --dynamic.")] = 96,
+    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
+    clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density [m^4/s^2].")] = None,
     weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
-    damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]; for --dynamic.")] = None,
+    damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]. Dynamic only.")] = None,
     seed: Annotated[int, typer.Option(help="Decides poses and first weights.")] = 0,
     chains: Chains = None,
     head: Head = None,
@@ -44,12 +46,14 @@ def train(
     """Train a tiny network for the hair joints of one rig. No data is needed."""
     if out.suffix != ".neuralocks":
         raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
-    if not 1 <= seconds <= 86400 or (steps is not None and not 1 <= steps <= 10_000_000):
+    if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
         raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
     if hidden is not None and not 1 <= hidden <= 256:
         raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
-    if not 2 <= clips <= 10000:
+    if clips is not None and not 2 <= clips <= 10000:
         raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
+    if not dynamic and (clips is not None or damping is not None):
+        raise NeuralocksError("--clips, --damping: nothing for them to do in held poses; leave out --quasi-static")
     changed = {"bend": bend, "weight": weight, "damping": damping}
     for name, value in changed.items():
         if value is not None and not 1e-6 < value < 1e4:
@@ -183,12 +187,22 @@ def report_lines(report: dict) -> list[str]:
     if "energy" in report:
         e = report["energy"]
         lines.append(
-            f"energy {e['network']:.3f} m^2/s^2, direct optimisation {e['optimised']:.3f}, carried rigidly {e['rigid']:.3f}"
+            f"held poses: energy {e['network']:.3f} m^2/s^2, direct optimisation {e['optimised']:.3f}, carried rigidly "
+            f"{e['rigid']:.3f}"
         )
-    for name, words in (("network", "network"), ("rigid", "carried rigidly")):
+    for name, words in (("network", "network"), ("optimised", "direct optimisation"), ("rigid", "carried rigidly")):
         if f"penetration_{name}" in report:
             p = report[f"penetration_{name}"]
-            lines.append(f"inside the body, {words}: {p['percent']:.2f} % of vertices, at most {p['worst_mm']:.1f} mm")
-    for name, row in report.get("motion_error", {}).items():
-        lines.append(f"motion error against the simulation, {name}: {row:.3f}")
+            lines.append(
+                f"inside the body, {words}: {p['percent']:.2f} % of vertices, at most {p['worst_mm']:.1f} mm "
+                f"in {p['poses']} poses"
+            )
+    for name, error in report.get("motion_error", {}).items():
+        line = f"in motion, {name}: error against the simulation {error:.3f} (carried rigidly 1)"
+        if name in report.get("rates", {}):
+            rates = ", ".join(f"{gap} mm off at {rate}" for rate, gap in report["rates"][name].items())
+            jump, cost = report["teleport"][name], report["cost"][name]
+            line += f"; {rates} from 60 fps; a teleport flings it {jump['flung_mm']} mm for {jump['seconds']} s"
+            line += f"; {cost['multiply_adds']} multiply-adds and {cost['bytes_carried_on']} bytes an avatar"
+        lines.append(line)
     return lines

@@ -12,11 +12,11 @@ def train_rig(
     character,
     out,
     *,
-    dynamic: bool = False,
-    seconds: float = 75.0,
+    dynamic: bool = True,
+    seconds: float | None = None,
     steps: int | None = None,
     hidden: int | None = None,
-    clips: int = 96,
+    clips: int | None = None,
     material: dict | None = None,
     seed: int = 0,
     chains: list[str] | None = None,
@@ -30,9 +30,10 @@ def train_rig(
     Args:
         character: USD file.
         out: `.neuralocks` file to write.
-        dynamic: learn from a simulation of the chains instead of the energy alone.
-        seconds, steps, hidden, seed: see `training.rig.train_static`.
-        clips: see `training.rig_dynamic.train_dynamic`.
+        dynamic: learn lag, swing and settling from a simulation of the chains; else held poses, from the energy alone.
+        seconds, steps, hidden, seed: see `training.rig.train_static` and `training.rig_dynamic.train_dynamic`, whose
+            defaults hold for what is None.
+        clips: see the latter.
         material: fields of `training.rig_energy.RigMaterial`.
         chains, head, skeleton: see `read_rigged_hair`.
         command: for the model card.
@@ -55,15 +56,15 @@ def train_rig(
     if hair.rig.character.body is None:
         notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
     values = RigMaterial(**(material or {}))
-    options = {"seconds": seconds, "steps": steps, "seed": seed, "progress": progress}
+    options = {"seconds": seconds, "steps": steps, "hidden": hidden}
     if dynamic:
-        from neuralocks_core.training.rig_dynamic import train_dynamic
+        from neuralocks_core.training.rig_dynamic import train_dynamic as train
 
-        model = train_dynamic(hair.rig, values, hidden=hidden or 32, clips=clips, **options)
+        options["clips"] = clips
     else:
-        from neuralocks_core.training.rig import train_static
-
-        model = train_static(hair.rig, values, hidden=hidden or 16, **options)
+        from neuralocks_core.training.rig import train_static as train
+    chosen = {name: value for name, value in options.items() if value is not None}
+    model = train(hair.rig, values, seed=seed, progress=progress, **chosen)
     if command:
         model.training["command"] = command
     model.training["character"] = Path(character).name

@@ -12,7 +12,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.network import feature_columns, input_limits
-from usd.rig_bake import NAME, bake_rig
+from usd.rig_bake import bake_rig
+from usd.rig_layer import NAME
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
