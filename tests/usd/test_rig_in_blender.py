@@ -41,7 +41,16 @@ def test_only_hair_bones_move_otherwise(tmp_path, version):
         pytest.skip(f"no Blender {version} wheel in .venv-blender-{version} (make test installs it)")
     model = RigModel.load()
     result = bake_rig(SHOT, tmp_path / "baked.usda", model)
-    words = [python, "-c", SCRIPT, ",".join(map(str, FRAMES)), SHOT, tmp_path / "a.npz", result.path, tmp_path / "b.npz"]
+    words = [
+        python,
+        "-c",
+        SCRIPT,
+        ",".join(map(str, FRAMES)),
+        SHOT,
+        tmp_path / "a.npz",
+        result.path,
+        tmp_path / "b.npz",
+    ]
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=240)
     assert (tmp_path / "b.npz").exists(), done.stdout[-2000:] + done.stderr[-2000:]
     with np.load(tmp_path / "a.npz") as before, np.load(tmp_path / "b.npz") as after:
