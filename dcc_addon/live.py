@@ -4,6 +4,7 @@ scene as it is now.
 """
 
 import os
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -42,6 +43,14 @@ def live_toggled(hair, context) -> None:
         refresh(context.scene)
     else:
         rest(hair)
+
+
+def loop_changed(armature, scene) -> None:
+    """The frame range of this character repeats from now on, or no longer."""
+    sampled = session.rigs.get(armature.name)
+    if sampled is not None:
+        sampled.clip = replace(sampled.clip, loop=armature.neuralocks_character.loop)
+    refresh(scene)
 
 
 def rest(hair) -> None:
@@ -107,7 +116,7 @@ def _update(hair, scene, graph, moved: bool) -> None:
     place = np.array(hair.evaluated_get(graph).matrix_world, float)
     to_local = np.linalg.inv(core @ place)
     time = scene.frame_current_final / sampled.motion.rate
-    points = prepared.points(time, joints, to_local, material(settings), settings.motion)
+    points = prepared.points(time, joints, to_local, material(settings), settings.motion, settings.resolve)
     curves.keep_rest(hair.data)
     mute_deformers(hair)
     curves.write(hair.data, points)

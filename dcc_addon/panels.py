@@ -10,6 +10,9 @@ from neuralocks_core.errors import NeuralocksError
 from .operators.training import job
 from .session import session
 
+LOOP_GAP = 2.0
+"""Turn from the last frame of a loop to its first [degrees] that is worth a word."""
+
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -56,6 +59,13 @@ def _motion(layout, armature) -> None:
     else:
         row.label(text=f"Motion of {len(sampled.motion.frames)} frames", icon="CHECKMARK")
     row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
+    character = armature.neuralocks_character
+    layout.prop(character, "loop")
+    if character.loop and sampled is not None:
+        gap = sampled.motion.gap()
+        if gap > LOOP_GAP:
+            first, last = sampled.motion.frames[[0, -1]]
+            words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")
     message(layout, armature.name)
 
 
@@ -87,6 +97,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             column.prop(own, name, slider=True)
+        column = layout.column()
+        column.enabled = settings.armature is not None
+        column.prop(own, "resolve")
         layout.operator("neuralocks.reset_look", icon="LOOP_BACK")
         layout.operator("neuralocks.report_card", icon="PRESET")
         for line in session.cards.get(hair.name, ()):

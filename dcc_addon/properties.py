@@ -61,6 +61,12 @@ def _character_changed(settings, context) -> None:
     session.forget_motion(settings.id_data.name_full)
 
 
+def _loop_changed(character, context) -> None:
+    from .live import loop_changed
+
+    loop_changed(character.id_data, context.scene)
+
+
 class HairSettings(bpy.types.PropertyGroup):
     """On a hair Curves object."""
 
@@ -119,6 +125,11 @@ class HairSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         update=_look_changed,
     )
+    resolve: BoolProperty(
+        name="Keep out of Body",
+        description="Push hair that the motion has brought into the body out of it, live and in bakes",
+        update=_look_changed,
+    )
     muted: StringProperty(options={"HIDDEN"}, description="Modifiers that are off while the hair is live, as JSON")
 
 
@@ -136,6 +147,12 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Head bone",
         description="The bone that carries the hair; found by name when left empty",
         update=_character_changed,
+    )
+    loop: BoolProperty(
+        name="Loop",
+        description="The frame range repeats: its last frame shows the pose of its first, and hair on the first "
+        "frame remembers the end of the range",
+        update=_loop_changed,
     )
     rig_model: StringProperty(
         name="Model",

@@ -54,6 +54,7 @@ def bake(
     material=None,
     strength: float = 1.0,
     resolve: bool = False,
+    loop: bool = False,
     velocities: bool = True,
     jobs: int | None = None,
     progress: Callable[[int, int, str], None] | None = None,
@@ -73,6 +74,7 @@ def bake(
         material: a Material, or words NAME=VALUE.
         strength: motion strength from 0 (each pose as if held) to 1.
         resolve: push hair out of the body after the network.
+        loop: the clip's last sample is followed by its first: hair on the first frame remembers the end of the clip.
         velocities: write velocities.
         jobs: threads; all cores if left out.
         progress: called with (done, total, message); raising from it stops the bake.
@@ -90,7 +92,7 @@ def bake(
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints)
     codes = time_codes(frames, shot.first, shot.last, subframes)
-    options = {"strength": strength, "resolve": resolve}
+    options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {
         "model": _digest(strand_model),
         "material": look.log_ratios().tolist(),

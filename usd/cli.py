@@ -84,6 +84,7 @@ def bake_command(
     material: Materials = None,
     strength: Annotated[float, typer.Option(help="Motion strength: 0 is each pose as if held, 1 as trained.")] = 1.0,
     resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network (slower).")] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="The clip's last sample is followed by its first.")] = False,
     velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -100,7 +101,7 @@ def bake_command(
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=_pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
-            resolve=resolve, velocities=velocities,
+            resolve=resolve, loop=loop, velocities=velocities,
             jobs=jobs, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One groom's points at any time code: a pure function of the shot and the model."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from neuralocks_core.materials import Material
@@ -20,6 +22,7 @@ class GroomPoser:
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
         resolve: push hair out of the body after the network.
+        loop: the clip's last sample is followed by its first.
         jobs: threads; the result does not depend on it.
     """
 
@@ -31,6 +34,7 @@ class GroomPoser:
         *,
         strength: float = 1.0,
         resolve: bool = False,
+        loop: bool = False,
         jobs: int = 1,
     ):
         self.item, self._rig = item, item.attachment.rig
@@ -38,7 +42,7 @@ class GroomPoser:
         self._placer = GroomPlacer(item, jobs)
         self._material = (material or Material()).log_ratios()
         self._strength = strength
-        self._sampler = model.sampler(character, self._rig.clip)
+        self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
         self._session = model.prepare(self._placer.strands)
         self._session.anchor(self._sampler.held_bind(self._material))
         self._session.codes = None  # needed for the first layer only; 15 MB of a large groom

@@ -60,7 +60,7 @@ def bake_steps(context, armature, hairs, path: str):
     first, last = frame_range(scene)
     if not hairs:
         raise NeuralocksError(f"{armature.name}: no hair belongs to this character; attach a hair object in the panel")
-    looks = {(*material_words(h.neuralocks_hair), h.neuralocks_hair.motion, h.neuralocks_hair.model) for h in hairs}
+    looks = {_look(h) for h in hairs}
     if not os.access(os.path.dirname(full) if os.path.isdir(os.path.dirname(full)) else "/", os.W_OK):
         raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
     with stepping(scene):
@@ -69,11 +69,7 @@ def bake_steps(context, armature, hairs, path: str):
     sampled = session.rigs[armature.name]
     baked = {}
     for number, look in enumerate(sorted(looks)):
-        group = [
-            h
-            for h in hairs
-            if (*material_words(h.neuralocks_hair), h.neuralocks_hair.motion, h.neuralocks_hair.model) == look
-        ]
+        group = [h for h in hairs if _look(h) == look]
         stem = Path(full)
         out = stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{number + 1}{stem.suffix}")
         shot = out.with_name(f"{out.stem}_shot.usdc")
@@ -88,12 +84,20 @@ def bake_steps(context, armature, hairs, path: str):
                 subframes=scene.neuralocks.subframes + 1,
                 material=material_words(settings),
                 strength=settings.motion,
+                resolve=settings.resolve,
+                loop=sampled.clip.loop,
                 progress=say,
             )
         )
         yield from job.steps(len(looks), number)
         baked |= {h.name: (str(out), prims[h.name]) for h in group}
     return baked
+
+
+def _look(hair) -> tuple:
+    """What hair that is baked together has in common."""
+    settings = hair.neuralocks_hair
+    return *material_words(settings), settings.motion, settings.resolve, settings.model
 
 
 class _Threaded:

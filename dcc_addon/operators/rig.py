@@ -100,7 +100,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
                 yield done, total, f"Sampling the motion of {name}"
         shot = out.with_name(f"{out.stem}_shot.usdc")
         write_shot(shot, bpy.data.objects[name], scene, session.rigs[name], [])
-        bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion)
+        bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
 

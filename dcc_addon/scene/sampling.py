@@ -89,7 +89,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
     arrays = [(body_reader.read(bpy.data.objects[body]), places[body][0]) for body in bodies]
     character = rig_service.character(rig, places[""][0], arrays, unit)
-    clip = motion.clip(to_core(unit))
+    clip = motion.clip(to_core(unit), bpy.data.objects[name].neuralocks_character.loop)
     session.forget_motion(name)
     session.rigs[name] = SampledRig(rig, motion, character, clip, trim_of(untrimmed, name), key)
     session.readers[name] = reader

@@ -135,6 +135,13 @@ class Motion:
         """The same as the core reads it."""
         return Clip(self.times, to_core @ self.world(), self.shape, loop)
 
+    def gap(self) -> float:
+        """How far the last pose is from the first [degrees]: largest turn of any joint against its parent. A loop has
+        none.
+        """
+        cosine = np.abs((self.rotation[0].astype(float) * self.rotation[-1]).sum(axis=-1))
+        return float(np.degrees(2 * np.arccos(np.clip(cosine, 0, 1)).max(initial=0.0)))
+
     def row(self, frame: float) -> int | None:
         """Index of the sample taken at `frame`, or None."""
         row = int(np.searchsorted(self.frames, frame - 1e-4))
