@@ -16,7 +16,7 @@ from .curves import find_curves, read_groom
 from .groom import USD
 from .placement import Placement
 from .rig_source import read_rig
-from .rig_stage import core_meshes, describe_chains, weight_notes
+from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
 from .stage import _composition, _groom_notes, _rig_notes, find_skeletons, frame_range, head_width
 
 
@@ -114,9 +114,11 @@ def _chains(rig, spoils: list[str]) -> list[dict]:
     """Hair joints of rigged mesh hair; none is nothing to report."""
     try:
         chains = assemble_rig(rig.character, core_meshes(rig)).chains
+        check_orients(rig, chains)
     except NeuralocksError as error:
         if "no hair chains" not in str(error):
-            spoils.append(f"{rig.path}: rigged hair: {error}")
+            reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
+            spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
     spoils += weight_notes(rig)
     return [

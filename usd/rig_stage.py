@@ -81,7 +81,7 @@ def read_rigged_hair(
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
-    _check_mirrored(found[0])
+    check_orients(found[0].source, found[0].rig.chains)
     return found[0]
 
 
@@ -123,17 +123,18 @@ def _check_authored(prim: Usd.Prim) -> None:
         raise NeuralocksError(f"{prim.GetPath()}: it has no bindTransforms; export the skeleton with its bind pose")
 
 
-def _check_mirrored(hair: RiggedHair) -> None:
+def check_orients(source: StageRig, chains: HairChains) -> None:
     """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written
     without the latter.
+
+    Raises:
+        NeuralocksError: names the joint.
     """
-    source = hair.source.source
-    below = hair.rig.chains.joints
-    involved = np.unique(np.concatenate([below, np.maximum(source.parents[below], 0)]))
-    for joint in involved:
-        linear = source.bind[joint, :3, :3]
-        name = source.names[joint].rsplit("/", 1)[-1]
-        if np.linalg.det(linear) * np.linalg.det(source.bind[hair.source.character.head, :3, :3]) < 0:
+    bind, names = source.source.bind, source.source.names
+    for joint in np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)])):
+        linear = bind[joint, :3, :3]
+        name = names[joint].rsplit("/", 1)[-1]
+        if np.linalg.det(linear) * np.linalg.det(bind[source.character.head, :3, :3]) < 0:
             raise NeuralocksError(
                 f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
             )

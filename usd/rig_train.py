@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks rig train`: from a USD rig to a model file."""
 
+import tempfile
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -51,6 +52,7 @@ def train_rig(
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
     from neuralocks_core.training.rig_energy import RigMaterial
 
+    _check_writable(Path(out))
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, all_shapes=True)
     notes = weight_notes(hair.source)
     if hair.rig.character.body is None:
@@ -70,3 +72,13 @@ def train_rig(
     model.training["character"] = Path(character).name
     model.save(out)
     return model, notes
+
+
+def _check_writable(out: Path) -> None:
+    """Before minutes of training, not after them."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out.parent):
+            pass
+    except OSError as error:
+        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None

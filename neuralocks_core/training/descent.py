@@ -2,7 +2,7 @@
 """The loop under every training here: a budget of time or steps, warm-up, cosine, clipped gradients."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,12 +50,17 @@ class Descended:
 
 
 def descend(
-    optimiser: torch.optim.Optimizer, losses: Losses, schedule: Schedule, *, step: int = 0, done: float = 0.0
+    optimisers: Sequence[torch.optim.Optimizer],
+    losses: Losses,
+    schedule: Schedule,
+    *,
+    step: int = 0,
+    done: float = 0.0,
 ) -> Iterator[Descended]:
-    """Minimise the sum of `losses` over what `optimiser` holds; stop it by leaving the loop.
+    """Minimise the sum of `losses` over what the optimisers hold; stop it by leaving the loop.
 
     Args:
-        optimiser: its step sizes are set anew before each step.
+        optimisers: each with parameters of its own; their step sizes are set anew before each step.
         losses: called once a step; whatever else should happen now and then may happen in it.
         schedule: see there.
         step, done: where an earlier run with the same budget stopped.
@@ -63,17 +68,20 @@ def descend(
     Yields:
         about once a second, and after the last step.
     """
-    parameters = [p for group in optimiser.param_groups for p in group["params"]]
+    groups = [group for optimiser in optimisers for group in optimiser.param_groups]
+    parameters = [p for group in groups for p in group["params"]]
     before, start = done, time.monotonic()
     shown, running = start, {}
     while done < 1.0:
-        for group in optimiser.param_groups:
+        for group in groups:
             group["lr"] = schedule.rate_at(step, done)
         values = losses(done)
-        optimiser.zero_grad(set_to_none=True)
+        for parameter in parameters:
+            parameter.grad = None
         sum(values.values()).backward()
         torch.nn.utils.clip_grad_norm_(parameters, schedule.clip)
-        optimiser.step()
+        for optimiser in optimisers:
+            optimiser.step()
         step += 1
         now = time.monotonic()
         done = step / schedule.steps if schedule.steps else before + (now - start) / (60 * schedule.minutes)

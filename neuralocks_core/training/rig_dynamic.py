@@ -6,7 +6,7 @@ after the same history.
 """
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ from neuralocks_core.random_motion import random_clip
 from neuralocks_core.rig.network import RigModel, input_limits, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend
-from neuralocks_core.training.rig import COLLIDING
+from neuralocks_core.training.rig import COLLIDING, ROOM
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial
 from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig_network import TinyNet
@@ -63,7 +63,7 @@ def train_dynamic(
     say = progress or (lambda done, total, message: None)
     spec = rig_spec(dynamic=True)
     features, turns = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
-    energy = RigEnergy(rig, material)
+    energy = RigEnergy(rig, replace(material, margin=material.margin + ROOM))
     with torch.no_grad():
         wanted = energy.pose(torch.as_tensor(turns.reshape(-1, len(rig.chains), 4)))[2]
     wanted = wanted.reshape(*turns.shape[:2], -1, 3)
@@ -99,7 +99,7 @@ def train_dynamic(
     began = time.monotonic()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=1e-3)
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=4e-3, warm_up=50)
-    for state in descend(optimiser, losses, schedule):
+    for state in descend([optimiser], losses, schedule):
         say(200 + int(750 * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
         "method": "dynamic, regression on simulated chains",
