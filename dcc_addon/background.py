@@ -9,6 +9,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from .live import needs_sampling, refresh
 from .scene.sampling import sample, stepping
 from .session import session
 
@@ -40,19 +41,17 @@ def cancel() -> None:
 
 
 def _tick():
-    from .live import needs_sampling, refresh
-
     context = bpy.context
     scene = context.scene
     if _busy(context):
         return PAUSE
     if not _work:
-        todo = [a for a in needs_sampling(scene) if a.name not in session.failed]
+        todo = [a for a in needs_sampling(scene) if a.name_full not in session.failed]
         if not todo:
             session.sampling = None
             _redraw(context)
             return None
-        _work.append((todo[0].name, sample(context, todo[0])))
+        _work.append((todo[0].name_full, sample(context, todo[0])))
     name, frames = _work[0]
     end = time.perf_counter() + SLICE
     try:

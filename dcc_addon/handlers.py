@@ -4,7 +4,11 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import live, live_rig
+from neuralocks_core.errors import NeuralocksError
+
+from . import background, live
+from .live_strands import EDITING
+from .scene.sampling import ensure
 from .session import session
 
 
@@ -12,28 +16,28 @@ from .session import session
 def on_frame(scene, graph=None):
     """A new frame is evaluated, in the viewport or for a render."""
     live.update(scene, graph or bpy.context.evaluated_depsgraph_get(), moved=True)
+    _catch_up()
 
 
 @persistent
 def on_update(scene, graph):
     """Something was edited: follow a pose made by hand, and notice edited animation."""
-    if session.paused or not (live.live_hairs(scene) or live_rig.live_armatures(scene)):
+    if session.paused:
         return
-    armatures = {o.neuralocks_hair.armature for o in live.live_hairs(scene)} | set(live_rig.live_armatures(scene))
-    names = {a.name for a in armatures if a is not None}
-    for update in graph.updates:
-        if isinstance(update.id, bpy.types.Action):
-            _mark_stale()
-        elif isinstance(update.id, bpy.types.Object) and (update.id.name in names or _mode_changed(update.id)):
-            live.update(scene, graph)
-            break
+    names = {a.name_full for a in live.carriers(scene)}
+    if not names:
+        return
+    changed = [update.id for update in graph.updates]
+    if any(isinstance(thing, bpy.types.Action) for thing in changed):
+        _mark_stale()
+    if any(isinstance(o, bpy.types.Object) and (o.name_full in names or _mode_changed(o)) for o in changed):
+        live.update(scene, graph)
+    _catch_up()
 
 
 @persistent
 def on_load(*_):
     """Another file: nothing that is known belongs to it."""
-    from . import background
-
     background.cancel()
     session.clear()
     for scene in bpy.data.scenes:
@@ -43,8 +47,8 @@ def on_load(*_):
 
 @persistent
 def on_undo(scene, *_):
-    """Undo may have brought back another pose or groom."""
-    session.hairs.clear()
+    """Undo may have brought back another pose, groom or choice."""
+    session.doubt()
     live.refresh(scene)
 
 
@@ -52,10 +56,7 @@ def on_undo(scene, *_):
 def before_save(*_):
     """The saved file holds the hair at rest, so that it opens right without the add-on."""
     for scene in bpy.data.scenes:
-        for hair in live.live_hairs(scene):
-            live.show_rest(hair)
-        for armature in live_rig.live_armatures(scene):
-            live_rig.show_rest(armature)
+        live.show_rest(scene)
 
 
 @persistent
@@ -67,27 +68,30 @@ def after_save(*_):
 @persistent
 def before_render(scene, *_):
     """A render must be right: sample now what is out of date."""
-    from .scene.sampling import ensure
-
     for armature in live.needs_sampling(scene):
         try:
             ensure(bpy.context, armature)
-        except live.NeuralocksError as error:
-            session.messages[armature.name] = str(error)
+        except NeuralocksError as error:
+            session.messages[armature.name_full] = str(error)
     live.refresh(scene)
 
 
 def _mark_stale() -> None:
-    from .background import request
-
     for sampled in session.rigs.values():
         sampled.stale = True
     session.failed.clear()
-    request()
+    session.wanting = True
+
+
+def _catch_up() -> None:
+    """Sample soon, if live hair found its motion missing or out of date."""
+    if session.wanting:
+        session.wanting = False
+        background.request()
 
 
 def _mode_changed(candidate) -> bool:
-    return candidate.type == "CURVES" and candidate.mode in live.EDITING
+    return candidate.type == "CURVES" and candidate.mode in EDITING
 
 
 HANDLERS = {

@@ -3,11 +3,18 @@
 
 import json
 
+import numpy as np
+
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from .models import model_path
+from .pose import pose
 from .services.bones import LiveBones
 from .session import session
+
+SAME = 1e-7
+"""Quaternions that differ by less are the same turn."""
 
 
 def live_armatures(scene) -> list:
@@ -15,64 +22,51 @@ def live_armatures(scene) -> list:
     return [o for o in scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_live]
 
 
-def live_toggled(armature, context) -> None:
-    """The Live switch of the hair bones was used."""
-    session.messages.pop(armature.name, None)
-    if armature.neuralocks_character.rig_live:
-        from .background import request
-        from .live import refresh
-
-        request()
-        refresh(context.scene)
-    else:
-        rest(armature)
-
-
-def update(scene, graph, moved: bool = False) -> None:
-    """Turn the hair bones of every live rig."""
-    for armature in live_armatures(scene):
-        try:
-            _update(armature, scene, graph, moved)
-        except NeuralocksError as error:
-            show_rest(armature)
-            session.messages[armature.name] = str(error)
+def update(armature, scene, graph, moved: bool = False) -> None:
+    """Turn the hair bones of a live rig; as they were, with a message that says why, where that cannot be."""
+    try:
+        _update(armature, scene, graph, moved)
+    except NeuralocksError as error:
+        show_rest(armature)
+        session.messages[armature.name_full] = str(error)
 
 
 def _update(armature, scene, graph, moved) -> None:
-    from .live import pose
-
-    sampled = session.rigs.get(armature.name)
+    sampled = session.rigs.get(armature.name_full)
     if sampled is None:
-        raise NeuralocksError(f"{armature.name}: its motion is not sampled yet; press Sample Motion")
+        session.wanting = True
+        raise NeuralocksError(f"{armature.name_full}: its motion is not sampled yet; press Sample Motion")
     bones = bind(armature, sampled)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
     turns = bones.turns([scene.frame_current_final / sampled.motion.rate], settings.rig_motion, joints[None])[0]
     _keep(armature, bones.bones)
+    changed = False
     for name, turn in zip(bones.bones, turns.tolist(), strict=True):
         bone = armature.pose.bones[name]
-        bone.rotation_mode = "QUATERNION"
-        bone.rotation_quaternion = turn
-    armature.update_tag()
-    session.messages.pop(armature.name, None)
+        if bone.rotation_mode != "QUATERNION" or np.abs(np.subtract(bone.rotation_quaternion, turn)).max() > SAME:
+            bone.rotation_mode, bone.rotation_quaternion, changed = "QUATERNION", turn, True
+    if changed:  # a tag is an update, which calls here again: it must end when nothing changes any more
+        armature.update_tag()
+    session.messages.pop(armature.name_full, None)
 
 
 def bind(armature, sampled) -> LiveBones:
     """The rig model bound to this armature, once."""
-    from .live import model_path
-
-    bones = session.chains.get(armature.name)
+    bones = session.chains.get(armature.name_full)
     if bones is None:
         settings = armature.neuralocks_character
         model = RigModel.load(model_path(settings.rig_model, "rig"))
-        bones = session.chains[armature.name] = LiveBones.of(model, sampled.rig, sampled.character, settings.chains)
+        bones = session.chains[armature.name_full] = LiveBones.of(
+            model, sampled.rig, sampled.character, settings.chains
+        )
     bones.follow(sampled.character, sampled.clip)
     return bones
 
 
 def rest(armature) -> None:
     """Give the hair bones the rotations back that they had before."""
-    session.chains.pop(armature.name, None)
+    session.chains.pop(armature.name_full, None)
     show_rest(armature)
 
 

@@ -48,7 +48,7 @@ class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
 
 def _motion(layout, armature) -> None:
     """How up to date the sampled motion is."""
-    sampled = session.rigs.get(armature.name)
+    sampled = session.rigs.get(armature.name_full)
     row = layout.row()
     if session.sampling is not None:
         row.label(text=f"Sampling motion {100 * session.sampling:.0f} %", icon="TIME")
@@ -66,7 +66,7 @@ def _motion(layout, armature) -> None:
         if gap > LOOP_GAP:
             first, last = sampled.motion.frames[[0, -1]]
             words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")
-    message(layout, armature.name)
+    message(layout, armature.name_full)
 
 
 class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
@@ -85,7 +85,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         own = hair.neuralocks_hair
         if own.armature is None or own.armature != settings.armature:
             if own.armature is not None:
-                words(layout, f"This hair belongs to {own.armature.name}", "INFO")
+                words(layout, f"This hair belongs to {own.armature.name_full}", "INFO")
             layout.operator("neuralocks.assign", icon="LINKED")
         layout.prop(own, "model")
         _training(layout, settings, "strands")
@@ -93,7 +93,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         row.scale_y = 1.5
         row.use_property_split = False
         row.prop(own, "live", toggle=True, icon="PLAY")
-        message(layout, hair.name)
+        message(layout, hair.name_full)
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             column.prop(own, name, slider=True)
@@ -102,7 +102,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         column.prop(own, "resolve")
         layout.operator("neuralocks.reset_look", icon="LOOP_BACK")
         layout.operator("neuralocks.report_card", icon="PRESET")
-        for line in session.cards.get(hair.name, ()):
+        for line in session.cards.get(hair.name_full, ()):
             words(layout, line, "NONE")
 
 
@@ -141,7 +141,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         own = armature.neuralocks_character
         layout.prop(own, "chains")
         layout.operator("neuralocks.find_chains", icon="BONE_DATA")
-        for line in session.cards.get(armature.name, ()):
+        for line in session.cards.get(armature.name_full, ()):
             words(layout, line, "NONE")
         layout.prop(own, "rig_model")
         _training(layout, settings, "rig")
@@ -150,7 +150,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         row.use_property_split = False
         row.prop(own, "rig_live", toggle=True, icon="PLAY")
         layout.prop(own, "rig_motion", slider=True)
-        message(layout, armature.name)
+        message(layout, armature.name_full)
         row = layout.row(align=True)
         row.operator("neuralocks.bake_keys", icon="KEYINGSET")
         row.operator("neuralocks.remove_keys", text="", icon="X")
@@ -188,7 +188,7 @@ def findings(armature) -> tuple[list[str], str]:
     from .services import rig as rig_service
 
     chosen = armature.neuralocks_character.head_bone
-    key = armature.name, len(armature.data.bones), chosen
+    key = armature.name_full, len(armature.data.bones), chosen
     if key not in _findings:
         _findings.clear()
         try:

@@ -11,6 +11,9 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import background, live
+from .session import session
+
 
 def _is_armature(_self, candidate) -> bool:
     return candidate.type == "ARMATURE"
@@ -25,46 +28,39 @@ def _is_hair(_self, candidate) -> bool:
 
 
 def _live_changed(hair_settings, context) -> None:
-    from .live import live_toggled
-
-    live_toggled(hair_settings.id_data, context)
+    live.strands_toggled(hair_settings.id_data, context)
+    background.request()
 
 
 def _look_changed(hair_settings, context) -> None:
-    from .live import refresh
-
-    refresh(context.scene)
+    live.refresh(context.scene)
 
 
 def _rig_live_changed(character, context) -> None:
-    from .live_rig import live_toggled
-
-    live_toggled(character.id_data, context)
+    live.rig_toggled(character.id_data, context)
+    background.request()
 
 
 def _rig_look_changed(character, context) -> None:
-    from .live import refresh
+    live.refresh(context.scene)
 
-    refresh(context.scene)
+
+def _rig_model_changed(character, context) -> None:
+    session.chains.pop(character.id_data.name_full, None)
+    live.refresh(context.scene)
 
 
 def _model_changed(settings, context) -> None:
-    from .session import session
-
     session.forget(settings.id_data.name_full)
     _look_changed(settings, context)
 
 
 def _character_changed(settings, context) -> None:
-    from .session import session
-
     session.forget_motion(settings.id_data.name_full)
 
 
 def _loop_changed(character, context) -> None:
-    from .live import loop_changed
-
-    loop_changed(character.id_data, context.scene)
+    live.loop_changed(character.id_data, context.scene)
 
 
 class HairSettings(bpy.types.PropertyGroup):
@@ -158,7 +154,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Model",
         description="Trained model file for hair bones (*.neuralocks); empty means the one that comes with the add-on",
         subtype="FILE_PATH",
-        update=_rig_look_changed,
+        update=_rig_model_changed,
     )
     rig_live: BoolProperty(
         name="Live", description="Turn the hair bones with the motion of the head", update=_rig_live_changed
@@ -166,7 +162,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     chains: StringProperty(
         name="Chains",
         description="Names of the first hair bones, with * for anything, separated by commas; found when left empty",
-        update=_rig_look_changed,
+        update=_rig_model_changed,
     )
     rig_kept: StringProperty(
         options={"HIDDEN"}, description="Rotations of the hair bones from before they were live, as JSON"

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import background, handlers, live, live_rig, operators, panels, properties
+from . import background, handlers, live_rig, live_strands, operators, panels, properties
 from .session import session
 
 CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
@@ -25,8 +25,8 @@ def unregister() -> None:
     operators.training.stop()
     handlers.detach()
     for scene in bpy.data.scenes:
-        for hair in live.live_hairs(scene):
-            live.rest(hair)
+        for hair in live_strands.live_hairs(scene):
+            live_strands.rest(hair)
         for armature in live_rig.live_armatures(scene):
             live_rig.rest(armature)
     session.clear()

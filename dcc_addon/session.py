@@ -55,6 +55,16 @@ class Session:
     failed: set[str] = field(default_factory=set)
     """Armatures that could not be sampled in the background; tried again when something about them changes."""
 
+    wanting: bool = False
+    """Whether live hair found its motion missing or out of date since somebody last saw to it."""
+    doubtful: set[str] = field(default_factory=set)
+    """Prepared hair whose groom or choices may have changed."""
+
+    def doubt(self) -> None:
+        """Anything in the file may have changed: look before use."""
+        self.doubtful.update(self.hairs)
+        self.chains.clear()
+
     def forget(self, name: str) -> None:
         """Drop what was prepared for a hair object or for the hair bones of an armature."""
         self.hairs.pop(name, None)

@@ -9,9 +9,11 @@ from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..live import material_words, model_path
+from ..live_strands import material_words
+from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
+from ..scene.lookup import find
 from ..scene.sampling import hairs_of, sample, stepping
 from ..session import session
 from .base import Stepwise, shown_armature, shown_hair
@@ -59,14 +61,16 @@ def bake_steps(context, armature, hairs, path: str):
     full = output_path(path)
     first, last = frame_range(scene)
     if not hairs:
-        raise NeuralocksError(f"{armature.name}: no hair belongs to this character; attach a hair object in the panel")
+        raise NeuralocksError(
+            f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
+        )
     looks = {_look(h) for h in hairs}
     if not os.access(os.path.dirname(full) if os.path.isdir(os.path.dirname(full)) else "/", os.W_OK):
         raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
     with stepping(scene):
         for done, total in sample(context, armature):
-            yield done, 2 * total, f"Sampling the motion of {armature.name}"
-    sampled = session.rigs[armature.name]
+            yield done, 2 * total, f"Sampling the motion of {armature.name_full}"
+    sampled = session.rigs[armature.name_full]
     baked = {}
     for number, look in enumerate(sorted(looks)):
         group = [h for h in hairs if _look(h) == look]
@@ -90,7 +94,7 @@ def bake_steps(context, armature, hairs, path: str):
             )
         )
         yield from job.steps(len(looks), number)
-        baked |= {h.name: (str(out), prims[h.name]) for h in group}
+        baked |= {h.name_full: (str(out), prims[h.name]) for h in group}
     return baked
 
 
@@ -170,10 +174,10 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
 
     def steps(self, context):
         armature, hair = shown_armature(context), shown_hair(context)
-        attach.check_possible()
-        name, path = hair.name, self.filepath or context.scene.neuralocks.output
+        attach.check_possible(hair)
+        name, path = hair.name_full, self.filepath or context.scene.neuralocks.output
         baked = yield from bake_steps(context, armature, [hair], path)
-        hair = bpy.data.objects[name]
+        hair = find(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name])
         return f"{name}: now plays {baked[name][0]}"
@@ -187,9 +191,10 @@ class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
 
     def steps(self, context):
         hair = shown_hair(context)
+        attach.check_own(hair)
         found = attach.detach(hair)
         yield 1, 1, ""
-        return f"{hair.name}: cache removed" if found else f"{hair.name}: it has no cache"
+        return f"{hair.name_full}: cache removed" if found else f"{hair.name_full}: it has no cache"
 
 
 class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
@@ -204,7 +209,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         import tempfile
 
         armature, hair = shown_armature(context), shown_hair(context)
-        name = hair.name
+        name = hair.name_full
         folder = tempfile.mkdtemp(prefix="neuralocks_")
         try:
             baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))

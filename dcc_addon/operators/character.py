@@ -20,7 +20,9 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
 
     def work(self, context):
         settings, scene = context.scene.neuralocks, context.scene
-        chosen = [*context.selected_objects, *scene.objects]
+        # An override before the linked object that it is made of, which may be in the scene too.
+        local = sorted(scene.objects, key=lambda thing: thing.library is not None)
+        chosen = [*context.selected_objects, *local]
         armature = next((o for o in chosen if o.type == "ARMATURE"), None)
         if armature is None:
             raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
@@ -28,7 +30,9 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
         settings.armature, settings.hair = armature, hair
         if hair is not None and hair.neuralocks_hair.armature is None:
             hair.neuralocks_hair.armature = armature
-        return f"Character {armature.name}" + (f", hair {hair.name}" if hair else ", no hair Curves in this scene")
+        return f"Character {armature.name_full}" + (
+            f", hair {hair.name_full}" if hair else ", no hair Curves in this scene"
+        )
 
 
 class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
@@ -44,7 +48,7 @@ class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
         lines = rig_service.advice(rig)
         for line in lines:
             self.report({"WARNING"}, line)
-        return None if lines else f"{armature.name}: the rig is fine"
+        return None if lines else f"{armature.name_full}: the rig is fine"
 
 
 class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
@@ -57,7 +61,7 @@ class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
 
     def steps(self, context):
         armature = shown_armature(context)
-        name = armature.name
+        name = armature.name_full
         for done, total in sample(context, armature):
             yield done, total, f"Sampling the motion of {name}"
         return f"{name}: motion sampled"

@@ -10,7 +10,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
 from ..live_rig import bind, rest
+from ..models import model_path
 from ..scene import actions
+from ..scene.attach import check_own
+from ..scene.lookup import find
 from ..scene.sampling import ensure, sample, stepping
 from ..services.bones import chains_of
 from ..services.motion import frame_numbers
@@ -34,8 +37,8 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
             f"{chains.chain_name(i)}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
             for i in range(len(chains.roots))
         ]
-        session.cards[armature.name] = lines
-        return f"{armature.name}: {len(chains)} hair bones in {len(lines)} chains"
+        session.cards[armature.name_full] = lines
+        return f"{armature.name_full}: {len(chains)} hair bones in {len(lines)} chains"
 
 
 class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
@@ -46,7 +49,8 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
 
     def steps(self, context):
         armature, scene = shown_armature(context), context.scene
-        name = armature.name
+        name = armature.name_full
+        check_own(armature)
         first, last = frame_range(scene)
         actions.remove(armature)
         armature.neuralocks_character.rig_live = False
@@ -54,7 +58,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         with stepping(scene):
             for done, total in sample(context, armature):
                 yield done, total, f"Sampling the motion of {name}"
-        armature = bpy.data.objects[name]
+        armature = find(name)
         bones = bind(armature, session.rigs[name])
         frames = frame_numbers(first, last, 0)
         turns = bones.turns(frames / session.rigs[name].motion.rate, armature.neuralocks_character.rig_motion)
@@ -70,9 +74,10 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
 
     def work(self, context):
         armature = shown_armature(context)
+        check_own(armature)
         if not actions.remove(armature):
-            raise NeuralocksError(f"{armature.name}: it has no baked hair keys; bake them first")
-        return f"{armature.name}: baked hair keys removed"
+            raise NeuralocksError(f"{armature.name_full}: it has no baked hair keys; bake them first")
+        return f"{armature.name_full}: baked hair keys removed"
 
 
 class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
@@ -89,17 +94,16 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     def steps(self, context):
         from usd.rig_bake import bake_rig
 
-        from ..live import model_path
         from ..scene.export import write_shot
 
         armature, scene = shown_armature(context), context.scene
-        settings, name = armature.neuralocks_character, armature.name
+        settings, name = armature.neuralocks_character, armature.name_full
         out = Path(output_path(self.filepath or scene.neuralocks.output.replace("bake", "rig_bake")))
         with stepping(scene):
             for done, total in sample(context, armature):
                 yield done, total, f"Sampling the motion of {name}"
         shot = out.with_name(f"{out.stem}_shot.usdc")
-        write_shot(shot, bpy.data.objects[name], scene, session.rigs[name], [])
+        write_shot(shot, find(name), scene, session.rigs[name], [])
         bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
@@ -117,8 +121,6 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
 
     def work(self, context):
         from neuralocks_core.export_c import export_c
-
-        from ..live import model_path
 
         armature = shown_armature(context)
         if self.filepath.startswith("//") and not bpy.data.filepath:

@@ -7,6 +7,7 @@ from bpy.props import StringProperty
 from neuralocks_core.errors import NeuralocksError
 
 from ..scene import particles
+from ..scene.attach import check_own
 from .base import Hardened, shown_armature, shown_hair
 
 
@@ -31,7 +32,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
         settings.hair = hair
         if settings.armature is not None:
             hair.neuralocks_hair.armature = settings.armature
-        return f"{hair.name}: {len(hair.data.curves)} strands from the particle hair of {source.name}"
+        return f"{hair.name_full}: {len(hair.data.curves)} strands from the particle hair of {source.name}"
 
 
 class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
@@ -57,8 +58,9 @@ class NEURALOCKS_OT_assign(Hardened, bpy.types.Operator):
 
     def work(self, context):
         hair, armature = shown_hair(context), shown_armature(context)
+        check_own(hair)
         hair.neuralocks_hair.armature = armature
-        return f"{hair.name} belongs to {armature.name}"
+        return f"{hair.name_full} belongs to {armature.name_full}"
 
 
 CLASSES = (NEURALOCKS_OT_from_particles, NEURALOCKS_OT_reset_look, NEURALOCKS_OT_assign)

@@ -10,6 +10,7 @@ from bpy.props import EnumProperty
 from neuralocks_core.errors import NeuralocksError
 
 from ..scene.export import write_shot
+from ..scene.lookup import find
 from ..scene.sampling import ensure
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
@@ -70,7 +71,7 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
         folder = Path(tempfile.mkdtemp(prefix="neuralocks_"))
         character = folder / "character.usdc"
         write_shot(character, armature, context.scene, sampled, [target] if self.kind == "strands" else [])
-        out = _out(target.name)
+        out = _out(target.name_full)
         settings = {
             "kind": self.kind,
             "character": str(character),
@@ -81,9 +82,9 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
         }
         stop()
         _jobs.append(TrainingJob(training_python(), settings))
-        _jobs[0].target = (target.name, self.kind)
+        _jobs[0].target = (target.name_full, self.kind)
         bpy.app.timers.register(_watch, first_interval=0.5)
-        return f"Training a model for {target.name} in the background"
+        return f"Training a model for {target.name_full} in the background"
 
 
 class NEURALOCKS_OT_cancel_training(Hardened, bpy.types.Operator):
@@ -108,7 +109,7 @@ def finish() -> str | None:
     if running is None or running.running:
         return None
     name, kind = running.target
-    target = bpy.data.objects.get(name)
+    target = find(name)
     if running.succeeded and target is not None:
         if kind == "strands":
             target.neuralocks_hair.model = running.out

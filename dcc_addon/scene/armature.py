@@ -24,7 +24,7 @@ def read(armature, head_bone: str = "") -> RigArrays:
     if len(bones):
         bones.foreach_get("matrix_local", rest.ravel())
     return RigArrays(
-        armature.name,
+        armature.name_full,
         tuple(bones[i].name for i in order),
         np.array([place[parents[i]] if parents[i] >= 0 else -1 for i in order], int),
         rest.astype(float).swapaxes(1, 2)[order],
@@ -36,7 +36,7 @@ class PoseReader:
     """Reads world transforms of all joints of one armature, fast and in the order of its `RigArrays`."""
 
     def __init__(self, armature, bones: tuple[str, ...]):
-        self.name = armature.name
+        self.name = armature.name_full
         pose = {bone.name: i for i, bone in enumerate(armature.pose.bones)}
         self._order = np.array([pose[name] for name in bones], int)
         self._buffer = np.empty((len(pose), 4, 4), np.float32)

@@ -10,8 +10,22 @@ from neuralocks_core.errors import NeuralocksError
 MODIFIER = "Neuralocks Cache"
 
 
-def check_possible() -> None:
-    """Refuse where Blender was built without USD."""
+def check_own(thing) -> None:
+    """Refuse an object that belongs to another file: what is changed in it is not saved.
+
+    Raises:
+        NeuralocksError: it does.
+    """
+    if thing.library is not None:
+        raise NeuralocksError(
+            f"{thing.name}: it is linked from {thing.library.name}, and changes here are not saved; make a library "
+            "override of it (Object > Library Override > Make) or make it local"
+        )
+
+
+def check_possible(hair) -> None:
+    """Refuse where Blender was built without USD, and hair of another file."""
+    check_own(hair)
     if not getattr(bpy.app.build_options, "usd", True):
         raise NeuralocksError(
             "Bake and Attach: this Blender is built without USD; use Bake to USD, or Blender from blender.org"

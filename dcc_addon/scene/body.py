@@ -15,7 +15,7 @@ def find(armature, objects) -> list:
         and not o.hide_render
         and any(m.type == "ARMATURE" and m.object == armature for m in o.modifiers)
     ]
-    return sorted(deformed, key=lambda o: o.name)
+    return sorted(deformed, key=lambda o: o.name_full)
 
 
 def read(mesh_object) -> BodyArrays:
@@ -35,7 +35,7 @@ def read(mesh_object) -> BodyArrays:
             if block != keys.reference_key:
                 shapes[block.name] = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
     return BodyArrays(
-        mesh_object.name,
+        mesh_object.name_full,
         points,
         triangles,
         tuple(group.name for group in mesh_object.vertex_groups),

@@ -52,8 +52,11 @@ def keep_rest(data) -> None:
     Raises:
         NeuralocksError: the data belongs to another file.
     """
-    if data.library is not None:
-        raise NeuralocksError(f"{data.name}: the hair is linked from another file; make it local or a library override")
+    if data.library is not None or data.override_library is not None:
+        raise NeuralocksError(
+            f"{data.name}: its curves are linked from another file and cannot be moved here; make them local (Object > "
+            "Relations > Make Local > Selected Objects and Data), or use Bake and Attach"
+        )
     if has_rest(data):
         return
     stale = data.attributes.get(REST)

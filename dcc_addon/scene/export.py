@@ -46,11 +46,11 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
                 curves.counts(data),
                 None if radius is None or not len(radius) else 2 * radius,
                 bind_place(hair, armature, sampled),
-                motion.places[hair.name],
+                motion.places[hair.name_full],
                 sampled.character.head,
             )
         )
-    bodies = [body_reader.read(body) for body in bodies_of(armature, scene) if body.name in motion.places]
+    bodies = [body_reader.read(body) for body in bodies_of(armature, scene) if body.name_full in motion.places]
     labels_of_shapes = iter(shape_names(bodies))
     skins = []
     for arrays, label in zip(bodies, names.unique([f"Body_{b.name}" for b in bodies]), strict=True):
@@ -81,7 +81,7 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
             prims,
         ),
     )
-    return {hair.name: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
+    return {hair.name_full: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
 
 
 def _core(motion: Motion) -> np.ndarray:

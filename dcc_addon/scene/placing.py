@@ -11,7 +11,7 @@ def bind_place(hair, armature, sampled) -> np.ndarray:
 
     Hair that is parented to a bone has moved with the pose already at the first frame: this is taken out again.
     """
-    place = sampled.motion.places[hair.name][0]
+    place = sampled.motion.places[hair.name_full][0]
     if hair.parent == armature and hair.parent_type == "BONE" and hair.parent_bone in sampled.rig.bones:
         joint = sampled.rig.bones.index(hair.parent_bone)
         bind = sampled.motion.places[""][0] @ sampled.rig.rest[joint] @ sampled.trim[joint]

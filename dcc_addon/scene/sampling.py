@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator
 
-import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
@@ -14,6 +13,7 @@ from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
+from .lookup import find
 
 
 def hairs_of(armature, scene) -> list:
@@ -38,10 +38,10 @@ def key_of(armature, scene) -> tuple:
         scene.neuralocks.subframes,
         round(scene.render.fps / scene.render.fps_base, 6),
         round(scene.unit_settings.scale_length, 9),
-        tuple(body.name for body in bodies),
+        tuple(body.name_full for body in bodies),
         settings.head_bone,
         len(armature.data.bones),
-        tuple(sorted(o.name for o in hairs_of(armature, scene))),
+        tuple(sorted(o.name_full for o in hairs_of(armature, scene))),
     )
 
 
@@ -56,21 +56,19 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     scene = context.scene
     rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
     rig.humanoid()
-    bodies = [body.name for body in bodies_of(armature, scene)]
-    tracked = [*(hair.name for hair in hairs_of(armature, scene)), *bodies]
+    bodies = [body.name_full for body in bodies_of(armature, scene)]
+    tracked = [*(hair.name_full for hair in hairs_of(armature, scene)), *bodies]
     frames = frame_numbers(scene.frame_start, scene.frame_end, scene.neuralocks.subframes)
     key = key_of(armature, scene)
     joints = np.empty((len(frames), len(rig.bones), 4, 4))
     places = {name: np.empty((len(frames), 4, 4)) for name in ["", *tracked]}
     shapes = []
-    name, reader = armature.name, None
+    name, reader = armature.name_full, None
     for row, frame in enumerate(frames):
         whole = int(np.floor(frame + 1e-6))
         scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
         graph = context.evaluated_depsgraph_get()
-        armature = bpy.data.objects.get(name)
-        if armature is None:
-            raise NeuralocksError(f"{name}: the armature was deleted while its motion was sampled; start again")
+        armature = _found(name)
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
             raise NeuralocksError(
@@ -80,19 +78,27 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
         joints[row] = reader.world(evaluated)
         places[""][row] = evaluated.matrix_world
         for other in tracked:
-            places[other][row] = bpy.data.objects[other].evaluated_get(graph).matrix_world
-        values = [body_reader.shape_values(bpy.data.objects[body]) for body in bodies]
+            places[other][row] = _found(other).evaluated_get(graph).matrix_world
+        values = [body_reader.shape_values(find(body)) for body in bodies]
         shapes.append(np.concatenate([np.zeros(0), *values]))
         yield row + 1, len(frames)
     rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
     untrimmed = places[""][0] @ rig.rest
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
-    arrays = [(body_reader.read(bpy.data.objects[body]), places[body][0]) for body in bodies]
+    arrays = [(body_reader.read(find(body)), places[body][0]) for body in bodies]
     character = rig_service.character(rig, places[""][0], arrays, unit)
-    clip = motion.clip(to_core(unit), bpy.data.objects[name].neuralocks_character.loop)
+    clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
     session.forget_motion(name)
     session.rigs[name] = SampledRig(rig, motion, character, clip, trim_of(untrimmed, name), key)
     session.readers[name] = reader
+
+
+def _found(name: str):
+    """The object of this full name, while frames are stepped."""
+    thing = find(name)
+    if thing is None:
+        raise NeuralocksError(f"{name}: it was deleted while the motion was sampled; start again")
+    return thing
 
 
 class stepping:
@@ -114,10 +120,10 @@ class stepping:
 
 def ensure(context, armature) -> SampledRig:
     """The sampled motion, sampled now if there is none or it is stale."""
-    found = session.rigs.get(armature.name)
+    found = session.rigs.get(armature.name_full)
     if found is None or found.stale or found.key != key_of(armature, context.scene):
         with stepping(context.scene):
             for _ in sample(context, armature):
                 pass
-        found = session.rigs[armature.name]
+        found = session.rigs[armature.name_full]
     return found

@@ -24,7 +24,12 @@ class LiveHair:
         groom: strands in bind world space [m].
         character: whose head carries them.
         model: the network.
+
+    Attributes:
+        made_of: whatever tells its maker that it must be made again.
     """
+
+    made_of: object = None
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel):
         self.groom, self.character, self.model = groom, character, model
@@ -36,6 +41,7 @@ class LiveHair:
         self._sampler: BoundarySampler | None = None
         self._clip: Clip | None = None
         self._points = np.empty((len(groom.points), 3), np.float32)
+        self._shown: object = b""
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
         # About the head's own place, so that coordinates far from the origin cost no digits.
         self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
@@ -45,6 +51,7 @@ class LiveHair:
         """Read the body's history from this clip from now on."""
         if clip is not self._clip:
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
+            self._resolver = None
 
     def points(
         self,
@@ -71,6 +78,10 @@ class LiveHair:
         vector = self._sampler.vectors([time], material, strength, joints[None])[0]
         self._session.anchor(self._sampler.held_bind(material))
         matrix = to_local @ self.character.carrying(joints)
+        wanted = vector.tobytes(), matrix.tobytes(), joints.tobytes() if resolve else b""
+        if wanted == self._shown:
+            return self._points
+        self._shown = b""  # until it is done
         linear = np.ascontiguousarray(matrix[:3, :3].T, np.float32)
         origin = np.empty((min(ROWS, len(self._points)), 3), np.float32)
         origin[:] = matrix[:3, :3] @ self._centre.astype(float) + matrix[:3, 3]
@@ -84,11 +95,26 @@ class LiveHair:
                 out += origin[: len(out)]
 
         if resolve and self.character.body is not None:
-            if self._resolver is None:
-                self._resolver = Resolver(self.character, self._strands)
-            shape = self._clip.shape_at([time])[0]
-            free = self._resolver.displacement(self._session.displacement(vector), joints, shape)
+            free = self._free(vector, joints, self._clip.shape_at([time])[0])
             self.model.by_chunk(lambda strands: place(strands, free[strands]), len(free))
         else:
             self._session.each(vector, place)
+        self._shown = wanted
         return self._points
+
+    def _free(self, vector: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Displacement (S, 24, 3) [m] of the network, pushed out of the body."""
+        if self._resolver is None:
+            self._resolver = Resolver(self.character, self._strands, self._clip)
+        result = np.empty(self._strands.rest.shape, np.float32)
+        body, hits = self._resolver.posed(joints, shape), []
+
+        def look(strands: slice, displacement: np.ndarray) -> None:
+            result[strands] = displacement
+            if body is not None:
+                hits.append(self._resolver.hits(displacement, strands, body))
+
+        self._session.each(vector, look)
+        if hits:
+            self._resolver.push(result, np.sort(np.concatenate(hits)), body)
+        return result

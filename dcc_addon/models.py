@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Model files as the panel names them."""
+
+import os
+
+import bpy
+
+from neuralocks_core import model as model_file
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.runtime import StrandModel
+
+from .session import session
+
+
+def load_model(path: str) -> StrandModel:
+    """The model of a path in the file, or the shipped one; read once while it does not change."""
+    found = model_path(path)
+    stamp = (os.path.getmtime(found), os.path.getsize(found)) if os.path.isfile(found) else None
+    kept = session.models.get(found)
+    if kept is None or kept[0] != stamp:
+        kept = session.models[found] = stamp, StrandModel.load(found)
+    return kept[1]
+
+
+def model_path(path: str, kind: str = "strands") -> str:
+    """Absolute path of a model named in the panel; the shipped one where it is empty."""
+    if not path.strip():
+        return str(model_file.shipped(kind))
+    if path.startswith("//") and not bpy.data.filepath:
+        raise NeuralocksError(
+            f"{path}: a path relative to a file that is not saved; save the file or choose the model again"
+        )
+    return bpy.path.abspath(path)

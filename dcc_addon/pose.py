@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pose that is drawn, of a sampled armature."""
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+from .services.axes import to_core
+from .services.motion import TOLERANCE, similar
+from .session import session
+
+
+def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
+    """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for
+    bit as the bake reads them.
+    """
+    evaluated = armature.evaluated_get(graph)
+    if not evaluated.is_evaluated:
+        raise NeuralocksError(
+            f"{armature.name_full}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
+        )
+    reader = session.readers.get(armature.name_full)
+    if reader is None or len(armature.pose.bones) != len(sampled.rig.bones):
+        session.forget_motion(armature.name_full)
+        raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
+    world = reader.world(evaluated) @ sampled.trim
+    row = sampled.motion.row(scene.frame_current_final)
+    if row is not None:
+        # Only the joints that hair is moved by: hair bones of their own, say, may be live themselves.
+        read = sorted(set(sampled.character.humanoid.values()))
+        if np.abs(world[read] - sampled.world[row, read]).max() < TOLERANCE:
+            return sampled.clip.joints[row]
+        if moved:
+            sampled.stale = session.wanting = True
+    drawn = to_core(sampled.motion.metres_per_unit) @ world
+    head = sampled.character.head
+    drawn[head] = similar(drawn[head], armature.name_full)
+    return drawn

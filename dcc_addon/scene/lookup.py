@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects by full name, which tells a linked object from a local one of the same name."""
+
+import bpy
+
+
+def find(name_full: str):
+    """The object of this full name, or None."""
+    thing = bpy.data.objects.get(name_full)
+    if thing is not None and thing.name_full == name_full:
+        return thing
+    return next((o for o in bpy.data.objects if o.name_full == name_full), None)
