@@ -116,7 +116,7 @@ def train_dynamic(
     model = RigModel(rig.chains, spec, layers, input_limits(spec), max_angle, training=training)
     if report_poses:
         say(950, 1000, "comparing on held-out motion")
-        model.report.update(static_report(model, rig, material, report_poses, seed + 1))
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, optimised=16))
         model.report.update(motion_report(rig, material, {"dynamic network": model}))
     return model
 
