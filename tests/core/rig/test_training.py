@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Energy, simulation and training of rigs: exact where it can be, better than rigid where it is learnt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 
 torch = pytest.importorskip("torch")
 
+from neuralocks_core.character import Body  # noqa: E402
 from neuralocks_core.reference.chains import ChainSolver  # noqa: E402
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones  # noqa: E402
-from neuralocks_core.rig import find_chains  # noqa: E402
+from neuralocks_core.rig import find_chains, rig_spec  # noqa: E402
 from neuralocks_core.rig.kinematics import (  # noqa: E402
     bone_ends,
     half_turns,
@@ -18,7 +22,9 @@ from neuralocks_core.rig.kinematics import (  # noqa: E402
 )
 from neuralocks_core.rig.rigging import HairRig  # noqa: E402
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns  # noqa: E402
-from tests.core.rig.builders import character, tail  # noqa: E402
+from neuralocks_core.training.rig_motion import SPRINGS, motion_report  # noqa: E402
+from neuralocks_core.training.rig_poses import PosePool, rest_distances  # noqa: E402
+from tests.core.rig.builders import character, random_model, tail  # noqa: E402
 
 
 def branched() -> HairRig:
@@ -101,3 +107,67 @@ def test_spring_bones_rest_and_depend_on_the_frame_rate():
         heads[0, :, 0, 3] = 0.2 * np.sin(8 * np.arange(rate) / rate)
         ends.append(spring_bones(chains, heads, 1 / rate, SpringSettings())[0, -1])
     assert np.abs(ends[0] - ends[1]).max() > 1e-3
+
+
+def with_balls() -> tuple[HairRig, float]:
+    """A body of two balls, around the head and in the chest, and a hanging chain; and their radius."""
+    rig = branched()
+    who, radius = rig.character, 0.12
+    ball = trimesh.creation.icosphere(3, radius)
+    names = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
+    points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
+    faces = np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
+    joints = np.repeat([names.index("head"), names.index("chest")], len(ball.vertices))[:, None]
+    return replace(rig, character=replace(who, body=Body(points, faces, joints, np.ones_like(joints, float)))), radius
+
+
+def test_depths_in_the_body_are_those_of_balls():
+    """Wherever a point lies: a nearest plane or a part of the surface alone may take outside for inside."""
+    rig, radius = with_balls()
+    pool = PosePool(rig, 4, np.random.default_rng(0), whole=True)
+    rng = np.random.default_rng(1)
+    count = len(pool._bodies[0]) // 2
+    points = rng.uniform(-0.4, 0.4, (4, 4000, 3)).astype(np.float32)
+    found = pool.distances(np.arange(4), points)
+    for pose in range(4):
+        centres = [pool._bodies[pose][:count].mean(0), pool._bodies[pose][count:].mean(0)]
+        wanted = np.min([np.linalg.norm(points[pose] - c, axis=1) - radius for c in centres], axis=0)
+        assert (found[pose][wanted > 1e-3] > 0).all()
+        inside = wanted < -1e-3
+        assert inside.sum() > 50 and np.abs(found[pose] - wanted)[inside].max() < 2e-3
+
+
+def test_margins_are_those_at_rest_at_most():
+    """What rests on the body as modelled, whatever shapes it may take, is not pushed away."""
+    rig, radius = with_balls()
+    centre = np.array([0, 0.07, 0.02])  # of the head's ball, from the head joint
+    points = centre + np.array([[radius + d, 0, 0] for d in (-0.004, 0.003, 0.02)])
+    rig = replace(rig, points=points, weights=rig.weights[:3])
+    np.testing.assert_allclose(rest_distances(rig, points), [-0.004, 0.003, 0.02], atol=1e-3)
+    np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
+
+
+def test_renewed_poses_take_the_place_of_the_oldest():
+    """And the others stay."""
+    rig, _ = with_balls()
+    pool = PosePool(rig, 8, np.random.default_rng(0))
+    before = pool.relative.copy()
+    for changed in ([0, 1, 2], [3, 4, 5], [6, 7, 0]):
+        kept = np.setdiff1d(np.arange(8), changed)
+        pool.renew(3)
+        same = (pool.relative == before).all(axis=(1, 2, 3))
+        assert same[kept].all() and not same[changed].any()
+        before = pool.relative.copy()
+
+
+def test_a_teleport_and_other_frame_rates():
+    """Spring bones are flung and depend on the rate; a function of held poses knows neither."""
+    model = random_model(spec=rig_spec())
+    who = character([row for c in range(4) for row in tail(f"hair_{c}", 5, at=(0.1 * np.cos(c), 1.6, 0.1 * np.sin(c)))])
+    rig = HairRig(who, model.chains, np.zeros((0, 3)), np.zeros((0, 17)), np.zeros((0, 3), int))
+    report = motion_report(rig, RigMaterial(), {"network": model}, kinds=("turn",))
+    assert report["teleport"]["network"] == {"flung_mm": 0.0, "seconds": 0.0}
+    assert report["teleport"][SPRINGS]["flung_mm"] > 20 and report["teleport"][SPRINGS]["seconds"] > 0.1
+    assert report["rates"]["network"]["24 fps"] < 0.5 < report["rates"][SPRINGS]["24 fps"]
+    assert report["cost"]["network"]["bytes_carried_on"] == 0
+    assert set(report["motion_error"]) > {"network", SPRINGS}
