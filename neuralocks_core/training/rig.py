@@ -18,14 +18,14 @@ from neuralocks_core.training.rig_network import TinyNet
 from neuralocks_core.training.rig_poses import PosePool
 from neuralocks_core.training.rig_report import static_report
 
-COLLIDING = 160
+COLLIDING = 96
 """Hair vertices that collide in one step, drawn anew: finding the nearest body is half of a step's time."""
 _POOL = 512
-"""Poses to draw from. Each step draws `batch` of them and renews one, so none is seen more than some thirty times:
-with a fixed pool the hair kept clear of the bodies that it knew, and went twice as deep into others."""
+"""Poses to draw from. Each step draws `batch` of them, and every other step renews one: with a fixed pool the hair kept
+clear of the bodies that it knew, and went twice as deep into others."""
 ROOM = 0.006
-"""Kept from the body over the material's margin while learning [m]. A network that cannot see the body's shape, nor
-hit the mark to the millimetre, goes half as deep into it for that."""
+"""Kept from the body over the material's margin while learning [m]: the network cannot see the body's shape, nor hit the
+mark to the millimetre, and so goes less deep into the body."""
 Progress = Callable[[int, int, str], None]
 
 
@@ -69,7 +69,7 @@ def train_static(
         nonlocal renewed
         renewed += 1
         if renewed % 16 == 0:
-            pool.renew(16)
+            pool.renew(8)
         poses = rng.integers(0, pool.count, batch)
         gravity = pool.gravity(poses)
         turns = net(torch.as_tensor(pool.features(spec, poses, gravity)))

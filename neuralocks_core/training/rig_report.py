@@ -9,7 +9,7 @@ from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, bounded_
 from neuralocks_core.training.rig_poses import PosePool, rest_distances
 
 
-def static_report(model, rig, material: RigMaterial, count: int, seed: int, progress=None, optimised: int = 64) -> dict:
+def static_report(model, rig, material: RigMaterial, count: int, seed: int, progress=None, optimised: int = 32) -> dict:
     """The report of a model over held-out poses and body shapes.
 
     Args:
