@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Quality of the rig models that are shipped, beside spring bones, in one run: held poses, motion, frame rates, teleports.
+
+    python benchmarks/rig_quality.py [MODEL...] [--poses 1000] [--seed 1] [--json]
+
+Poses, body shapes and motion are held out: their seed is not that of training, and the scripted clips are in no training.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from neuralocks_core import model as model_file  # noqa: E402
+from neuralocks_core.rig import RigModel  # noqa: E402
+from neuralocks_core.training.rig_energy import RigMaterial  # noqa: E402
+from neuralocks_core.training.rig_motion import motion_report  # noqa: E402
+from neuralocks_core.training.rig_report import static_report  # noqa: E402
+from usd.rig_stage import read_rigged_hair  # noqa: E402
+
+EXAMPLE = ROOT / "examples" / "mesh_hair"
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    shipped = [Path(model_file.shipped("rig")), EXAMPLE / "quasi_static.neuralocks"]
+    parser.add_argument("models", nargs="*", type=Path, default=shipped, help="the two shipped ones if left out")
+    parser.add_argument("--character", type=Path, default=EXAMPLE / "character.usda")
+    parser.add_argument("--poses", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    rig = read_rigged_hair(options.character, all_shapes=True).rig
+    models = {path.stem: RigModel.load(path) for path in options.models}
+    material = RigMaterial(**next(iter(models.values())).training["material"])
+    held = {name: static_report(m, rig, material, options.poses, options.seed) for name, m in models.items()}
+    motion = motion_report(rig, material, models)
+    if options.json:
+        print(json.dumps({"held": held, "motion": motion}, indent=1))
+        return
+    print("| held poses | energy | of it collision | inside % | deeper than 5 mm, % of poses | worst mm |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    first = next(iter(held))
+    for name, report in held.items():
+        _held_row(name, report, "network")
+    _held_row("direct optimisation", held[first], "optimised")
+    _held_row("carried rigidly", held[first], "rigid")
+    print(
+        "\n| motion | error | motion ratio | 24 fps mm | 30 fps mm | flung by a teleport mm | for s | bytes carried on |"
+    )
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for name, error in motion["motion_error"].items():
+        row = [name, error, motion["motion_ratio"][name]]
+        if name in motion["rates"]:
+            row += [*motion["rates"][name].values(), *motion["teleport"][name].values()]
+            row += [motion["cost"][name]["bytes_carried_on"]]
+        print("| " + " | ".join(map(str, row + ["-"] * (8 - len(row)))) + " |")
+
+
+def _held_row(name: str, report: dict, key: str) -> None:
+    depth = report[f"penetration_{key}"]
+    values = [f"{report['energy'][key]:.3f}", f"{report['energy_collision'][key]:.3f}", f"{depth['percent']:.3f}"]
+    values += [f"{depth['percent_of_poses_deeper_than_5_mm']:.1f}", f"{depth['worst_mm']:.1f}"]
+    print(f"| {name} ({depth['poses']} poses) | " + " | ".join(values) + " |")
+
+
+if __name__ == "__main__":
+    main()
