@@ -28,7 +28,7 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     if row is not None:
         # Only the joints that hair is moved by: hair bones of their own, say, may be live themselves.
         read = sorted(set(sampled.character.humanoid.values()))
-        if np.abs(world[read] - sampled.world[row, read]).max() < TOLERANCE:
+        if np.abs(world[read] - sampled.drawn[row, read]).max() < TOLERANCE:
             return sampled.clip.joints[row]
         if moved:
             sampled.stale = session.wanting = True

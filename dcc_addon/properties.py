@@ -4,7 +4,6 @@
 import bpy
 from bpy.props import (
     BoolProperty,
-    EnumProperty,
     FloatProperty,
     IntProperty,
     PointerProperty,
@@ -201,11 +200,6 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     train_minutes: FloatProperty(
         name="Minutes", description="How long a training may take", default=15.0, min=0.05, max=720.0
-    )
-    train_for: EnumProperty(
-        name="Train",
-        items=[("STRANDS", "Strands", "A model for strand hair"), ("RIG", "Bones", "A model for hair bones")],
-        default="STRANDS",
     )
 
 

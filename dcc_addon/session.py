@@ -31,6 +31,9 @@ class SampledRig:
     stale: bool = False
     """Whether the animation has changed since."""
 
+    drawn: np.ndarray = None
+    """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
+
     @cached_property
     def world(self) -> np.ndarray:
         """Joints (T, J, 4, 4) in Blender's world space."""

@@ -56,7 +56,12 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
     bl_label = "Train for This Character"
     bl_options = {"REGISTER"}
 
-    kind: EnumProperty(items=[("strands", "Strands", "Strand hair"), ("rig", "Bones", "Hair bones")], default="strands")
+    kind: EnumProperty(
+        name="Kind",
+        description="What the model is for",
+        items=[("strands", "Strands", "Strand hair"), ("rig", "Bones", "Hair bones")],
+        default="strands",
+    )
 
     def work(self, context):
         running = job()

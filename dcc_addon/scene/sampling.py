@@ -89,7 +89,9 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     character = rig_service.character(rig, places[""][0], arrays, unit)
     clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
     session.forget_motion(name)
-    session.rigs[name] = SampledRig(rig, motion, character, clip, trim_of(untrimmed, name), key)
+    trim = trim_of(untrimmed, name)
+    drawn = (joints @ trim).astype(np.float32)
+    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, drawn=drawn)
     session.readers[name] = reader
 
 

@@ -107,14 +107,10 @@ class LiveHair:
         if self._resolver is None:
             self._resolver = Resolver(self.character, self._strands, self._clip)
         result = np.empty(self._strands.rest.shape, np.float32)
-        body, hits = self._resolver.posed(joints, shape), []
 
-        def look(strands: slice, displacement: np.ndarray) -> None:
+        def keep(strands: slice, displacement: np.ndarray) -> None:
             result[strands] = displacement
-            if body is not None:
-                hits.append(self._resolver.hits(displacement, strands, body))
 
-        self._session.each(vector, look)
-        if hits:
-            self._resolver.push(result, np.sort(np.concatenate(hits)), body)
+        self._session.each(vector, keep)
+        self._resolver.apply(result, joints, shape, self.model.map)
         return result

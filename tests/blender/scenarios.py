@@ -114,6 +114,34 @@ def one_result(folder: Path) -> None:
     assert skin.name in bpy.data.objects
 
 
+def out_of_the_body(folder: Path) -> None:
+    """Keep out of Body and a looped range: live equals the bake, and each makes a difference."""
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 60, length=0.4)
+    _live(rig, strands)
+    free = {f: _at(strands, f) for f in (2, 13, 24)}
+    strands.neuralocks_hair.resolve = True
+    shown = {f: _at(strands, f) for f in (13, 2, 24)}
+    assert not _messages(), _messages()
+    assert max(_apart(free[f], shown[f]) for f in free) > 1e-4, "no hair was in the body"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert _apart(_baked(folder / "out.usdc", "/Character/Hair_Hair", f), points) < SAME
+
+    strands.neuralocks_hair.resolve = False
+    assert _apart(_at(strands, 2), free[2]) == 0.0
+    rig.neuralocks_character.loop = True
+    shown = {f: _at(strands, f) for f in (2, 13, 24)}
+    assert _apart(free[2], shown[2]) > 1e-4, "the second frame must remember the end of the range"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "loop.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert _apart(_baked(folder / "loop.usdc", "/Character/Hair_Hair", f), points) < SAME
+    rig.neuralocks_character.loop = False
+    assert _apart(_at(strands, 2), free[2]) == 0.0
+
+
 def blender_export(folder: Path) -> None:
     """A bake of the scene as Blender itself exports it equals the live view."""
     if not hasattr(bpy.ops.wm, "usd_export") or not getattr(bpy.app.build_options, "usd", False):
@@ -525,3 +553,139 @@ def training(folder: Path) -> None:
     strands.neuralocks_hair.live = True
     bpy.context.scene.frame_set(9)
     assert "Hair" not in _messages(), _messages()
+
+
+def undo(folder: Path) -> None:
+    """Undo and redo after Live, a slider, a bake with its cache and keyframes: the scene is whole, the view right."""
+    if bpy.app.version < (4, 0):
+        return  # without a window, older ones keep no undo steps
+    push, back, again = bpy.ops.ed.undo_push, bpy.ops.ed.undo, bpy.ops.ed.redo
+
+    def own():
+        return bpy.data.objects["Hair"]
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    scene = bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    strands.neuralocks_hair.model = MODEL
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    scene.frame_set(9)
+    push(message="groomed")
+    groomed = scenes.points(own())
+    own().neuralocks_hair.live = True
+    push(message="live")
+    live = scenes.points(own())
+    own().neuralocks_hair.motion = 0.2
+    push(message="slider")
+    slow = scenes.points(own())
+    assert _apart(live, groomed) > 0.01 and _apart(slow, live) > 0.001
+
+    back()
+    assert own().neuralocks_hair.motion == 1.0 and _apart(scenes.points(own()), live) == 0.0
+    back()
+    assert not own().neuralocks_hair.live and "neuralocks_rest" not in own().data.attributes
+    assert _apart(scenes.points(own()), groomed) == 0.0
+    again()
+    assert _apart(scenes.points(own()), live) == 0.0
+    again()
+    assert _apart(scenes.points(own()), slow) == 0.0
+    again_at = bpy.context.scene
+    again_at.frame_set(14)
+    after = scenes.points(own())
+
+    if getattr(bpy.app.build_options, "usd", True):
+        push(message="before the bake")
+        assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+        push(message="attached")
+        assert "Neuralocks Cache" in own().modifiers and not own().neuralocks_hair.live
+        back()
+        assert "Neuralocks Cache" not in own().modifiers and own().neuralocks_hair.live
+        bpy.context.scene.frame_set(14)
+        assert _apart(scenes.points(own()), after) == 0.0
+    own().neuralocks_hair.live = False
+    own_points = np.array([p.position for p in own().data.points])
+    own().neuralocks_hair.live = True
+    own().neuralocks_hair.live = False
+    assert _apart(np.array([p.position for p in own().data.points]), own_points) == 0.0
+    assert not _messages(), _messages()
+
+
+def linked(folder: Path) -> None:
+    """A linked character: clear words; an override plays its bake; local curves are live; nothing is lost."""
+    if not hasattr(bpy.types.ID, "override_hierarchy_create") or bpy.app.version < (4, 0):
+        return
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 20)
+    scene = bpy.context.scene
+    character = bpy.data.collections.new("Character")
+    scene.collection.children.link(character)
+    for thing in list(scene.collection.objects):
+        character.objects.link(thing)
+        scene.collection.objects.unlink(thing)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    scenes.empty()
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    scene = bpy.context.scene
+    scene.collection.children.link(bpy.data.collections["Character"])
+    rig, strands = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    groomed = scenes.points(strands)
+    _live(rig, strands)
+    _at(strands, 9)
+    message = next(text for name, text in _messages().items() if "Hair" in name)
+    assert "linked" in message and "Make Local" in message, _messages()
+    strands.neuralocks_hair.live = False
+    for refused in (bpy.ops.neuralocks.bake_attach, bpy.ops.neuralocks.assign):
+        try:
+            refused()
+        except RuntimeError as error:
+            assert "linked from library.blend" in str(error), error
+        else:
+            raise AssertionError("what is done to linked data is not saved")
+    assert not strands.modifiers
+    assert _apart(_at(strands, 1), groomed) < 1e-6
+
+    bpy.data.collections["Character"].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    rig, strands = (
+        next(o for o in bpy.data.objects if o.type == kind and not o.library) for kind in ("ARMATURE", "CURVES")
+    )
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    strands.neuralocks_hair.armature, strands.neuralocks_hair.model = rig, MODEL
+    assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+    played = _at(strands, 9)
+    assert _apart(played, scenes.points(bpy.data.objects["Hair", str(bpy.data.libraries[0].filepath)])) > 0.01
+    assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+    strands.make_local()
+    strands.data.make_local()
+    _live(rig, strands)
+    assert _apart(_at(strands, 9), played) < SAME
+    assert not _messages(), _messages()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    strands = next(o for o in bpy.data.objects if o.type == "CURVES" and not o.library)
+    assert strands.neuralocks_hair.live and "neuralocks_rest" not in strands.data.attributes
+
+
+def words(_folder: Path) -> None:
+    """Every operator is found by Blender's search, and everything has a name and a tooltip."""
+    import dcc_addon
+    from dcc_addon import operators, properties
+
+    assert dcc_addon.bl_info["name"] == "Neuralocks"
+    for cls in operators.CLASSES:
+        operator = getattr(bpy.ops.neuralocks, cls.bl_idname.split(".")[1])
+        described = operator.get_rna_type()
+        assert described.name == cls.bl_label and "INTERNAL" not in getattr(cls, "bl_options", ())
+        assert described.description and not described.description.endswith("."), cls.bl_idname
+        assert operator.poll(), "search hides what cannot run, and then nobody hears why"
+        for prop in described.properties:
+            assert prop.identifier == "rna_type" or prop.description, (cls.bl_idname, prop.identifier)
+    for cls in properties.CLASSES:
+        for prop in getattr(bpy.types, cls.__name__).bl_rna.properties:
+            if prop.identifier in cls.__annotations__:
+                assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
+                if prop.type == "ENUM":
+                    assert all(item.description for item in prop.enum_items), prop.identifier
