@@ -34,6 +34,8 @@ ROWS = {
     "displacement output (paper)": {"options": {"output": "displacement"}},
     "no lock codes": {"locks": False},
     "deep motion encoder": {"options": {"motion": "encoder"}},
+    "hidden layers scaled by the frame": {"options": {"motion": "modulated"}},
+    "AdamW for all weights": {"options": {"optimiser": "adamw", "rate": 3e-3}},
     "N = 30 single steps (paper)": {"spec": BoundarySpec(bins=(1,) * 30, taper=0.0)},
     "no taper": {"spec": replace(SPEC, taper=0.0)},
     "half the history": {"spec": replace(SPEC, bins=(1,) * 12 + (2,) * 8)},
@@ -73,9 +75,9 @@ def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollo
         torch.manual_seed(options.seed)
         net = StrandNet(spec.size, motion=options.motion)
         normalise(net, *samples(banks["rollouts"]), spec.slices["history"], options.static)
-        *_, state = regress(banks["rollouts"], net, options, list)
+        *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
-        print(f"| {row} | {state['step']} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
+        print(f"| {row} | {state.step} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
 
 
 def main() -> None:

@@ -72,7 +72,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
         net = StrandNet(own.spec.size, motion=options.motion)
         history = own.spec.slices["history"]
         normalise(net, *teacher.samples(), history, options.static)
-        for _ in teacher.train(net, None):
+        for _ in teacher.train(net, options.optimisers(net)):
             pass
         card = measure(net, held, options.output, history, options.supported).to_json()
         cells = " | ".join(f"{card[name]:.3g}" for name in names)

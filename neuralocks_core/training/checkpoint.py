@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +15,25 @@ import torch
 from neuralocks_core.errors import NeuralocksError
 
 
-def save(path: Path, meta: dict, modules: dict[str, torch.nn.Module], optimiser: dict | None = None) -> None:
-    """Write modules, an optimiser's state_dict and JSON values.
+def save(
+    path: Path, meta: dict, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()
+) -> None:
+    """Write modules, the state of optimisers and JSON values.
 
     Args:
         path: ends in `.npz`.
         meta: plain JSON values.
         modules: by name; all their parameters and buffers are kept.
-        optimiser: `state_dict()` of Adam or AdamW.
+        optimisers: whose state is tensors and numbers, as that of all in torch.
     """
     arrays = {"meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)}
     for name, module in modules.items():
         for key, value in module.state_dict().items():
             arrays[f"module/{name}/{key}"] = value.detach().cpu().numpy()
-    for index, values in (optimiser or {}).get("state", {}).items():
-        for key, value in values.items():
-            arrays[f"optimiser/{index}/{key}"] = torch.as_tensor(value).detach().cpu().numpy()
+    for place, optimiser in enumerate(optimisers):
+        for index, values in optimiser.state_dict()["state"].items():
+            for key, value in values.items():
+                arrays[f"optimiser/{place}/{index}/{key}"] = torch.as_tensor(value).detach().cpu().numpy()
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(".tmp")
     with open(temporary, "wb") as file:
@@ -39,8 +43,10 @@ def save(path: Path, meta: dict, modules: dict[str, torch.nn.Module], optimiser:
     os.replace(temporary, path)
 
 
-def load(path: Path, modules: dict[str, torch.nn.Module], optimiser: torch.optim.Optimizer | None = None) -> dict:
-    """Fill modules (and the optimiser) from a checkpoint; returns its JSON values.
+def load(
+    path: Path, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()
+) -> dict:
+    """Fill modules (and optimisers) from a checkpoint; returns its JSON values.
 
     Raises:
         NeuralocksError: it is damaged, or belongs to other settings.
@@ -58,11 +64,11 @@ def load(path: Path, modules: dict[str, torch.nn.Module], optimiser: torch.optim
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None
-    if optimiser is not None:
+    for place, optimiser in enumerate(optimisers):
         state: dict[int, dict] = {}
         for name, value in arrays.items():
-            if name.startswith("optimiser/"):
-                _, index, key = name.split("/")
+            if name.startswith(f"optimiser/{place}/"):
+                index, key = name.split("/")[2:]
                 state.setdefault(int(index), {})[key] = torch.from_numpy(value)
         if state:
             optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})

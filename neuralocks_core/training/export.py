@@ -23,18 +23,22 @@ def strand_graphs(
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
-    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256);
-    - `tail.onnx`: `strand_part` (S, 256), `frame_part` (1, 256), `anchor` (S, 72) offsets of the held bind
-    pose, `edges`
+    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, P), P = 256, or 768 where the frame also scales both hidden
+      layers;
+    - `tail.onnx`: `strand_part` (S, 256), `frame_part` (1, P), `anchor` (S, 72) offsets of the held bind pose, `edges`
       (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
     """
+    into = None if autoencoder.into is None else _folded(autoencoder.into, autoencoder.mean, autoencoder.scale)
     encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale), *autoencoder.encoder[1:]]
     frame = _folded(net.frame, net.frame_mean, net.frame_scale)
     deep = None
     if net.encoder is not None:
         deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale), *net.encoder[1:]]
+        # What scales the hidden layers has no linear part: zeros beside it.
+        wider = net.encoder[-1].out_features - net.frame.out_features
+        frame = (np.pad(frame[0], ((0, 0), (0, wider))), np.pad(frame[1], (0, wider)))
     return {
-        "encoder.onnx": _encoder_graph(encoder),
+        "encoder.onnx": _encoder_graph(encoder, into),
         "strand.onnx": _linear_graph("strand", _folded(net.strand, net.strand_mean, net.strand_scale)),
         "frame.onnx": _linear_graph("frame", frame, deep),
         "tail.onnx": _tail_graph(net, output),
@@ -111,9 +115,12 @@ class _Graph:
         return model.SerializeToString(deterministic=True)
 
 
-def _encoder_graph(layers) -> bytes:
+def _encoder_graph(layers, into) -> bytes:
     graph = _Graph("encoder")
-    graph.mlp("shape", layers, "code")
+    if into is None:
+        graph.mlp("shape", layers, "code")
+    else:
+        graph.node("Add", [graph.linear("shape", into, "flat"), graph.mlp("shape", layers, "bent")], "code")
     return graph.finish({"shape": ("S", 72)}, {"code": ("S", len(_weights(layers[-1])[1]))})
 
 
@@ -132,8 +139,14 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
     runtime's chunks."""
     graph, hidden, width = _Graph("tail"), net.middle.in_features, net.out.out_features
     count = width // 3
-    graph.node("Add", ["strand_part", "frame_part"], "sum")
-    graph.mlp(graph.node("Relu", ["sum"], "first"), [net.middle, nn.ReLU(), net.out], "offsets")
+    parts = ["frame_part"]
+    if net.motion == "modulated":
+        parts = ["added", "factor1", "factor2"]
+        graph.nodes.append(graph.helper.make_node("Split", ["frame_part"], parts, axis=1))
+        graph.constant("one", np.float32(1.0))
+    first = graph.node("Relu", [graph.node("Add", ["strand_part", parts[0]], "sum")], "first")
+    second = graph.node("Relu", [graph.linear(_scaled(graph, first, parts[1:2]), net.middle)], "second")
+    graph.linear(_scaled(graph, second, parts[2:3]), net.out, "offsets")
     free = np.repeat(np.arange(count) >= 2, 3).astype(np.float32)
     graph.node("Sub", ["offsets", "anchor"], "change")
     graph.node(
@@ -156,8 +169,16 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
         graph.node("MatMul", ["d", graph.constant("running", running)], "displacement")
     inputs = {
         "strand_part": ("S", hidden),
-        "frame_part": (1, hidden),
+        "frame_part": (1, len(parts) * hidden),
         "anchor": ("S", width),
         "edges": ("S", width),
     }
     return graph.finish(inputs, {"offsets": ("S", width), "displacement": ("S", width)})
+
+
+def _scaled(graph: _Graph, value: str, factor: list[str]) -> str:
+    """`value * (1 + factor)`, or the value where there is no factor."""
+    if not factor:
+        return value
+    more = graph.node("Add", [factor[0], "one"], f"{factor[0]}.more")
+    return graph.node("Mul", [value, more], f"{value}.scaled")

@@ -12,6 +12,7 @@ import torch
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moments import MOMENTS, MomentPool
 from neuralocks_core.training.networks import StrandNet
@@ -51,9 +52,9 @@ class RolloutLesson:
         """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
         return samples(self.bank)
 
-    def train(self, net: StrandNet, resume) -> Iterator[dict]:
+    def train(self, net: StrandNet, optimisers, **since) -> Iterator[Descended]:
         """See `regression.regress`."""
-        return regress(self.bank, net, self.options, self.farm.files, resume=resume)
+        return regress(self.bank, net, self.options, optimisers, self.farm.files, **since)
 
     def told(self) -> str:
         """What there is to learn from, in a word."""
@@ -90,9 +91,9 @@ class MomentLesson:
             frames[:, self.pool.scene.spec.slices["material"]] = 0
         return np.concatenate([inputs[:: max(1, len(inputs) // 500)] for inputs in self.inputs]), frames
 
-    def train(self, net: StrandNet, resume) -> Iterator[dict]:
+    def train(self, net: StrandNet, optimisers, **since) -> Iterator[Descended]:
         """See `selfsupervised.train_on_moments`."""
-        return train_on_moments(self.pool, self.inputs, net, self.options, resume=resume)
+        return train_on_moments(self.pool, self.inputs, net, self.options, optimisers, **since)
 
     def told(self) -> str:
         """What there is to learn from, in a word."""

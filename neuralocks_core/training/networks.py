@@ -9,7 +9,9 @@ from torch import Tensor, nn
 
 VERTICES = 24
 OUTPUTS = ("direction", "displacement")
-MOTIONS = ("linear", "encoder")
+MOTIONS = ("linear", "encoder", "modulated")
+CODES = slice(2, 66)
+"""Where the strand's and its lock's code lie among the strand inputs."""
 
 
 class StrandNet(nn.Module):
@@ -26,9 +28,9 @@ class StrandNet(nn.Module):
         strand_size: uv 2, rest code 32, lock code 32, root normal 3, length 1.
         hidden: width of both hidden layers.
         outputs: 3 for each of the 24 vertices.
-        motion: `"linear"`, as in the paper, or `"encoder"`: a deeper map of the boundary vector is added to
-        the linear
-            one. It runs once per frame, so it costs nothing per strand.
+        motion: `"linear"`, as in the paper; `"encoder"`: a deeper map of the boundary vector is added to the linear
+            one; `"modulated"`: that map also scales the units of both hidden layers. It runs once per frame, so it
+            costs next to nothing per strand.
     """
 
     def __init__(
@@ -51,21 +53,23 @@ class StrandNet(nn.Module):
         for parameter in (self.strand.weight, self.frame.weight, self.frame.bias):
             nn.init.uniform_(parameter, -bound, bound)
         self.encoder = None
-        if motion == "encoder":
+        if motion != "linear":
             self.encoder = nn.Sequential(
                 nn.Linear(frame_size, hidden),
                 nn.ReLU(),
                 nn.Linear(hidden, hidden),
                 nn.ReLU(),
-                nn.Linear(hidden, hidden),
+                nn.Linear(hidden, 3 * hidden if motion == "modulated" else hidden),
             )
         self.middle = nn.Linear(hidden, hidden)
         self.out = nn.Linear(hidden, outputs)
-        with (
-            torch.no_grad()
-        ):  # hair starts at rest: zero offsets are both the groom and a direction that exists
+        with torch.no_grad():
+            # Hair starts at rest: zero offsets are both the groom and a direction that exists.
             self.out.weight.mul_(0.1)
             self.out.bias.zero_()
+            if motion == "modulated":
+                self.encoder[-1].weight.mul_(0.1)
+                self.encoder[-1].bias.zero_()
         for name, size in (("strand", strand_size), ("frame", frame_size)):
             self.register_buffer(f"{name}_mean", torch.zeros(size))
             self.register_buffer(f"{name}_scale", torch.ones(size))
@@ -96,6 +100,10 @@ class StrandNet(nn.Module):
             # What never varied was never learned: reading it later could only add noise.
             floor = 1e-5 * (1.0 + mean.abs())
             scale = torch.where(std > floor, 1.0 / std.clamp_min(1e-12), torch.zeros_like(std))
+            if name == "strand":
+                # A code's last components tell hairs of one groom apart; blown up to the size of the first, they
+                # would throw a groom that was not trained on far outside.
+                scale[CODES] = scale[CODES].clamp_max(50.0 / float(std[CODES].max().clamp_min(1e-9)))
             if name == "frame":
                 mean[history] = 0.0  # a held pose is exactly zero here and stays so
                 rms = samples[:, history].square().mean(0).sqrt()
@@ -109,15 +117,24 @@ class StrandNet(nn.Module):
         return self.strand((strands - self.strand_mean) * self.strand_scale)
 
     def frame_part(self, frames: Tensor) -> Tensor:
-        """First layer, body part and bias: (..., frame_size) -> (..., hidden)."""
+        """First layer, body part and bias: (..., frame_size) -> (..., hidden), or (..., 3 hidden) with the factors of
+        both hidden layers behind it.
+        """
         normal = (frames - self.frame_mean) * self.frame_scale
         part = self.frame(normal)
-        return part if self.encoder is None else part + self.encoder(normal)
+        if self.encoder is None:
+            return part
+        deep = self.encoder(normal)
+        return deep + nn.functional.pad(part, (0, deep.shape[-1] - part.shape[-1]))
 
     def tail(self, strand_part: Tensor, frame_part: Tensor) -> Tensor:
         """All that is left per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
-        hidden = torch.relu(strand_part + frame_part)
-        return self.out(torch.relu(self.middle(hidden)))
+        added, *factors = frame_part.split(strand_part.shape[-1], dim=-1)
+        first = torch.relu(strand_part + added)
+        if not factors:
+            return self.out(torch.relu(self.middle(first)))
+        second = torch.relu(self.middle(first * (1 + factors[0])))
+        return self.out(second * (1 + factors[1]))
 
     def forward(self, strands: Tensor, frames: Tensor) -> Tensor:
         """Offsets for every frame and strand.

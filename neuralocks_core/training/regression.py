@@ -1,23 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training on rollouts of our own solver: positions, frame differences and the body they must stay out of.
 
-The paper's detached inertia term (its section 3.3.5) is an iteration that diverges for weakly damped hair;
-here each step is pulled to
-where the converged solver went instead. `selfsupervised.py` has the paper's way.
+The paper's detached inertia term (its section 3.3.5) is an iteration that diverges for weakly damped hair; here each
+step is pulled to where the converged solver went instead. `selfsupervised.py` has the paper's way.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
@@ -36,11 +35,12 @@ class RegressionOptions:
         clips: rollouts in a step.
         moments: pairs of consecutive frames from each.
         strands: strands from each.
-        rate: AdamW's first step size, falling along a cosine.
+        rate: first step size, falling along a cosine.
+        optimiser: "muon" for the weight matrices (AdamW for the rest), or "adamw" for all.
         velocity: weight of the frame difference against the position, both in strand lengths.
         collision: weight of the depth under the target's body plane, in strand lengths.
         output: "direction" or "displacement".
-        motion: "linear" or "encoder", see StrandNet.
+        motion: "linear", "encoder" or "modulated", see StrandNet.
         static: learn without history (the quasi-static variant, and the baseline of equal budget).
         seed: of weights and batches.
         device: torch device.
@@ -51,14 +51,26 @@ class RegressionOptions:
     clips: int = 48
     moments: int = 4
     strands: int = 8
-    rate: float = 3e-3
-    velocity: float = 20.0
-    collision: float = 10.0
+    rate: float = 2e-3
+    optimiser: str = "muon"
+    velocity: float = 8.0
+    collision: float = 30.0
     output: str = "direction"
-    motion: str = "linear"
+    motion: str = "modulated"
     static: bool = False
     seed: int = 0
     device: str = "cpu"
+
+    def optimisers(self, net: nn.Module) -> list[torch.optim.Optimizer]:
+        """What trains `net`."""
+        decay = {"lr": self.rate, "weight_decay": 1e-4}
+        if self.optimiser == "adamw":
+            return [torch.optim.AdamW(net.parameters(), **decay)]
+        matrices = [p for p in net.parameters() if p.ndim == 2]
+        rest = [p for p in net.parameters() if p.ndim != 2]
+        # Steps as large as AdamW's, so that one rate does for both.
+        muon = torch.optim.Muon(matrices, adjust_lr_fn="match_rms_adamw", **decay)
+        return [muon, torch.optim.AdamW(rest, **decay)]
 
 
 class RolloutBank:
@@ -123,55 +135,32 @@ def regress(
     bank: RolloutBank,
     net: StrandNet,
     options: RegressionOptions,
+    optimisers: list[torch.optim.Optimizer],
     new_files: Callable[[], list[Path]],
     *,
-    resume: Callable[[torch.optim.Optimizer], dict] | None = None,
-    each: Callable[[dict], None] | None = None,
-) -> Iterator[dict]:
+    step: int = 0,
+    done: float = 0.0,
+) -> Iterator[Descended]:
     """Train `net` in place; yields what a caller may show, measure or save about every second.
 
     Args:
         bank: holds rollouts already; grows by what `new_files` gives.
-        net: normalised.
+        net: normalised, on `options.device`.
         options: see there.
+        optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
         new_files: the rollouts on disk by now.
-        resume: fills the optimiser from a checkpoint and returns its `{"step", "done"}`.
-        each: called with every batch's losses, for tests.
-
-    Yields:
-        `{"step", "done" (0..1), "losses": {name: value}, "optimiser": state}`.
+        step, done: where an earlier run stopped.
     """
-    net.to(options.device).train()
-    optimiser = torch.optim.AdamW(net.parameters(), lr=options.rate, weight_decay=1e-4)
-    step, before = 0, 0.0
-    if resume is not None:
-        state = resume(optimiser)
-        step, before = int(state["step"]), float(state["done"])
+    net.train()
     rng = np.random.default_rng([options.seed, step])
-    start = shown = time.monotonic()
-    done, running = before, None
-    while done < 1.0:
-        for group in optimiser.param_groups:
-            warm = min(1.0, (step + 1) / 200)
-            group["lr"] = options.rate * warm * (0.005 + 0.995 * 0.5 * (1 + np.cos(np.pi * done)))
-        losses = regression_losses(net, bank.batch(rng, options), options)
-        total = sum(losses.values())
-        optimiser.zero_grad(set_to_none=True)
-        total.backward()
-        torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-        optimiser.step()
-        step += 1
-        now = time.monotonic()
-        done = step / options.steps if options.steps else before + (now - start) / (60 * options.minutes)
-        values = np.array([float(v.detach()) for v in losses.values()])
-        running = values if running is None else 0.99 * running + 0.01 * values
-        if each:
-            each(dict(zip(losses, values)))
-        if now - shown > 1.0 or done >= 1.0:
-            shown = now
-            bank.add(new_files())
-            named = dict(zip(losses, map(float, running)))
-            yield {"step": step, "done": min(done, 1.0), "losses": named, "optimiser": optimiser.state_dict()}
+
+    def losses(_: float) -> dict[str, Tensor]:
+        return regression_losses(net, bank.batch(rng, options), options)
+
+    schedule = Schedule(options.minutes, options.steps, options.rate)
+    for state in descend(optimisers, losses, schedule, step=step, done=done):
+        bank.add(new_files())
+        yield state
     net.eval()
 
 

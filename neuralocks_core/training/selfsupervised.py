@@ -8,7 +8,6 @@ iteration stable and the hair moving. `docs/deviations.md` says why.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -17,6 +16,7 @@ import torch
 
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.physics.bend_twist import Cosserat
+from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moments import MomentPool
 from neuralocks_core.training.networks import StrandNet
@@ -34,7 +34,7 @@ class SelfSupervisedOptions:
         pool: moments kept.
         rate: Adam's first step size, falling along a cosine.
         output: "direction" or, as in the paper, "displacement".
-        motion: "linear" or "encoder", see StrandNet.
+        motion: "linear", "encoder" or "modulated", see StrandNet.
         static: the quasi-static variant: no history, no inertia.
         undetached: weight of a second inertia term whose past is not detached. The paper's detached term alone (0)
             diverges for long, weakly damped hair; this one damps fast swings.
@@ -71,6 +71,10 @@ class SelfSupervisedOptions:
     seed: int = 0
     device: str = "cpu"
 
+    def optimisers(self, net: torch.nn.Module) -> list[torch.optim.Optimizer]:
+        """What trains `net`."""
+        return [torch.optim.Adam(net.parameters(), lr=self.rate)]
+
     @classmethod
     def paper(cls, **changes) -> SelfSupervisedOptions:
         """The paper's choices wherever it states them, `changes` on top."""
@@ -97,55 +101,36 @@ def train_on_moments(
     inputs: list[np.ndarray],
     net: StrandNet,
     options: SelfSupervisedOptions,
+    optimisers: list[torch.optim.Optimizer],
     *,
-    resume=None,
-    each=None,
-) -> Iterator[dict]:
+    step: int = 0,
+    done: float = 0.0,
+) -> Iterator[Descended]:
     """Train `net` in place; the same protocol as `regression.regress`.
 
     Args:
         pool: has moments already; grows to `options.pool` meanwhile.
         inputs: what the network reads of each groom's strands, one (S, 70) a groom.
-        net: normalised.
+        net: normalised, on `options.device`.
         options: see there.
-        resume: fills the optimiser from a checkpoint and returns its `{"step", "done"}`.
-        each: called with every step's losses, for tests.
-
-    Yields:
-        `{"step", "done" (0..1), "losses": {name: value}, "optimiser": state}` about every second.
+        optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
+        step, done: where an earlier run stopped.
     """
-    net.to(options.device).train()
-    optimiser = torch.optim.Adam(net.parameters(), lr=options.rate)
-    step, before = 0, 0.0
-    if resume is not None:
-        state = resume(optimiser)
-        step, before = int(state["step"]), float(state["done"])
+    net.train()
     rng = np.random.default_rng([options.seed, step])
-    start = shown = time.monotonic()
-    done, running = before, None
-    while done < 1.0:
-        for group in optimiser.param_groups:
-            warm = min(1.0, (step + 1) / 200)
-            group["lr"] = options.rate * warm * (0.01 + 0.99 * 0.5 * (1 + np.cos(np.pi * done)))
-        moments, hair = pool.batch(rng, options.poses)
-        losses = moment_losses(net, moments, hair, inputs, pool.scene.spec, options, rng, _dynamics(options, done))
-        optimiser.zero_grad(set_to_none=True)
-        sum(losses.values()).backward()
-        torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
-        optimiser.step()
-        step += 1
+    taken = 0
+
+    def losses(done: float) -> dict[str, torch.Tensor]:
         # Moments are made one clip every few steps, so that training starts at once and is not held up long.
-        if step % 4 == 0 and len(pool.moments) < options.pool:
+        nonlocal taken
+        taken += 1
+        if taken % 4 == 0 and len(pool.moments) < options.pool:
             pool.grow()
-        now = time.monotonic()
-        done = step / options.steps if options.steps else before + (now - start) / (60 * options.minutes)
-        values = {name: float(value.detach()) for name, value in losses.items()}
-        running = {name: 0.99 * (running or values).get(name, value) + 0.01 * value for name, value in values.items()}
-        if each:
-            each(values)
-        if now - shown > 1.0 or done >= 1.0:
-            shown = now
-            yield {"step": step, "done": min(done, 1.0), "losses": running, "optimiser": optimiser.state_dict()}
+        moments, hair = pool.batch(rng, options.poses)
+        return moment_losses(net, moments, hair, inputs, pool.scene.spec, options, rng, _dynamics(options, done))
+
+    schedule = Schedule(options.minutes, options.steps, options.rate, floor=0.01, clip=5.0)
+    yield from descend(optimisers, losses, schedule, step=step, done=done)
     net.eval()
 
 

@@ -94,36 +94,33 @@ def train_strands(
             torch.manual_seed(options.seed)
             net = StrandNet(scene.spec.size, teacher.inputs[0].shape[1], motion=options.motion)
         normalise(net, *teacher.samples(), history, options.static)
-        meta = {"step": 0, "done": 0.0, "seconds": 0.0}
-        modules = {"net": net}
+        net.to(options.device)
+        optimisers = options.optimisers(net)
+        meta, modules = {"step": 0, "seconds": 0.0}, {"net": net}
         if resume:
-            meta = checkpoint.load(saved, modules)
+            meta = checkpoint.load(saved, modules, optimisers)
+        # Against today's budget: a finished run goes on when it is given more time.
+        spent = meta["step"] / options.steps if options.steps else meta["seconds"] / (60 * options.minutes)
         began, last = time.monotonic() - meta["seconds"], time.monotonic()
         gauge = None
-
-        def refill(optimiser):
-            kept = checkpoint.load(saved, modules, optimiser)
-            # Against today's budget: a finished run goes on when it is given more time.
-            spent = kept["step"] / options.steps if options.steps else kept["seconds"] / (60 * options.minutes)
-            return {**kept, "done": min(spent, 1.0)}
 
         def look():
             held.add(held_farm.files())
             return measure(net, held, options.output, history, teacher.anchored) if held.rollouts else None
 
-        for state in teacher.train(net, refill if resume else None):
+        for state in teacher.train(net, optimisers, step=meta["step"], done=min(spent, 1.0)):
             if farm.failed() or held_farm.failed():
                 raise NeuralocksError(
                     "training: the solver's process ended early; free some memory and go on with --resume"
                 )
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
-            if now - last > SAVE_EVERY or state["done"] >= 1.0 or first:
+            if now - last > SAVE_EVERY or state.done >= 1.0 or first:
                 last, gauge = now, look()
-                meta = {"step": state["step"], "done": state["done"], "seconds": now - began}
-                checkpoint.save(saved, meta, modules, state["optimiser"])
-            losses = " ".join(f"{name} {value:.4f}" for name, value in state["losses"].items())
-            report(state["done"], f"{state['step']} steps, {teacher.told()}; {gauge or losses}")
+                meta = {"step": state.step, "seconds": now - began}
+                checkpoint.save(saved, meta, modules, optimisers)
+            losses = " ".join(f"{name} {value:.4f}" for name, value in state.losses.items())
+            report(state.done, f"{state.step} steps, {teacher.told()}; {gauge or losses}")
         if gauge is None:
             wait(held_farm, HELD_OUT, report)
             gauge = look()
@@ -175,7 +172,7 @@ def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
         checkpoint.load(saved, {"coder": coder})
         return coder.eval().requires_grad_(False)
     shapes = np.concatenate([scalp_local(groom)[groom.valid] for groom in scene.grooms])
-    budget = {"steps": min(1000, options.steps)} if options.steps else {"seconds": min(35.0, 6.0 * options.minutes)}
+    budget = {"steps": min(1000, options.steps)} if options.steps else {"seconds": min(35.0, 4.0 * options.minutes)}
     coder = train_autoencoder(
         shapes, **budget, seed=scene.seed, progress=lambda done, total, message: report(0.0, message)
     ).cpu()

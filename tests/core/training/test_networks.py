@@ -49,14 +49,14 @@ def test_the_split_first_layer_is_one_linear_layer():
         ],
         1,
     )
-    torch.testing.assert_close(
-        net.strand_part(strands) + net.frame_part(frame), whole(normal), atol=2e-5, rtol=1e-5
-    )
+    torch.testing.assert_close(net.strand_part(strands) + net.frame_part(frame), whole(normal), atol=2e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize(("motion", "output"), [("linear", "direction"), ("encoder", "displacement")])
+@pytest.mark.parametrize(
+    ("motion", "output"), [("linear", "direction"), ("encoder", "displacement"), ("modulated", "direction")]
+)
 def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
-    net, autoencoder = _net(motion), StrandAutoencoder()
+    net, autoencoder = _net(motion), StrandAutoencoder(principal=motion != "encoder")
     shapes = torch.randn(9, 72) * 0.1 + 0.3
     autoencoder.set_normalisation(shapes)
     graphs = strand_graphs(autoencoder, net, output)
@@ -74,13 +74,9 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
         "edges": torch.cat([torch.zeros(9, 1, 3), rest.diff(dim=1)], 1).reshape(9, 72),
     }
     offsets = net(strands, frame)[0]
-    np.testing.assert_allclose(
-        _run(graphs["tail.onnx"], **inputs), offsets.detach().reshape(9, 72), atol=1e-5
-    )
+    np.testing.assert_allclose(_run(graphs["tail.onnx"], **inputs), offsets.detach().reshape(9, 72), atol=1e-5)
     moved = _run(graphs["tail.onnx"], "displacement", **inputs)
-    np.testing.assert_allclose(
-        moved, deform(offsets, rest, anchor, output).detach().reshape(9, 72), atol=2e-6
-    )
+    np.testing.assert_allclose(moved, deform(offsets, rest, anchor, output).detach().reshape(9, 72), atol=2e-6)
     assert strand_graphs(autoencoder, net, output) == graphs, "the same weights give the same bytes"
 
 
@@ -112,9 +108,7 @@ def test_zero_offsets_are_exactly_the_groom(rest):
 
 def test_direction_keeps_every_edge_length_and_clamps_the_first_edge(rest):
     moved = rest + deform(torch.randn(5, 6, 24, 3), rest)
-    torch.testing.assert_close(
-        moved.diff(dim=-2).norm(dim=-1), rest.diff(dim=-2).norm(dim=-1).expand(5, 6, 23)
-    )
+    torch.testing.assert_close(moved.diff(dim=-2).norm(dim=-1), rest.diff(dim=-2).norm(dim=-1).expand(5, 6, 23))
     assert torch.equal(moved[..., :2, :], rest[:, :2].expand(5, 6, 2, 3))
 
 
@@ -152,7 +146,9 @@ def test_the_autoencoder_learns_strands_and_is_reproducible():
     shapes = length * np.concatenate([along + 0 * length, 0.2 * np.sin(curl), 0.2 * along * np.cos(curl)], -1)
     first = train_autoencoder(shapes[:300], steps=400, batch=128)
     again = train_autoencoder(shapes[:300], steps=400, batch=128)
-    assert first.errors(shapes[300:]).mean() < 0.01
+    paper = train_autoencoder(shapes[:300], steps=400, batch=128, rate=1e-3, principal=False)
+    assert first.errors(shapes[300:]).mean() < 0.001
+    assert paper.errors(shapes[300:]).mean() < 0.01
     np.testing.assert_array_equal(first.codes(shapes), again.codes(shapes))
     assert first.codes(shapes).shape == (400, 32)
     assert not any(p.requires_grad for p in first.parameters())

@@ -163,8 +163,8 @@ def test_hair_finds_less_energy_than_rigid_hair_has(pool, inputs):
 def test_training_goes_on_from_where_it_was_and_stays_finite(pool, inputs):
     net, options = _net(pool, inputs), SelfSupervisedOptions(steps=12, poses=4, pool=len(pool.moments) + 1)
     before = len(pool.moments)
-    states = list(train_on_moments(pool, inputs, net, options, resume=lambda _: {"step": 7, "done": 7 / 12}))
-    assert states[-1]["step"] == 12 and np.isfinite(list(states[-1]["losses"].values())).all()
+    states = list(train_on_moments(pool, inputs, net, options, options.optimisers(net), step=7, done=7 / 12))
+    assert states[-1].step == 12 and np.isfinite(list(states[-1].losses.values())).all()
     assert len(pool.moments) > before
 
 
@@ -175,8 +175,9 @@ def test_the_papers_own_settings_train(pool, inputs):
     paper_pool = MomentPool(pool.scene, supported=False, nearest_vertices=True)
     paper_pool.grow()
     assert not paper_pool.hair[0].rods.support.any()
-    states = list(train_on_moments(paper_pool, inputs, _net(pool, inputs), options))
-    assert states[-1]["done"] == 1.0 and states[-1]["step"] == 3
+    net = _net(pool, inputs)
+    states = list(train_on_moments(paper_pool, inputs, net, options, options.optimisers(net)))
+    assert states[-1].done == 1.0 and states[-1].step == 3
 
 
 def test_one_call_trains_the_papers_way_and_says_so(pool, tmp_path):

@@ -73,7 +73,7 @@ def test_held_out_strands_are_never_trained_on(scene):
 def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     """On motion and strands that it never saw, the network halves the error of hair carried rigidly."""
     messages = []
-    options = RegressionOptions(steps=500, clips=16, strands=6)
+    options = RegressionOptions(steps=500, clips=16, strands=6, rate=4e-3)
     path = train_strands(
         scene, tmp_path / "hair.neuralocks", options, rollouts=60, progress=lambda *a: messages.append(a)
     )
@@ -87,8 +87,8 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     sampler = StrandModel.load(path).sampler(person(), scripted_clip(person(), "shake"))
     session = StrandModel.load(path).prepare(scene.grooms[0])
     session.anchor(sampler.held_bind())
-    tips = [session.displacement(v)[:, -1] for v in sampler.vectors([0.0, 1.2])]
-    assert np.abs(tips[1] - tips[0]).max() > 0.01
+    tips = np.stack([session.displacement(v)[:, -1] for v in sampler.vectors(np.arange(0, 2, 0.1))])
+    assert np.ptp(tips, axis=0).max() > 0.03
 
 
 def test_a_killed_run_goes_on(scene, tmp_path):
