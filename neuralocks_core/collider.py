@@ -11,14 +11,6 @@ from neuralocks_core.errors import NeuralocksError
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
 
-BAND = 0.01
-"""Points farther from the surface than this [m] are not looked for by `near`. A strand that enters the body passes
-nearer with some vertex: it is half of the longest segment that hair of half a metre has."""
-CELL = 0.012
-"""Width of the cells of the first sieve [m]; two of them are more than BAND and the distance between samples."""
-CURVED = 0.003
-"""How far a surface may bend away from the plane of its nearest sample [m]."""
-
 
 class Collider:
     """A mesh in one pose, asked for distances.
@@ -92,49 +84,6 @@ class Collider:
         direction = np.where(length[:, None] > 1e-9, along, normal)
         return (sign * length).reshape(shape), direction.reshape(*shape, 3), triangle.reshape(shape)
 
-    def near(self, points: np.ndarray, reach: float) -> np.ndarray:
-        """Indices (n,) of the points (N, 3) that may lie less than `reach` [m] outside, or inside: a cheap sieve.
-
-        Each point is judged by the plane of its nearest surface sample, with room for the surface's curvature.
-        """
-        close = np.flatnonzero(self.around(points))
-        far, sample = self._tree.query(points[close], distance_upper_bound=BAND + self._reach, workers=-1)
-        found = np.isfinite(far)
-        close, sample = close[found], sample[found]
-        height = ((points[close] - self._tree.data[sample]) * self._normals[self._owner[sample]]).sum(axis=1)
-        return close[height < reach + CURVED]
-
-    def around(self, points: np.ndarray) -> np.ndarray:
-        """Which points (N, 3) lie in a cell that is, or is nearly, next to the surface: the first, cheapest sieve."""
-        low, marked = self._cells
-        if marked is None:
-            return np.ones(len(points), bool)
-        cell = ((points - low) / CELL).astype(np.int32)
-        size = np.array(marked.shape)
-        inside = ((cell >= 0) & (cell < size)).all(axis=1) & (points >= low).all(axis=1)
-        flat = np.ravel_multi_index(tuple(np.clip(cell, 0, size - 1).T), marked.shape)
-        return inside & marked.ravel()[flat]
-
-    @cached_property
-    def _cells(self):
-        """Low corner, and marks of the cells up to two away from one with a sample; None if there are too many."""
-        samples = self._tree.data
-        low = samples.min(axis=0) - 3 * CELL
-        size = ((samples.max(axis=0) - low) / CELL).astype(np.int64) + 4
-        if np.prod(size.astype(float)) > 4e6:
-            return low, None
-        marked = np.zeros(size, bool)
-        marked[tuple(((samples - low) / CELL).astype(int).T)] = True
-        for axis in range(3):
-            for _ in range(2):
-                wide = marked.copy()
-                ahead, behind = ([slice(None)] * 3 for _ in range(2))
-                ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
-                wide[tuple(ahead)] |= marked[tuple(behind)]
-                wide[tuple(behind)] |= marked[tuple(ahead)]
-                marked = wide
-        return low, marked
-
     def _nearest(self, points, candidates):
         """Closest point, pseudonormal there, triangle and distance, of candidate triangles (N, k), for (N, 3)."""
         corners = self.points[self.triangles[candidates]]
@@ -201,6 +150,14 @@ def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarr
     return a + v[..., None] * ab + w[..., None] * ac, feature
 
 
+def split_triangle(m: int) -> np.ndarray:
+    """Middles (m * m, 2) of the alike triangles into which m - 1 cuts along each side divide one, along its sides."""
+    i, j = np.mgrid[0:m, 0:m]
+    up = np.stack([i, j], axis=-1)[i + j < m] + 1 / 3
+    down = np.stack([i, j], axis=-1)[i + j < m - 1] + 2 / 3
+    return np.concatenate([up, down]) / m
+
+
 def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Points spread over triangles (n, 3), the triangle of each (n,), and how far the surface is from them at most [m].
 
@@ -217,10 +174,7 @@ def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np
     samples, owner = [], []
     for m in np.unique(split):
         which = np.flatnonzero(split == m)
-        i, j = np.mgrid[0:m, 0:m]
-        up = np.stack([i, j], axis=-1)[i + j < m] + 1 / 3
-        down = np.stack([i, j], axis=-1)[i + j < m - 1] + 2 / 3
-        uv = np.concatenate([up, down]) / m
+        uv = split_triangle(m)
         at = (a[which, None] + uv[None, :, :1] * (b - a)[which, None] + uv[None, :, 1:] * (c - a)[which, None])
         samples.append(at.reshape(-1, 3))
         owner.append(np.repeat(which, len(uv)))

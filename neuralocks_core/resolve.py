@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Push hair out of the body after the network, with every segment's length kept."""
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
 import numpy as np
 
 from neuralocks_core.character import Body, Character
 from neuralocks_core.collider import Collider
-from neuralocks_core.head_field import HeadField, PosedBody
+from neuralocks_core.motion import Clip
+from neuralocks_core.near_body import NearBody, PosedBody
 from neuralocks_core.strands import StrandSet
 
 MARGIN = 0.001
@@ -14,6 +19,12 @@ ROUNDS = 5
 """Of finding the planes under a strand and laying it over them."""
 CLAMPED = 2
 """Vertices at the root that never move."""
+STILL = 1e-3
+"""Skin that moves by less than this against the head [m] stands still."""
+BATCH = 2048
+"""Strands looked at together."""
+PUSHED = 1024
+"""Strands pushed together."""
 NEAR = 0.02
 """Distance [m] within which a vertex of a strand in trouble minds the surface."""
 
@@ -24,157 +35,211 @@ class Resolver:
     Args:
         character: whose body the hair must stay out of; without a body nothing is done.
         strands: the groom at rest.
-        shape: blend shape weights (B,) of the pose in which the groom rests.
+        clip: the motion to come. What hardly moves against the head in it is looked up in a grid made once, and blend
+            shapes that do not change in it are part of the pose at rest. Without one, the joint weights must tell.
 
     Attributes:
         body: the part of the body that the hair can reach, or None.
-        at_rest: the collider in bind pose, if there is a body.
+        low: distance (S, 24) float32 [m] under which a vertex is in trouble; made when first asked for.
     """
 
-    def __init__(self, character: Character, strands: StrandSet, shape: np.ndarray | None = None):
-        self.character, self.strands = character, strands
+    def __init__(self, character: Character, strands: StrandSet, clip: Clip | None = None):
+        self.character, self.strands, self._clip = character, strands, clip
         self.body = None if character.body is None else _within_reach(character, strands)
-        self.at_rest: Collider | None = None
-        if self.body is not None:
-            to_canonical = np.linalg.inv(character.canonical_to_bind)
-            points = self.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-            self.at_rest = Collider(points, self.body.triangles)
-            self.rest_distance = self.at_rest.distance(strands.rest)[0]
-            self._fields: dict[bytes, HeadField] = {}
 
-    def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
-        """The body that the hair can reach, posed by world joint transforms (J, 4, 4), in canonical space."""
+    @cached_property
+    def at_rest(self) -> Collider | None:
+        """The exact collider in bind pose, if there is a body."""
         if self.body is None:
             return None
-        to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
-        skinning = to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
-        return Collider(self.body.posed(skinning, shape), self.body.triangles)
+        to_canonical = np.linalg.inv(self.character.canonical_to_bind)
+        points = self.body.shaped(self._constant) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+        return Collider(points, self.body.triangles)
 
-    def _quick(self, joints: np.ndarray, shape: np.ndarray | None) -> PosedBody:
-        """As `collider`, with what moves rigidly with the head looked up in a grid, made once for a body shape."""
-        shape = None if shape is None else np.asarray(shape, float)
-        key = b"" if shape is None else shape.tobytes()
-        if key not in self._fields:
-            if len(self._fields) > 8:
-                self._fields.clear()
-            to_canonical = np.linalg.inv(self.character.canonical_to_bind)
-            points = self.body.shaped(shape) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-            self._fields[key] = HeadField(points, self.body.triangles, _moves_with_head(self.character, self.body))
-        to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
-        posed = self.body.posed(to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind, shape)
-        return PosedBody(self._fields[key], posed)
-
-    def displacement(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:
-        """The network's displacement (S, 24, 3) [m] for a pose, changed where it leaves hair inside the body."""
+    def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
+        """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: to measure with."""
         if self.body is None:
-            return displacement
-        points = self.strands.rest + displacement
-        resolved = resolve(points, self._quick(joints, shape), self.rest_distance)
-        if resolved is points:
-            return displacement
-        moved = (resolved != points).any(axis=(1, 2)) & self.strands.valid
-        result = displacement.copy()
-        result[moved] = resolved[moved] - self.strands.rest[moved]
-        return result
+            return None
+        return Collider(self.body.posed(self._skinning(joints), shape), self.body.triangles)
+
+    def apply(
+        self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None, each: Callable = map
+    ) -> None:
+        """Change the network's displacement (S, 24, 3) float32 [m] for a pose where it leaves hair inside the body.
+
+        Args:
+            displacement: canonical, changed in place.
+            joints: world joint transforms (J, 4, 4).
+            shape: blend shape weights (B,).
+            each: as `map`, on several threads say; the result does not depend on them.
+        """
+        if self.body is None or not len(displacement):
+            return
+        rest, low = self.strands.rest, self.low
+        parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
+        edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
+        body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
+        hit = list(each(lambda s: body.violated(rest[s] + displacement[s], low[s]) + s.start, parts))
+        hit = np.concatenate(hit)
+        hit = hit[self.strands.valid[hit]]
+
+        def push(rows: np.ndarray) -> None:
+            displacement[rows] = resolved(rest[rows] + displacement[rows], body, self._clear[rows]) - rest[rows]
+
+        for _ in each(push, [hit[i : i + PUSHED] for i in range(0, len(hit), PUSHED)]):
+            pass
+
+    def _posed(self, joints, shape, low, high) -> PosedBody:
+        constant = self._constant
+        changed = None if shape is None or constant is None else np.asarray(shape, float) - constant
+        return self._near.posed(self._skinning(joints), changed, low, high)
+
+    @cached_property
+    def low(self) -> np.ndarray:
+        """Distance (S, 24) float32 [m] under which a vertex is in trouble."""
+        # A vertex that may rest inside must not be in trouble by the rounding of the network's output.
+        return self._clear - np.float32(1e-5)
+
+    @cached_property
+    def _clear(self) -> np.ndarray:
+        joints = self.character.skeleton.bind
+        rest = self._posed(joints, self._constant, *_corners(self.strands.rest))
+        parts = [rest.distance(self.strands.rest[i : i + 2048])[0] for i in range(0, len(self.strands.rest), 2048)]
+        return clearance(np.concatenate(parts))
+
+    @cached_property
+    def _near(self) -> NearBody:
+        body, character, strands = self.body, self.character, self.strands
+        still = _stands_still(character, body, self._clip)
+        if self._clip is not None and body.shapes:
+            varies = np.ptp(self._clip.shape, axis=0) > 1e-6
+            for offsets, moves in zip(body.shapes.values(), varies):
+                if moves:
+                    still &= ~(np.abs(offsets) > 1e-5).any(axis=1)
+            body = replace(body, points=body.shaped(self._constant))
+        length = float(strands.length[strands.valid].max())
+        roots = strands.rest[strands.valid, 0]
+        low, high = roots.min(axis=0) - length, roots.max(axis=0) + length
+        return NearBody(body, np.linalg.inv(character.canonical_to_bind), still, low, high)
+
+    @property
+    def _constant(self) -> np.ndarray | None:
+        return None if self._clip is None else self._clip.shape[0]
+
+    def _skinning(self, joints: np.ndarray) -> np.ndarray:
+        to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
+        return to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
 
 
-def resolve(
-    points: np.ndarray, collider: Collider | PosedBody, rest_distance: np.ndarray, margin: float = MARGIN
-) -> np.ndarray:
-    """Strands without vertices inside the body.
+def _corners(points: np.ndarray) -> np.ndarray:
+    """Low and high corner (2, 3) of points (S, K, 3)."""
+    # Along the strands first: rows of numbers are compared much faster than triples.
+    rows = points.reshape(len(points), -1)
+    return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
 
-    Strands that touch nothing come back bit for bit. The others are laid over the planes of the surface under them,
-    from the root on and with every length kept, until nothing is inside any more. A strand depends on itself and on the
-    body only: neither the order of strands nor their division into chunks matters.
+
+def clearance(rest_distance: np.ndarray, margin: float = MARGIN) -> np.ndarray:
+    """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
+
+    Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
+    """
+    clear = np.minimum(rest_distance, margin).astype(np.float32)
+    clear[:, :CLAMPED] = -np.inf
+    return clear
+
+
+def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray, margin: float = MARGIN) -> np.ndarray:
+    """Strands laid over the surface where they were inside it.
+
+    Strand by strand, from the root on and with every length kept, each segment goes as near to where it was wanted as
+    the planes under it let it, until nothing is inside any more. A strand depends on itself and on the body only:
+    neither the order of strands nor their division into chunks matters. Up to the first vertex that must give way, a
+    strand stays bit for bit.
 
     Args:
-        points: deformed strands (S, K, 3) [m], in the collider's space.
-        collider: the body in this pose.
-        rest_distance: signed distance of each vertex in the bind pose (S, K) [m]: hair that rests inside the body, or
-            closer than the margin, is not pushed beyond where it rests.
+        points: deformed strands (S, K, 3) [m], in the body's space.
+        body: in this pose.
+        clear: distance [m] that each vertex must keep (S, K), -inf for those that never move.
         margin: clearance [m].
 
     Returns:
-        (S, K, 3), of the type of `points`.
+        (S, K, 3) float32.
     """
-    clear = np.minimum(rest_distance, margin, dtype=float)
-    clear[:, :CLAMPED] = -np.inf
-    # A vertex that may rest inside must not count as a violation by the float32 rounding of the network's output.
-    low = clear - 1e-5
-    hit = np.flatnonzero(_violates(points, collider, low, margin))
-    if not len(hit):
-        return points
-    result = np.array(points)
-    wanted, clear = np.asarray(points[hit], float), clear[hit]
-    lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2)
-    planes = _Planes(wanted.shape[:2])
-    now, todo = wanted.copy(), np.arange(len(hit))
-    for _ in range(ROUNDS):
-        planes.look(collider, now, clear, todo)
-        now[todo] = _laid(wanted[todo], lengths[todo], planes.normal[todo], planes.height[todo])
-        todo = todo[_violates(now[todo], collider, clear[todo] - 0.5 * margin, margin)]
-        if not len(todo):
+    # Vertices first, strands last: what is done to one vertex of all strands is one contiguous array.
+    wanted = np.ascontiguousarray(np.asarray(points, float).transpose(1, 2, 0))
+    lengths = np.sqrt(np.square(np.diff(wanted, axis=0)).sum(axis=1))
+    keep = np.ascontiguousarray(clear.T, float)
+    now, todo = wanted, np.arange(len(points))
+    normal, height = np.zeros(wanted.shape), np.full(keep.shape, -np.inf)
+    for done in range(ROUNDS + 1):
+        here = now[CLAMPED:][:, :, todo]
+        distance, way = body.distance(here.transpose(0, 2, 1).astype(np.float32))
+        distance = distance.astype(float)
+        # The first time a strand is given its margin; after that half of it is enough.
+        left = (distance < keep[CLAMPED:, todo] - 0.5 * margin * (done > 0)).any(axis=0)
+        todo = todo[left]
+        if not len(todo) or done == ROUNDS:
             break
-    result[hit] = now
-    return result
-
-
-class _Planes:
-    """A plane under each vertex, n . x >= height, the latest one found."""
-
-    def __init__(self, shape):
-        self.normal, self.height = np.zeros((*shape, 3)), np.full(shape, -np.inf)
-
-    def look(self, collider: Collider, points: np.ndarray, clear: np.ndarray, rows: np.ndarray) -> None:
-        """Find the planes of these strands anew."""
-        inside = points[rows, CLAMPED:]
-        distance, normal = collider.distance(inside, limit=NEAR, proven=False)
-        surface = (inside * normal).sum(axis=-1) - distance
-        height = np.where(distance < NEAR, surface + clear[rows, CLAMPED:] * 1.02 + 2e-5, -np.inf)
-        self.normal[rows, CLAMPED:], self.height[rows, CLAMPED:] = normal, height
+        here, distance, way = here[:, :, left], distance[:, left], way[:, left].transpose(0, 2, 1).astype(float)
+        surface = (here * way).sum(axis=1) - distance
+        normal[CLAMPED:, :, todo] = way
+        height[CLAMPED:, todo] = np.where(distance < NEAR, surface + keep[CLAMPED:, todo] * 1.02 + 2e-5, -np.inf)
+        # What is still inside was deep: from where it lies now the way out is clearer than from where it came.
+        now[:, :, todo] = _laid(now[:, :, todo], lengths[:, todo], normal[:, :, todo], height[:, todo])
+    return now.transpose(2, 0, 1).astype(np.float32)
 
 
 def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Strands (n, K, 3) as near to where they are wanted as their lengths and the planes under them let them be.
+    """Strands (K, 3, n) as near to where they are wanted as their lengths (K - 1, n) and the planes under them let them.
 
     From the root on, each segment aims at its wanted end. If that is under its plane, it takes the direction nearest to
     that which ends on the plane; straight away from the body if not even that reaches.
     """
     result = wanted.copy()
-    free = np.ones(len(wanted), bool)
-    for i in range(CLAMPED, wanted.shape[1]):
-        before, length, n = result[:, i - 1], lengths[:, i - 1, None], normal[:, i]
-        along = _unit(wanted[:, i] - before)
-        up = ((height[:, i] - (n * before).sum(axis=1)) / np.maximum(length[:, 0], 1e-9))[:, None]
-        rise = (along * n).sum(axis=1, keepdims=True)
-        low = (rise < up)[:, 0]
-        slope = np.clip(up, -1, 1)
-        lifted = slope * n + np.sqrt(1 - slope**2) * _unit(along - rise * n)
-        moved = before + length * np.where(low[:, None], lifted, along)
+    free = np.ones(wanted.shape[2], bool)
+    for i in range(CLAMPED, len(wanted)):
+        before, length, n = result[i - 1], lengths[i - 1], normal[i]
+        up = height[i] - _dot(n, before)
+        along = wanted[i] - before
+        rise = _dot(along, n)
+        size = np.sqrt(_dot(along, along))
+        low = rise * length < up * size
         free &= ~low
-        # Up to the first vertex that must give way, a strand stays bit for bit.
-        result[:, i] = np.where(free[:, None], wanted[:, i], moved)
+        if free.all():
+            continue
+        np.maximum(size, 1e-12, out=size)
+        along *= length / size
+        rise *= length / size
+        slope = np.clip(up, -length, length)
+        side = along - rise * n
+        side *= np.sqrt(length**2 - slope**2) / np.maximum(np.sqrt(_dot(side, side)), 1e-12)
+        side += slope * n
+        moved = np.where(low, side, along)
+        moved += before
+        result[i] = np.where(free, wanted[i], moved)
     return result
 
 
-def _violates(points: np.ndarray, collider: Collider, low: np.ndarray, margin: float) -> np.ndarray:
-    """Which strands (S,) have a vertex nearer than `low` (S, K), or deeper inside."""
-    flat, low = points.reshape(-1, 3), low.ravel()
-    free = np.flatnonzero(np.isfinite(low))
-    near = free[collider.near(flat[free], margin)]
-    deep = np.zeros(low.shape, bool)
-    deep[near] = collider.distance(flat[near], limit=margin, proven=False)[0] < low[near]
-    return deep.reshape(points.shape[:2]).any(axis=1)
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-
-
-def _moves_with_head(character: Character, body: Body) -> np.ndarray:
-    """Which vertices (V,) follow the head joint and nothing else, so that they stand still in canonical space."""
-    own = np.sum(body.joint_weights * (body.joint_indices == character.head), axis=1)
-    return own > 1 - 1e-5
+def _stands_still(character: Character, body: Body, clip: Clip | None) -> np.ndarray:
+    """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion."""
+    to_canonical = np.linalg.inv(character.canonical_to_bind)
+    if clip is None:
+        turn = np.where(np.arange(len(character.skeleton.names)) == character.head, 0.0, 2.0)
+        shift = 0.2 * turn
+    else:
+        shift = turn = np.zeros(len(character.skeleton.names))
+        for joints in clip.joints:
+            against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
+            off = against @ character.canonical_to_bind - np.eye(4)
+            turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
+            shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
+    far = np.linalg.norm(body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3], axis=1)
+    each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
+    return np.sum(body.joint_weights * each, axis=1) < STILL
 
 
 def _within_reach(character: Character, strands: StrandSet) -> Body | None:

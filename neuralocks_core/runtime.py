@@ -9,7 +9,7 @@ cores each at one of its own.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
@@ -74,8 +74,12 @@ class StrandModel:
         `start` on.
         """
         chunks = [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
-        for _ in self._pool.map(function, chunks):
+        for _ in self.map(function, chunks):
             pass
+
+    def map(self, function: Callable, items) -> Iterable:
+        """Results of calls on this model's threads, in order; a single one is made where it stands."""
+        return map(function, items) if len(items) < 2 else self._pool.map(function, items)
 
     def frame_part(self, vector: np.ndarray) -> np.ndarray:
         """First layer, body part (1, 256), of a boundary vector (spec.size,)."""

@@ -53,7 +53,7 @@ def bake(
     subframes: int = 1,
     material=None,
     strength: float = 1.0,
-    resolve: bool = False,
+    resolve: bool = True,
     loop: bool = False,
     velocities: bool = True,
     jobs: int | None = None,
@@ -100,7 +100,7 @@ def bake(
     }
 
     def poser(item: StageGroom) -> GroomPoser:
-        return GroomPoser(item, strand_model, look, jobs=jobs, **options)
+        return GroomPoser(item, strand_model, look, **options)
 
     resumed = write_samples(shot, out, codes, poser, inputs | options, velocities=velocities, progress=progress)
     return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)

@@ -80,7 +80,7 @@ def demo(
 
     # Without velocities: twice as fast and half as large, and nothing here draws motion blur.
     result = timed(
-        "bake", lambda: bake(shot, outputs["bake"], model, resolve=True, velocities=False, progress=progress)
+        "bake", lambda: bake(shot, outputs["bake"], model, velocities=False, progress=progress)
     )
     baked = read_baked(outputs["bake"])
     card = timed("report card", lambda: evaluate(baked, progress=progress))

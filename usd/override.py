@@ -69,7 +69,8 @@ class OverrideWriter:
         with _named(self._out):
             if name == "points":
                 pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
-                extent = np.stack([held[0].min(axis=0) - pad, held[0].max(axis=0) + pad])
+                low, high = _corners(held[0])
+                extent = np.stack([low - pad, high + pad])
                 self._set(item, time_code, "extent", [extent])
             self._set(item, time_code, name, held)
             if self._held >= SAVE_EVERY:
@@ -128,6 +129,18 @@ def reload_open(path: Path) -> None:
     layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
     if layer:
         layer.Reload(force=True)
+
+
+def _corners(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest coordinates (3,) of points (P, 3)."""
+    # Long rows are compared ten times as fast as triples.
+    even = len(points) // 64 * 64
+    rows = points[:even].reshape(-1, 192)
+    parts = [points[even:]]
+    if even:
+        parts += [rows.min(axis=0).reshape(-1, 3), rows.max(axis=0).reshape(-1, 3)]
+    few = np.concatenate(parts)
+    return few.min(axis=0), few.max(axis=0)
 
 
 def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:

@@ -2,7 +2,6 @@
 """From a canonical displacement of 24 vertices to a groom's own points in its prim's space."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +15,10 @@ from neuralocks_core.strands import StrandSet, strand_set
 from .curves import rest_points
 from .stage import StageGroom
 
-BLOCK = 4096
-"""Strands that one thread takes at a time; a multiple of what the runtime takes."""
+BLOCK = 512
+"""Strands placed at a time, as many as the runtime infers at a time."""
 
-PART = 4 * BLOCK
+PART = 32 * BLOCK
 """Strands prepared at a time: what that needs besides its result does not grow with the groom."""
 
 STILL = 1e-6
@@ -27,67 +26,47 @@ STILL = 1e-6
 
 
 class GroomPlacer:
-    """Places one groom of a shot; the result depends on neither the threads nor the blocks.
+    """Places one groom of a shot; the result does not depend on the blocks in which it is asked for.
 
     Attributes:
         item: the groom.
         strands: as the network sees it.
-
-    Args:
-        item: the groom.
-        jobs: threads.
+        carriers: one for every PART strands.
+        ends: (S + 1,) first point of each strand, and the number of all.
+        centre: (3,) float32 [m], the head's own place in bind world.
     """
 
-    def __init__(self, item: StageGroom, jobs: int = 1):
+    def __init__(self, item: StageGroom):
         self.item = item
         character = item.attachment.character
         self._parts = _parts(item.groom)
         self.strands = _strands(self._parts, character)
         slices = (slice(low, low + PART) for low in range(0, item.groom.strand_count, PART))
-        self._carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
-        self._pool = ThreadPoolExecutor(max(1, jobs), thread_name_prefix="place")
-        self._ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
-        self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
+        self.carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
+        self.ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
+        self.centre = character.canonical_to_bind[:3, 3].astype(np.float32)
         low, high = item.groom.points.min(axis=0), item.groom.points.max(axis=0)
         self._corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
 
-    def close(self) -> None:
-        """Let the threads go."""
-        self._pool.shutdown()
+    def at(self, time_code: float, joints: np.ndarray) -> "Placed":
+        """The groom at a time code, to be filled in; `joints` (J, 4, 4) are world joint transforms [m] there."""
+        item = self.item
+        to_prim = np.linalg.inv(item.attachment.rig.border.to_core @ item.placement.at(time_code))
+        to_local = to_prim @ item.attachment.character.carrying(joints)
+        return Placed(self, to_local, self._rest_in_place(to_local))
 
     def points(self, time_code: float, joints: np.ndarray, displacement: Callable[[slice], np.ndarray]) -> np.ndarray:
         """Points (P, 3) float32 in the prim's own space and units.
 
         Args:
-            time_code: when.
-            joints: world joint transforms (J, 4, 4) [m] at that time.
+            time_code, joints: as for `at`.
             displacement: gives (n, 24, 3) float32 [m], canonical, for a slice of strands.
         """
-        item, groom = self.item, self.item.groom
-        to_prim = np.linalg.inv(item.attachment.rig.border.to_core @ item.placement.at(time_code))
-        to_local = to_prim @ item.attachment.character.carrying(joints)
-        rest = self._rest_in_place(to_local)
-        linear = to_local[:3, :3].astype(np.float32)
-        origin = (to_local[:3, :3] @ self._centre.astype(float) + to_local[:3, 3]).astype(np.float32)
-        result = np.empty((len(groom.points), 3), np.float32)
-
-        def block(strands: slice) -> None:
-            here = slice(self._ends[strands.start], self._ends[strands.stop])
-            within = slice(strands.start % PART, strands.start % PART + strands.stop - strands.start)
-            carrier = self._carriers[strands.start // PART]
-            out = carrier.carry(displacement(strands), out=result[here], strands=within)
-            if rest is not None:
-                # What the network did not move keeps the author's own bits.
-                out -= groom.points[here]
-                out[:] = rest[here] + out @ linear.T
-            else:
-                out -= self._centre
-                out[:] = out @ linear.T + origin
-
-        count = groom.strand_count
-        for _ in self._pool.map(block, [slice(low, min(low + BLOCK, count)) for low in range(0, count, BLOCK)]):
-            pass
-        return result
+        placed, count = self.at(time_code, joints), self.item.groom.strand_count
+        for low in range(0, count, BLOCK):
+            strands = slice(low, min(low + BLOCK, count))
+            placed.put(strands, displacement(strands))
+        return placed.points
 
     def _rest_in_place(self, to_local: np.ndarray) -> np.ndarray | None:
         """The authored rest points (P, 3) if the groom as a whole stands where it rests."""
@@ -95,6 +74,40 @@ class GroomPlacer:
         shift = self._corners @ (to_local - home)[:3, :3].T + (to_local - home)[:3, 3]
         scale = np.cbrt(abs(np.linalg.det(home[:3, :3])))
         return rest_points(self.item.prim) if np.abs(shift).max() < STILL * scale else None
+
+
+class Placed:
+    """One groom at one time, filled block by block, by several threads if wanted.
+
+    Attributes:
+        points: (P, 3) float32 in the prim's own space and units.
+    """
+
+    def __init__(self, placer: GroomPlacer, to_local: np.ndarray, rest: np.ndarray | None):
+        self._placer, self._rest = placer, rest
+        self._linear = to_local[:3, :3].astype(np.float32)
+        self._origin = (to_local[:3, :3] @ placer.centre.astype(float) + to_local[:3, 3]).astype(np.float32)
+        self.points = np.empty((len(placer.item.groom.points), 3), np.float32)
+
+    def put(self, strands: slice, displacement: np.ndarray) -> None:
+        """Place consecutive strands of one PART.
+
+        Args:
+            strands: which.
+            displacement: (n, 24, 3) float32 [m], canonical.
+        """
+        placer = self._placer
+        here = slice(placer.ends[strands.start], placer.ends[strands.stop])
+        within = slice(strands.start % PART, strands.start % PART + strands.stop - strands.start)
+        out = placer.carriers[strands.start // PART].carry(displacement, out=self.points[here], strands=within)
+        if self._rest is not None:
+            # What the network did not move keeps the author's own bits.
+            out -= placer.item.groom.points[here]
+            out[:] = self._rest[here] + out @ self._linear.T
+        else:
+            out -= placer.centre
+            out[:] = out @ self._linear.T
+            out += self._origin
 
 
 def _parts(groom: Groom) -> list[Groom]:

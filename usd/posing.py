@@ -18,12 +18,11 @@ class GroomPoser:
 
     Args:
         item: the groom.
-        model: the strand model.
+        model: the strand model; its threads share the work, and the result does not depend on them.
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
         resolve: push hair out of the body after the network.
         loop: the clip's last sample is followed by its first.
-        jobs: threads; the result does not depend on it.
     """
 
     def __init__(
@@ -35,11 +34,10 @@ class GroomPoser:
         strength: float = 1.0,
         resolve: bool = False,
         loop: bool = False,
-        jobs: int = 1,
     ):
-        self.item, self._rig = item, item.attachment.rig
+        self.item, self._rig, self._model = item, item.attachment.rig, model
         character = item.attachment.character
-        self._placer = GroomPlacer(item, jobs)
+        self._placer = GroomPlacer(item)
         self._material = (material or Material()).log_ratios()
         self._strength = strength
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
@@ -50,26 +48,19 @@ class GroomPoser:
         if resolve and character.body is not None:
             from neuralocks_core.resolve import Resolver
 
-            self._resolver = Resolver(character, self._placer.strands)
+            self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
         give_back()  # 60 MB of a large groom
-
-    def close(self) -> None:
-        """Let the threads go."""
-        self._placer.close()
-
-    def __enter__(self) -> "GroomPoser":
-        return self
-
-    def __exit__(self, *_) -> None:
-        self.close()
 
     def points(self, time_code: float) -> np.ndarray:
         """The groom's points (P, 3) float32 at a time code, in the prim's own space and units."""
         joints = self._rig.joints_at(time_code)
         seconds = self._rig.border.seconds([time_code])
         vector = self._sampler.vectors(seconds, self._material, self._strength, joints[None])[0]
+        placed = self._placer.at(time_code, joints)
         if self._resolver is None:
-            return self._placer.points(time_code, joints, lambda strands: self._session.displacement(vector, strands))
-        shape = self._rig.clip.shape_at(seconds)[0]
-        whole = self._resolver.displacement(self._session.displacement(vector), joints, shape)
-        return self._placer.points(time_code, joints, lambda strands: whole[strands])
+            self._session.each(vector, placed.put)
+            return placed.points
+        moved = self._session.displacement(vector)
+        self._resolver.apply(moved, joints, self._rig.clip.shape_at(seconds)[0], self._model.map)
+        self._model.by_chunk(lambda strands: placed.put(strands, moved[strands]), len(moved))
+        return placed.points

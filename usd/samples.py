@@ -7,7 +7,7 @@ the file.
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -19,19 +19,16 @@ from .behind import Behind
 from .override import OverrideWriter, reload_open, to_text, used_files
 from .spool import Spool, fingerprint
 from .stage import Shot, StageGroom
+from .stencils import Stencils
 
-HALF = 0.5
-"""Time codes to each side over which a velocity is measured."""
-
+BLOCK = 1 << 16
+"""Points of which velocities are measured at a time."""
 
 class Poser(Protocol):
     """What gives a groom's points."""
 
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32, in the prim's own space and units."""
-
-    def close(self) -> None:
-        """Called when no more points are wanted."""
 
 
 def write_samples(
@@ -90,19 +87,23 @@ def check_out(out: Path) -> None:
 
 def _write(shot: Shot, codes, poser, spool: Spool, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
-    total, done, resumed = len(codes) * len(shot.grooms), 0, 0
+    plans = [Stencils(item, codes, velocities) for item in shot.grooms]
+    total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
     say(0, total, "reading")
     with Behind() as behind:
-        for number, item in enumerate(shot.grooms):
+        for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
             behind.put(writer.groom, item, velocities)
-            frames = _Frames(shot, item, poser, velocities)
-            try:
-                for code in codes:
-                    resumed += _frame(spool, behind, writer, item, number, code, frames)
-                    done += 1
-                    say(done, total, item.path)
-            finally:
-                frames.close()
+            store, made = _Store(spool, writer, item, number, plan), None
+            for code in plan.codes:
+                held = []
+                if spool.holds(number, code, len(item.groom.points)):
+                    resumed += code in plan.wanted
+                else:
+                    made = made or poser(item)
+                    held.append(made.points(code))
+                behind.put(store.frame, code, held)
+                done += 1
+                say(done, total, item.path)
         behind.put(writer.close)
     if spool.out.suffix.lower() == ".usda":
         text = spool.layer_path.with_suffix(".usda")
@@ -113,67 +114,37 @@ def _write(shot: Shot, codes, poser, spool: Spool, velocities: bool, say) -> int
     return resumed
 
 
-def _frame(
-    spool: Spool, behind: Behind, writer: OverrideWriter, item: StageGroom, number: int, code: float, frames
-) -> bool:
-    """One frame, one array after the other; whether it was there already."""
-    count = len(item.groom.points)
-    there = all(spool.holds(number, code, name, count) for name in frames.names)
-    arrays = (spool.read(number, code, name) for name in frames.names) if there else frames.at(code)
-    for name, array in zip(frames.names, arrays):
-        if not there:
-            behind.put(spool.write, number, code, name, array)
-        held = [array]  # the writer takes it out as soon as it has its own copy
-        del array
-        behind.put(writer.sample, item, code, name, held)
-    return there
+class _Store:
+    """Takes one groom's points frame by frame: keeps them, writes them, and velocities once both sides are there."""
 
+    def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, number: int, plan: Stencils):
+        self._spool, self._writer, self._item, self._number, self._plan = spool, writer, item, number, plan
+        self._due = list(plan.wanted) if plan.velocities else []
 
-class _Frames:
-    """Samples of one groom in ascending order; the pose half-way between two frames is computed once."""
+    def frame(self, code: float, held: list[np.ndarray]) -> None:
+        """The points (P, 3) of the next time code in the list; an empty list if they are in the spool already."""
+        if held:
+            self._spool.write(self._number, code, held[0])
+        elif code in self._plan.wanted:
+            held.append(self._spool.read(self._number, code, slice(None)))
+        if code in self._plan.wanted:
+            self._writer.sample(self._item, code, "points", held)
+        held.clear()
+        while self._due and self._plan.last(self._due[0]) <= code:
+            due = self._due.pop(0)
+            self._writer.sample(self._item, due, "velocities", [self._velocity(due)])
 
-    def __init__(self, shot: Shot, item: StageGroom, poser: Callable[[StageGroom], Poser], velocities: bool):
-        self._item, self._make, self._poser = item, poser, None
-        self.names = ("points", "velocities") if velocities else ("points",)
-        self._rate = shot.border.rate
-        self._kept: tuple[float, np.ndarray] | None = None
-
-    def at(self, code: float) -> Iterator[np.ndarray]:
-        """Points, then velocities per second, (P, 3) float32; each can be let go before the next is made."""
-        if self._poser is None:
-            self._poser = self._make(self._item)
-        before, after = around(self._item, code)
-        wanted = len(self.names) == 2
-        if wanted and after > before and (self._kept is None or self._kept[0] != before):
-            self._kept = before, self._poser.points(before)
-        yield self._poser.points(code)
-        if not wanted:
-            return
-        if after <= before:
-            yield np.zeros_like(self._item.groom.points)
-            return
-        velocity, later = self._kept[1], self._poser.points(after)
-        self._kept = after, later
-        np.subtract(later, velocity, out=velocity)
-        velocity *= np.float32(self._rate / (after - before))
-        yield velocity
-
-    def close(self) -> None:
-        """Let threads and buffers go."""
-        self._kept = None
-        if self._poser is not None:
-            self._poser.close()
-
-
-def around(item: StageGroom, code: float) -> tuple[float, float]:
-    """The two time codes whose difference is the velocity at `code`.
-
-    Outside of its samples the animation stands still: differences are taken inside only, on one side at the ends.
-    """
-    clip, moving = item.attachment.rig.time_codes, item.placement.samples
-    first = min([clip[0], *moving[:1]])
-    last = max([clip[-1], *moving[-1:]])
-    return min(max(code - HALF, first), last), min(max(code + HALF, first), last)
+    def _velocity(self, code: float) -> np.ndarray:
+        """(P, 3) float32, in units of the prim per second."""
+        result = np.zeros((len(self._item.groom.points), 3), np.float32)
+        terms = self._plan.terms(code)
+        for low in range(0, len(result), BLOCK):
+            rows = slice(low, min(low + BLOCK, len(result)))
+            for other, weight in terms:
+                part = self._spool.read(self._number, other, rows)
+                part *= np.float32(weight)
+                result[rows] += part
+        return result
 
 
 def _check_not_input(out: Path, shot: Shot) -> None:
@@ -182,10 +153,11 @@ def _check_not_input(out: Path, shot: Shot) -> None:
 
 
 def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:
-    size = sum(len(item.groom.points) for item in shot.grooms) * 12 * (1 + velocities) * count
+    # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
+    size = 1.03 * sum(len(item.groom.points) for item in shot.grooms) * 12 * (2 + velocities) * count
     folder = next((p for p in [out.parent, *out.parent.parents] if p.is_dir()), None)
-    if folder is not None and 2.05 * size > (free := shutil.disk_usage(folder).free):
+    if folder is not None and size > (free := shutil.disk_usage(folder).free):
         raise NeuralocksError(
-            f"{out}: needs {2.05 * size / 1e9:.2f} GB while it is written, {free / 1e9:.2f} GB are free; "
+            f"{out}: needs {size / 1e9:.2f} GB while it is written, {free / 1e9:.2f} GB are free; "
             "free some, bake fewer frames or choose another folder"
         )

@@ -12,8 +12,9 @@ from neuralocks_core.errors import NeuralocksError
 
 from .bake import BakeResult, as_material, described
 from .placing import GroomPlacer
-from .samples import around, check_out, write_samples
+from .samples import check_out, write_samples
 from .stage import Shot, StageGroom, read_shot
+from .stencils import Stencils
 from .time_codes import time_codes
 
 STRANDS = 2000
@@ -73,7 +74,7 @@ class _SimulatedPoser:
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
         # Simulation begins with the animation, whatever frames are wanted.
         start = min(codes[0], float(self._rig.time_codes[0]))
-        times = sorted({start} | {t for code in codes for t in (code, *around(item, code))})
+        times = sorted({start, *Stencils(item, codes).codes})
         self._row = {code: row for row, code in enumerate(times)}
         seconds = self._rig.border.seconds(times)
         clip, character = self._rig.clip, item.attachment.character
@@ -87,7 +88,3 @@ class _SimulatedPoser:
         moved = self._moved[self._row[time_code]]
         joints = self._rig.joints_at(time_code)
         return self._placer.points(time_code, joints, lambda strands: moved[self._nearest[strands]])
-
-    def close(self) -> None:
-        """Let the threads go."""
-        self._placer.close()

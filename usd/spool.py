@@ -58,20 +58,29 @@ class Spool:
         # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
 
-    def holds(self, groom: int, time_code: float, name: str, points: int) -> bool:
-        """Whether an array (points, 3) of a frame is there, as a whole."""
+    def holds(self, groom: int, time_code: float, points: int) -> bool:
+        """Whether the points (points, 3) of a frame are there, all of them."""
         try:
-            return self._path(groom, time_code, name).stat().st_size == points * 12
+            return self._path(groom, time_code).stat().st_size == points * 12
         except OSError:
             return False
 
-    def read(self, groom: int, time_code: float, name: str) -> np.ndarray:
-        """An array (points, 3) float32 that `holds` says is there."""
-        return np.fromfile(self._path(groom, time_code, name), np.float32).reshape(-1, 3)
+    def read(self, groom: int, time_code: float, rows: slice) -> np.ndarray:
+        """Rows (n, 3) float32 of the points of a frame that is there.
 
-    def write(self, groom: int, time_code: float, name: str, array: np.ndarray) -> None:
-        """Keep an array (points, 3) of a finished frame."""
-        path = self._path(groom, time_code, name)
+        Raises:
+            NeuralocksError: they cannot be read.
+        """
+        path, first = self._path(groom, time_code), rows.start or 0
+        count = -1 if rows.stop is None else 3 * (rows.stop - first)
+        try:
+            return np.fromfile(path, np.float32, count, offset=12 * first).reshape(-1, 3)
+        except (OSError, ValueError) as error:
+            raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
+
+    def write(self, groom: int, time_code: float, array: np.ndarray) -> None:
+        """Keep the points (P, 3) of a finished frame."""
+        path = self._path(groom, time_code)
         part = path.with_suffix(".part")
         try:
             with open(part, "wb") as file:
@@ -97,8 +106,8 @@ class Spool:
         self._lock.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _path(self, groom: int, time_code: float, name: str) -> Path:
-        return self.folder / f"{groom}_{float(time_code).hex()}_{name}.frame"
+    def _path(self, groom: int, time_code: float) -> Path:
+        return self.folder / f"{groom}_{float(time_code).hex()}.frame"
 
 
 def fingerprint(files, values: dict) -> str:

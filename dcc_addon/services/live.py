@@ -106,11 +106,6 @@ class LiveHair:
         """Displacement (S, 24, 3) [m] of the network, pushed out of the body."""
         if self._resolver is None:
             self._resolver = Resolver(self.character, self._strands, self._clip)
-        result = np.empty(self._strands.rest.shape, np.float32)
-
-        def keep(strands: slice, displacement: np.ndarray) -> None:
-            result[strands] = displacement
-
-        self._session.each(vector, keep)
+        result = self._session.displacement(vector)
         self._resolver.apply(result, joints, shape, self.model.map)
         return result

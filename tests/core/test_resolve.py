@@ -1,13 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Hair leaves the body whether what it meets stands still (a grid) or moves (samples), strand by strand."""
+
 import numpy as np
 import pytest
 import trimesh
 
+from neuralocks_core.character import Body
 from neuralocks_core.collider import Collider
-from neuralocks_core.resolve import MARGIN, resolve
+from neuralocks_core.near_body import NearBody
+from neuralocks_core.resolve import MARGIN, clearance, resolved
 
 HEAD = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
-COLLIDER = Collider(HEAD.vertices, HEAD.faces)
+EXACT = Collider(HEAD.vertices, HEAD.faces)
+LOW, HIGH = np.full(3, -0.4), np.full(3, 0.4)
+FREE = clearance(np.full((60, 24), 0.01))
+
+
+def near_body(still, mesh=HEAD):
+    count = len(mesh.vertices)
+    body = Body(mesh.vertices, mesh.faces, np.zeros((count, 1), int), np.ones((count, 1)))
+    return NearBody(body, np.eye(4), np.full(count, still), LOW, HIGH)
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["still", "moving"])
+def body(request):
+    return near_body(request.param).posed(np.eye(4)[None], None, LOW, HIGH)
 
 
 def strands(count=60, turn=1.5, seed=0):
@@ -23,43 +40,76 @@ def strands(count=60, turn=1.5, seed=0):
     return np.concatenate([root[:, None], root[:, None] + np.cumsum(edges, axis=1)], axis=1).astype(np.float32)
 
 
-FREE = np.full((60, 24), 0.01)
+def test_distances_near_the_skin_are_those_of_the_sphere(body):
+    rng = np.random.default_rng(3)
+    away = rng.normal(size=(3000, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    depth = rng.uniform(-0.02, 0.01, 3000)
+    value, direction = body.distance(((0.1 + depth)[:, None] * away).astype(np.float32))
+    error = np.abs(value - depth)
+    assert np.quantile(error, 0.99) < 6e-4 and error.max() < 2e-3
+    assert (direction * away).sum(axis=1).min() > 0.97
+    assert np.isinf(body.distance(np.full((5, 3), 0.3, np.float32))[0]).all()
 
 
-def test_no_vertex_stays_inside_and_lengths_are_kept():
+def test_moving_skin_is_found_where_it_is():
+    far = np.eye(4)
+    far[:3, 3] = 0.05, 0.02, -0.03
+    posed = near_body(False).posed(far[None], None, LOW, HIGH)
+    away = np.random.default_rng(4).normal(size=(500, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    value, _ = posed.distance((0.104 * away + far[:3, 3]).astype(np.float32))
+    assert np.abs(value - 0.004).max() < 1e-3
+
+
+def test_the_sieve_finds_every_strand_that_is_inside(body):
+    points = strands(300, seed=5)
+    low = clearance(np.full((300, 24), 0.01)) - np.float32(1e-5)
+    inside = (EXACT.distance(points, limit=0.02)[0][:, 2:] < 0).any(axis=1)
+    assert 0.1 < inside.mean()
+    assert set(np.flatnonzero(inside)) <= set(body.violated(points, low))
+    assert not len(body.violated(strands(turn=0.0) * np.float32(1.5), low[:60]))
+
+
+def test_no_vertex_stays_inside_and_lengths_are_kept(body):
     before = strands()
-    assert (COLLIDER.distance(before)[0] < 0).mean() > 0.05
-    after = resolve(before, COLLIDER, FREE)
-    assert COLLIDER.distance(after)[0][:, 2:].min() > 0.5 * MARGIN
+    assert (EXACT.distance(before)[0] < 0).mean() > 0.05
+    after = resolved(before, body, FREE)
+    assert EXACT.distance(after)[0][:, 2:].min() > 0
     lengths = np.linalg.norm(np.diff(before, axis=1), axis=2)
     np.testing.assert_allclose(np.linalg.norm(np.diff(after, axis=1), axis=2), lengths, atol=2e-7)
     np.testing.assert_array_equal(after[:, :2], before[:, :2])
 
 
-def test_strands_do_not_depend_on_each_other():
+def test_strands_do_not_depend_on_each_other(body):
     before = strands()
-    whole = resolve(before, COLLIDER, FREE)
+    whole = resolved(before, body, FREE)
     order = np.random.default_rng(1).permutation(60)
-    np.testing.assert_array_equal(resolve(before[order], COLLIDER, FREE)[np.argsort(order)], whole)
-    np.testing.assert_array_equal(resolve(before[20:33], COLLIDER, FREE[20:33]), whole[20:33])
+    np.testing.assert_array_equal(resolved(before[order], body, FREE)[np.argsort(order)], whole)
+    np.testing.assert_array_equal(resolved(before[20:33], body, FREE[20:33]), whole[20:33])
 
 
-def test_hair_clear_of_the_body_is_untouched():
-    before = strands(turn=0.0) * np.float32(1.5)
-    assert resolve(before, COLLIDER, FREE) is before
-
-
-def test_hair_that_rests_inside_is_not_pushed_beyond_its_rest():
+def test_hair_that_rests_inside_is_not_pushed_beyond_its_rest(body):
     before = strands()
-    rest_distance = np.minimum(COLLIDER.distance(before)[0], 0.01)
-    np.testing.assert_array_equal(resolve(before, COLLIDER, rest_distance), before)
+    clear = clearance(body.distance(before)[0])
+    np.testing.assert_array_equal(resolved(before, body, clear), before)
+    assert not len(body.violated(before, clear - np.float32(1e-5)))
 
 
 @pytest.mark.parametrize("shift", [0.0005, 0.002, 0.01])
-def test_small_violations_make_small_corrections(shift):
+def test_small_violations_make_small_corrections(body, shift):
     """What is pushed moves by about as much as it was deep: no popping."""
     before = strands(turn=0.0)
     lowered = before.copy()
     lowered[:, 2:] -= np.float32(shift) * before[:, 2:] / np.linalg.norm(before[:, 2:], axis=2, keepdims=True)
-    after = resolve(lowered, COLLIDER, FREE)
+    after = resolved(lowered, body, FREE)
     assert np.abs(after - lowered).max() < 4 * (shift + MARGIN)
+
+
+def test_hair_slides_over_the_skin_without_jumps(body):
+    """A strand that is lowered in steps of 0.2 mm follows in steps of the same order."""
+    before = strands(40, turn=0.8, seed=2)
+    steps = [before - np.float32(2e-4 * i) * np.array([0, 1, 0], np.float32) for i in range(25)]
+    moved = np.stack([resolved(step, body, FREE[:40]) for step in steps])
+    jump = np.linalg.norm(np.diff(moved, axis=0), axis=-1)
+    assert np.quantile(jump, 0.99) < 1e-3 and jump.max() < 8e-3
