@@ -123,6 +123,7 @@ class HairSettings(bpy.types.PropertyGroup):
     resolve: BoolProperty(
         name="Keep out of Body",
         description="Push hair that the motion has brought into the body out of it, live and in bakes",
+        default=True,
         update=_look_changed,
     )
     muted: StringProperty(options={"HIDDEN"}, description="Modifiers that are off while the hair is live, as JSON")

@@ -120,7 +120,7 @@ def out_of_the_body(folder: Path) -> None:
     scenes.body(rig)
     scenes.dance(rig)
     strands = scenes.hair(rig, 60, length=0.4)
-    _live(rig, strands)
+    _live(rig, strands, resolve=False)
     free = {f: _at(strands, f) for f in (2, 13, 24)}
     strands.neuralocks_hair.resolve = True
     shown = {f: _at(strands, f) for f in (13, 2, 24)}
@@ -474,6 +474,80 @@ def bad_input(folder: Path) -> None:
     assert not _messages(), _messages()
 
 
+def bad_hair(folder: Path) -> None:
+    """Hair and models that cannot be live say why, and what is deleted or hidden meanwhile takes nothing along."""
+    import zipfile
+
+    from dcc_addon.scene.sampling import sample
+    from neuralocks_core.errors import NeuralocksError
+
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    strands, other = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Other")
+    scene = bpy.context.scene
+
+    later = folder / "later.neuralocks"
+    with zipfile.ZipFile(MODEL) as old, zipfile.ZipFile(later, "w") as new:
+        for item in old.infolist():
+            data = old.read(item)
+            new.writestr(item, data.replace(b'"format": 1', b'"format": 99') if item.filename == "model.json" else data)
+    _live(rig, strands)
+    groomed = np.array([p.position for p in other.data.points])
+    _at(strands, 7)
+    strands.neuralocks_hair.model = str(later)
+    assert "99" in _messages()["Hair"], _messages()
+    strands.neuralocks_hair.model = MODEL
+    assert not _messages(), _messages()
+
+    first = other.data.points[0].position.copy()
+    other.data.points[0].position = (float("nan"), 0, 0)
+    other.neuralocks_hair.model = MODEL
+    other.neuralocks_hair.live = True
+    assert "finite" in _messages()["Other"], _messages()
+    other.data.points[0].position = first
+    other.neuralocks_hair.live = False
+    assert _apart(np.array([p.position for p in other.data.points]), groomed) == 0.0
+
+    # Hair in an excluded collection while the motion is sampled, and shown afterwards.
+    away = bpy.data.collections.new("Away")
+    scene.collection.children.link(away)
+    away.objects.link(other)
+    scene.collection.objects.unlink(other)
+    layer = bpy.context.view_layer.layer_collection.children["Away"]
+    other.location, other.rotation_euler, other.scale = (0.1, 0.2, 0.0), (0.1, 0.2, 0.4), (1.5, 0.7, -1.0)
+    bpy.context.view_layer.update()
+    layer.exclude = True
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    scene.frame_set(17)
+    layer.exclude = False
+    other.neuralocks_hair.live = True
+    shown = _at(other, 9)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert _apart(_at(other, 9), shown) < SAME
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "away.usdc")) == {"FINISHED"}
+    assert _apart(_baked(folder / "away.usdc", "/Character/Hair_Other", 9), shown) < SAME
+
+    steps = sample(bpy.context, rig)
+    next(steps)
+    bpy.data.objects.remove(skin)
+    try:
+        list(steps)
+    except NeuralocksError as error:
+        assert "deleted" in str(error), error
+    else:
+        raise AssertionError("the body was deleted half way")
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    _at(strands, 3)
+    bpy.data.objects.remove(other)
+    _at(strands, 4)
+    assert not _messages(), _messages()
+    rig.name, strands.name = "Renamed", "Locks"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    _at(strands, 5)
+    assert not _messages(), _messages()
+
+
 def ways_of_parenting(folder: Path) -> None:
     """Hair parented to the armature, to its head bone, or grown on a deformed surface moves in the same way."""
     rig = scenes.armature()
@@ -553,6 +627,56 @@ def training(folder: Path) -> None:
     strands.neuralocks_hair.live = True
     bpy.context.scene.frame_set(9)
     assert "Hair" not in _messages(), _messages()
+
+
+def trained_for_real(folder: Path) -> None:
+    """Train from the panel's own operator in a real second Python, with progress, cancel, and a model at the end."""
+    import time
+
+    from dcc_addon.operators import training as operator
+
+    if operator.training_python_problem():
+        print(operator.training_python_problem())
+        return
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    scene = bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    scene.neuralocks.train_minutes = 0.05
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+
+    def wait(until, seconds):
+        end = time.monotonic() + seconds
+        while not until():
+            assert time.monotonic() < end, operator.job() and (operator.job().message, operator.job().failure())
+            time.sleep(0.2)
+
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    running = operator.job()
+    wait(lambda: running.message not in ("Starting",), 120)
+    assert bpy.ops.neuralocks.cancel_training() == {"FINISHED"}
+    assert operator.job() is None and not running.running and not running.succeeded
+    assert not list(folder.glob("*.neuralocks")), "a cancelled training leaves no model"
+
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    running, said, shares = operator.job(), set(), []
+
+    def follow():
+        said.add(running.message)
+        shares.append(running.done)
+        return operator.finish() is not None
+
+    wait(follow, 400)
+    print(sorted(said))
+    assert "trained" in _messages()["training"], _messages()
+    assert len(said) > 3 and shares == sorted(shares)
+    assert Path(strands.neuralocks_hair.model).parent == folder and Path(strands.neuralocks_hair.model).exists()
+    strands.neuralocks_hair.live = True
+    scene.frame_set(9)
+    assert "Hair" not in _messages(), _messages()
+    assert "neuralocks_rest" in strands.data.attributes
 
 
 def undo(folder: Path) -> None:
@@ -684,7 +808,7 @@ def words(_folder: Path) -> None:
         for prop in described.properties:
             assert prop.identifier == "rna_type" or prop.description, (cls.bl_idname, prop.identifier)
     for cls in properties.CLASSES:
-        for prop in getattr(bpy.types, cls.__name__).bl_rna.properties:
+        for prop in cls.bl_rna.properties:
             if prop.identifier in cls.__annotations__:
                 assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
                 if prop.type == "ENUM":
