@@ -44,6 +44,7 @@ def simulated(
     material: Material | None = None,
     *,
     substeps: int = 1,
+    volume: float = 0.0,
     resolver: Resolver | None = None,
     progress=None,
 ) -> np.ndarray:
@@ -58,6 +59,7 @@ def simulated(
         times: (T,) [s].
         material: of the hair.
         substeps: of each step; more mean less numerical damping than models are trained with.
+        volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
         resolver: of the same character, for the part of its body that the hair can reach.
         progress: called with (done, total, message).
 
@@ -82,6 +84,7 @@ def simulated(
         material or Material(),
         dt=STEP,
         substeps=substeps,
+        volume=volume,
         neighbours=lock_mates(strands.rest, strands.lock),
         bind_body=bind,
         progress=progress,

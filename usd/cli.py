@@ -119,6 +119,9 @@ def simulate_command(
     strands: Annotated[
         int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
     ] = None,
+    volume: Annotated[
+        float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
+    ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
     """Bake with the slow reference solver instead of the network, to compare with."""
@@ -127,8 +130,9 @@ def simulate_command(
 
     with progress_bar("simulating") as progress:
         result = simulate(
-            shot, out, groom or None, skeleton, head, frames, material=material, strands=strands, progress=progress
-        )
+            shot, out, groom or None, skeleton, head, frames,
+            material=material, strands=strands, volume=volume, progress=progress,
+        )  # fmt: skip
     _bake_report(result, as_json)
 
 

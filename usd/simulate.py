@@ -32,6 +32,7 @@ def simulate(
     subframes: int = 1,
     material=None,
     strands: int | None = None,
+    volume: float = 0.0,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> BakeResult:
     """Simulate a shot's hair and write it as a bake.
@@ -39,6 +40,7 @@ def simulate(
     Args:
         shot, out, grooms, skeleton, head, frames, subframes, material, progress: as for `bake`.
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these.
+        volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
 
     Raises:
         NeuralocksError: as `bake`, or the solver is not installed.
@@ -50,12 +52,14 @@ def simulate(
     count = STRANDS if strands is None else strands
     if count < 1:
         raise NeuralocksError(f"--strands {count}: must be above 0")
+    if not 0 <= volume < float("inf"):
+        raise NeuralocksError(f"--volume {volume}: must be 0 or above")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
     codes = time_codes(frames, shot.first, shot.last, subframes)
-    inputs = {"solver": 1, "strands": count, "material": look.log_ratios().tolist(), "codes": codes}
+    inputs = {"solver": 1, "strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
-        return _SimulatedPoser(item, codes, look, count, progress)
+        return _SimulatedPoser(item, codes, look, count, volume, progress)
 
     resumed = write_samples(shot, out, codes, poser, inputs, progress=progress)
     return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)
@@ -64,7 +68,7 @@ def simulate(
 class _SimulatedPoser:
     """Points of one groom out of a simulation of some of its strands."""
 
-    def __init__(self, item: StageGroom, codes: list[float], material, count: int, progress):
+    def __init__(self, item: StageGroom, codes: list[float], material, count: int, volume: float, progress):
         from neuralocks_core.comparison import simulated, whole_locks
 
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
@@ -78,7 +82,9 @@ class _SimulatedPoser:
         self._row = {code: row for row, code in enumerate(times)}
         seconds = self._rig.border.seconds(times)
         clip, character = self._rig.clip, item.attachment.character
-        self._moved = simulated(character, every.subset(chosen), clip, seconds, material, progress=progress)
+        self._moved = simulated(
+            character, every.subset(chosen), clip, seconds, material, volume=volume, progress=progress
+        )
         mean = every.rest.mean(axis=1)
         self._nearest = cKDTree(mean[chosen]).query(mean)[1]
         self._nearest[chosen] = np.arange(len(chosen))

@@ -51,6 +51,7 @@ def simulate(
     margin: float = 0.004,
     collision: float = 1e6,
     gravity: float = GRAVITY,
+    volume: float = 0.0,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> Rollout:
@@ -77,6 +78,7 @@ def simulate(
         margin: distance kept from the body [m], or a vertex's own distance at rest where that is less.
         collision: stiffness of the contact [1/(m s^2)].
         gravity: [m/s^2].
+        volume: stiffness against strands crowding closer than at rest [m^2/s^2], 0 for none; see `volume`.
         device: "cpu", "cuda" or "cuda:N".
         progress: called with frames done, all frames, message.
 
@@ -85,6 +87,8 @@ def simulate(
     """
     rods = rest_rods(rest, rest_support=rest_support)
     strands, vertices = rods.mass.shape
+    if not (np.isfinite(volume) and volume >= 0):
+        raise NeuralocksError(f"volume {volume}: must be 0 or above")
     if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
     way = headway(head, substeps)
@@ -108,6 +112,7 @@ def simulate(
         collision,
         gravity,
         tolerance * gravity,
+        volume,
         device,
     )
     if body is not None:

@@ -29,6 +29,7 @@ class Stepper:
         collision: float,
         gravity: float,
         tolerance: float,
+        volume: float,
         device: str,
     ):
         self.wp = wp = start_warp(device)
@@ -76,7 +77,11 @@ class Stepper:
             setattr(self.scratch, name, self._empty(wp.vec4d, column))
         for name in ("diagonal", "lower1", "lower2"):
             setattr(self.scratch, name, self._empty(wp.mat44d, column))
-        self.mesh = None
+        self.mesh, self.volume = None, None
+        if volume > 0:
+            from neuralocks_core.reference.volume import Volume
+
+            self.volume = Volume(self.rest, self.constants.mass, volume)
 
     def attach_body(self, bind: np.ndarray, triangles: np.ndarray) -> None:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
@@ -159,13 +164,14 @@ class Stepper:
             take = min(chunk, iterations - spent)
             if take <= 0:
                 break
-            if self.mesh is None and not self.clumped:
+            together = self.clumped or self.volume is not None
+            if self.mesh is None and not together:
                 take = iterations
             if spent > 0:
-                self.wake.fill_(int(self.clumped))
+                self.wake.fill_(int(together))
                 if self.mesh is not None:
                     self._look(self.x, 0)
-            if spent == 0 or self.clumped:
+            if spent == 0 or together:
                 self._gather(1.0 / dt, settling)
             self._newton(take, int(spent > 0))
             spent += take
@@ -177,6 +183,8 @@ class Stepper:
             self.x, self.last, self.before, self.target, self.pull,
         )  # fmt: skip
         self._run(self.kernels.forces, args)
+        if self.volume is not None:
+            self.volume.push(self.x, self.target, self.pull)
 
     def _newton(self, iterations: int, again: int) -> None:
         args = [
