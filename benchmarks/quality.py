@@ -2,9 +2,12 @@
 """How the network's hair compares with the solver's: per kind of motion and per hairstyle, beside the baselines.
 
     python benchmarks/quality.py [--model MODEL] [--static MODEL] [--floor] [--motion FILE.bvh ...] [--style NAME ...]
+                                 [--groom FILE ...] [--shape SEED]
 
 Hair is grown with a seed that no model was trained on, and of it only the locks that training leaves out are looked
-at; the motion is the scripted clips, or files. Rigid hair has motion error 1 and velocity error 1 by definition.
+at; the motion is the scripted clips, or files. Hair files in place of grown hair are put on the head by the spheres
+through their roots and through the scalp; `--shape` gives the body a random shape. Rigid hair has motion error 1 and
+velocity error 1 by definition.
 """
 
 from __future__ import annotations
@@ -12,6 +15,8 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -23,7 +28,7 @@ from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
-from neuralocks_core.training.rollouts import held_out_split
+from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
 SEED = 7001
 STRANDS = 48
@@ -33,14 +38,26 @@ DT = 1 / 30
 class Bench:
     """One character with hairstyles that no model has seen."""
 
-    def __init__(self, character_path: str, styles: list[str] | None):
+    def __init__(self, character_path: str, styles: list[str] | None, grooms: list[str], shape: int | None):
         from neuralocks_core.hairstyles import STYLES
         from usd.training import training_scene
 
         scene = training_scene(character_path, ["library"], seed=SEED)
         self.character = scene.character
         self.styles = {n: g for n, g in zip(STYLES, scene.grooms) if not styles or n in styles}
+        if grooms:
+            roots = np.concatenate([g.rest[g.valid, 0] for g in scene.grooms])
+            self.styles = {Path(path).stem: on_head(path, self.character, roots) for path in grooms}
         self.body = hair_body(scene.character, reach=0.9)
+        count = len(scene.character.body.shapes)
+        self.shape = np.zeros(count)
+        if shape is not None:
+            self.shape = 0.6 * np.random.default_rng([SEED, shape]).uniform(-1, 1, count)
+            maker = RolloutMaker(scene)
+            self.styles = {
+                n: replace(g, rest=maker.fitted(g.rest.astype(float), self.shape).astype(np.float32))
+                for n, g in self.styles.items()
+            }
         self.chosen = {name: self._locks(groom) for name, groom in self.styles.items()}
 
     def _locks(self, groom) -> np.ndarray:
@@ -54,29 +71,53 @@ class Bench:
         groom, chosen = self.styles[style], self.chosen[style]
         rest = groom.rest[chosen].astype(float)
         joints = clip.at(times)
-        posed = posed_over_time(self.body, joints @ self.character.inverse_bind)
-        to_bind = self.character.canonical_to_bind
-        bind_body = (self.body.points - to_bind[:3, 3]) @ to_bind[:3, :3]
+        posed = posed_over_time(self.body, joints @ self.character.inverse_bind, self.shape)
+        bind_body = self.bind_body()
         heads = self.character.canonical_to_world(joints)
         arguments = (rest, heads, posed, self.body.triangles, Material())
         return arguments, {"dt": DT, "neighbours": lock_mates(rest, groom.lock[chosen]), "bind_body": bind_body}
+
+    def bind_body(self) -> np.ndarray:
+        """Collision vertices at rest, canonical (V, 3)."""
+        to_bind = self.character.canonical_to_bind
+        return (self.body.shaped(self.shape) - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times) -> np.ndarray:
         """The network's displacement (T, n, 24, 3)."""
         key = (id(model), style)
         if key not in sessions:
             sessions[key] = model.prepare(self.styles[style])
+        clip = replace(clip, shape=np.tile(self.shape, (len(clip.times), 1)))
         sampler = model.sampler(self.character, clip)
-        sessions[key].anchor(sampler.held_bind())
+        sessions[key].anchor(sampler.held_bind(shape=self.shape))
         return np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in sampler.vectors(times)])
+
+
+def on_head(path: str, character, scalp: np.ndarray):
+    """A hair file's strands on a character's head, Y up and facing Z; `scalp` (n, 3) are canonical roots of grown hair."""
+    from neuralocks_core.formats.reading import read
+    from neuralocks_core.strands import strand_set
+
+    groom = read(path)
+    (centre, radius), (middle, wanted) = sphere(groom.points[np.cumsum(groom.counts) - groom.counts].astype(float)), sphere(scalp)
+    points = (groom.points - centre) * (wanted / radius) + middle
+    to_bind = character.canonical_to_bind
+    groom = replace(groom, points=(points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32))
+    return strand_set(groom, to_bind[:3, 3], character.head_centre, character.facing)
+
+
+def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and radius of the sphere next to points (n, 3), in least squares."""
+    rows = np.concatenate([2 * points, np.ones((len(points), 1))], axis=1)
+    x = np.linalg.lstsq(rows, np.square(points).sum(1), rcond=None)[0]
+    return x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
 
 
 def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarray, rest: np.ndarray) -> list[float]:
     """Shares of vertices inside the body and deeper than 3 mm, percent, every 12th frame; those at rest inside left
     out.
     """
-    to_bind = bench.character.canonical_to_bind
-    bind = Collider((bench.body.points - to_bind[:3, 3]) @ to_bind[:3, :3], bench.body.triangles)
+    bind = Collider(bench.bind_body(), bench.body.triangles)
     free = bind.distance(rest[:, 2:].reshape(-1, 3), limit=0.02)[0] >= 0
     deep = []
     for frame in range(0, len(points), 12):
@@ -96,10 +137,12 @@ def main() -> None:
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--motion", action="append", default=[], help="BVH or USD clips in place of the scripted ones")
     parser.add_argument("--seconds", type=float, default=8.0, help="of each file")
+    parser.add_argument("--groom", action="append", default=[], help="hair files in place of grown hair")
+    parser.add_argument("--shape", type=int, help="number of a random body shape")
     parser.add_argument("--floor", action="store_true", help="also what forgetting costs the solver")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    bench = Bench(arguments.character, arguments.style)
+    bench = Bench(arguments.character, arguments.style, arguments.groom, arguments.shape)
     models = {"network": StrandModel.load(arguments.model)}
     if arguments.static:
         models["static"] = StrandModel.load(arguments.static)
