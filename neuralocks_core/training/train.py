@@ -96,7 +96,7 @@ def train_strands(
         normalise(net, *teacher.samples(), history, options.static)
         net.to(options.device)
         optimisers = options.optimisers(net)
-        meta, modules = {"step": 0, "seconds": 0.0}, {"net": net}
+        meta, modules = {"step": 0, "seconds": 0.0, "curve": []}, {"net": net}
         if resume:
             meta = checkpoint.load(saved, modules, optimisers)
         # Against today's budget: a finished run goes on when it is given more time.
@@ -117,7 +117,8 @@ def train_strands(
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
                 last, gauge = now, look()
-                meta = {"step": state.step, "seconds": now - began}
+                curve = [*meta.get("curve", []), *_told(now - began, gauge)]
+                meta = {"step": state.step, "seconds": now - began, "curve": curve}
                 checkpoint.save(saved, meta, modules, optimisers)
             losses = " ".join(f"{name} {value:.4f}" for name, value in state.losses.items())
             report(state.done, f"{state.step} steps, {teacher.told()}; {gauge or losses}")
@@ -136,6 +137,7 @@ def train_strands(
             float(np.mean([1e3 * coder.errors(scalp_local(g)[g.valid]).mean() for g in scene.grooms])), 2
         ),
         "options": asdict(options, dict_factory=_plain),
+        "curve": meta["curve"],
     }
     description = {
         "kind": "strands",
@@ -178,6 +180,11 @@ def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
     ).cpu()
     checkpoint.save(saved, {}, {"coder": coder})
     return coder
+
+
+def _told(seconds: float, gauge) -> list[dict[str, float]]:
+    """A point of the learning curve, where there is something to measure on."""
+    return [] if gauge is None else [{"minutes": round(seconds / 60, 2), **gauge.to_json()}]
 
 
 def _plain(fields: list[tuple[str, object]]) -> dict:
