@@ -11,7 +11,7 @@ from neuralocks_core.materials import Material
 from .models import load_model, model_path
 from .pose import pose
 from .scene import curves
-from .scene.placing import bind_place, mute_deformers, unmute_deformers
+from .scene.placing import bind_place, mute_deformers, unmute_deformers, world
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
@@ -57,8 +57,7 @@ def _update(hair, scene, graph, moved: bool) -> None:
     joints = pose(armature, sampled, scene, graph, moved)
     prepared = prepare(hair, armature, sampled)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
-    place = np.array(hair.evaluated_get(graph).matrix_world, float)
-    to_local = np.linalg.inv(core @ place)
+    to_local = np.linalg.inv(core @ world(hair, graph))
     time = scene.frame_current_final / sampled.motion.rate
     points = prepared.points(time, joints, to_local, material(settings), settings.motion, settings.resolve)
     curves.keep_rest(hair.data)

@@ -19,6 +19,26 @@ def bind_place(hair, armature, sampled) -> np.ndarray:
     return place
 
 
+def world(thing, graph) -> np.ndarray:
+    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded is not evaluated: its place then
+    comes from its parent's.
+    """
+    evaluated = thing.evaluated_get(graph)
+    if evaluated.is_evaluated:
+        return np.array(evaluated.matrix_world, float)
+    own, parent = np.array(thing.matrix_basis, float), thing.parent
+    if parent is None:
+        return own
+    place = world(parent, graph)
+    pose = parent.evaluated_get(graph).pose
+    bone = pose.bones.get(thing.parent_bone) if pose and thing.parent_type == "BONE" else None
+    if bone is not None:  # bone parents count from the tail
+        tail = np.eye(4)
+        tail[1, 3] = bone.bone.length
+        place = place @ np.array(bone.matrix, float) @ tail
+    return place @ np.array(thing.matrix_parent_inverse, float) @ own
+
+
 def mute_deformers(hair) -> None:
     """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done
     that.

@@ -14,6 +14,7 @@ from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
 from .lookup import find
+from .placing import world
 
 
 def hairs_of(armature, scene) -> list:
@@ -78,7 +79,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
         joints[row] = reader.world(evaluated)
         places[""][row] = evaluated.matrix_world
         for other in tracked:
-            places[other][row] = _found(other).evaluated_get(graph).matrix_world
+            places[other][row] = world(_found(other), graph)
         values = [body_reader.shape_values(find(body)) for body in bodies]
         shapes.append(np.concatenate([np.zeros(0), *values]))
         yield row + 1, len(frames)
