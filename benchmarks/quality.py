@@ -182,6 +182,8 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
         row[f"{name} velocity"] = metrics.velocity_error(points, truth, times)
         row[f"{name} ratio"] = metrics.motion_ratio(points, truth, times)
         if name == "network":
+            row["dynamic frames"] = metrics.dynamic_frames(points, truth, times)
+            row["settles s"], row["solver settles s"] = (settling(clip, p, times) for p in (points, truth))
             row["inside"], row["inside 3 mm"] = inside(bench, points, heads, posed, rest)
             row["solver inside"] = inside(bench, truth, heads, posed, rest)[0]
             row["still jitter mm"] = metrics.jitter(points[-10:])
@@ -190,6 +192,14 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
         least = stateless_floor(*given, history=min(known, len(times) - 20), every=10, truth=truth, **keywords)
         row["floor motion"], row["floor motion rms"] = least.median, least.rms
     return row
+
+
+def settling(clip, points: np.ndarray, times: np.ndarray) -> float:
+    """Seconds until hair stands after the body does; not a number where the clip has no second of rest at its end."""
+    joints = clip.at(times)
+    moving = np.abs(np.diff(joints, axis=0)).max(axis=(1, 2, 3)) > 1e-4
+    stop = times[np.flatnonzero(moving).max(initial=-1) + 1]
+    return metrics.settling_time(points, times, stop) if times[-1] - stop > 1.0 else float("nan")
 
 
 def table(rows: list[dict], by: str) -> None:
