@@ -5,8 +5,8 @@ import numpy as np
 
 from neuralocks_core.collider import Collider
 
-CELL = 0.004
-"""Distance between grid nodes [m]; on a head, linear interpolation is then right within 0.1 mm."""
+CELL = 0.005
+"""Distance between grid nodes [m]; on a head, linear interpolation is then right within 0.2 mm."""
 ROOM = 0.03
 """How far around the head the grid reaches [m]."""
 EXACT = 0.01

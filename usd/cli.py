@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from .cli_bake import bake_command, simulate_command
+from .cli_train import train_command
 from .command import command_of, note, one_line, print_json
+from .options import AsJson, Head, Joints, Model, Out, Skeleton, numbers, pairs
 
 app = typer.Typer(
     name="neuralocks",
@@ -18,35 +21,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine to read.")]
-Grooms = Annotated[
-    list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All if left out.")
-]
-Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
-Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]
-Joints = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, where names do not tell; repeat for more."
-    ),
-]
-Frames = Annotated[
-    str | None,
-    typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out."),
-]
-Materials = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--material",
-        help="NAME=VALUE, or NAME=2x for a factor. bend 0.0002..0.005 m^4/s^2, weight 0.5..2 (times gravity), "
-        "damping 4..20 /s, clumping 0..240 /s^2.",
-    ),
-]
-Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", help="Threads; all cores if left out. The result is the same.")]
-
 command = command_of(app)
+command("bake")(bake_command)
+command("simulate")(simulate_command)
+command("train")(train_command)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -68,72 +46,6 @@ def _add_rig() -> None:
         return
     if not any(group.name == "rig" for group in app.registered_groups):
         app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
-
-
-@command("bake")
-def bake_command(
-    shot: Annotated[Path, typer.Argument(help="USD stage with an animated skeleton and at least one groom.")],
-    out: Out,
-    model: Model = None,
-    groom: Grooms = None,
-    skeleton: Skeleton = None,
-    head: Head = None,
-    joint: Joints = None,
-    frames: Frames = None,
-    subframes: Annotated[int, typer.Option(help="Samples per frame, for motion blur.")] = 1,
-    material: Materials = None,
-    strength: Annotated[float, typer.Option(help="Motion strength: 0 is each pose as if held, 1 as trained.")] = 1.0,
-    resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
-    loop: Annotated[bool, typer.Option("--loop", help="The clip's last sample is followed by its first.")] = False,
-    velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-) -> None:
-    """Bake moving hair into a layer that goes over the shot.
-
-    The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back.
-    A bake that was stopped goes on where it was when the same command is given again.
-    """
-    from .bake import bake
-    from .progress import progress_bar
-
-    with progress_bar("baking") as progress:
-        result = bake(
-            shot, out, model, groom or None, skeleton, head, frames,
-            joints=_pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
-            resolve=resolve, loop=loop, velocities=velocities,
-            jobs=jobs, progress=progress,
-        )  # fmt: skip
-    _bake_report(result, as_json)
-
-
-@command("simulate")
-def simulate_command(
-    shot: Annotated[Path, typer.Argument(help="USD stage with an animated skeleton and at least one groom.")],
-    out: Out,
-    groom: Grooms = None,
-    skeleton: Skeleton = None,
-    head: Head = None,
-    frames: Frames = None,
-    material: Materials = None,
-    strands: Annotated[
-        int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
-    ] = None,
-    volume: Annotated[
-        float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
-    ] = 0.0,
-    as_json: AsJson = False,
-) -> None:
-    """Bake with the slow reference solver instead of the network, to compare with."""
-    from .progress import progress_bar
-    from .simulate import simulate
-
-    with progress_bar("simulating") as progress:
-        result = simulate(
-            shot, out, groom or None, skeleton, head, frames,
-            material=material, strands=strands, volume=volume, progress=progress,
-        )  # fmt: skip
-    _bake_report(result, as_json)
 
 
 @command("import")
@@ -167,7 +79,7 @@ def inspect_command(
     """Say what a file holds, and what would stop or spoil a bake of it."""
     from .inspect import as_text, inspect
 
-    facts = inspect(file, head, _pairs(joint, "--joint"))
+    facts = inspect(file, head, pairs(joint, "--joint"))
     if as_json:
         print_json(facts)
     else:
@@ -226,7 +138,7 @@ def body_command(
     """Write the statistical body anny as a USD character (extra 'body')."""
     from .body import write_body
 
-    typer.echo(str(write_body(out, phenotype=_numbers(phenotype, "--phenotype") or None)))
+    typer.echo(str(write_body(out, phenotype=numbers(phenotype, "--phenotype") or None)))
 
 
 @command("grow")
@@ -267,82 +179,3 @@ def demo_command(
     for name, path in {"shot": str(done.shot), **outputs}.items():
         took = f" ({done.seconds[name]:.1f} s)" if name in done.seconds else ""
         typer.echo(f"{name}: {path}{took}")
-
-
-@command("train")
-def train_command(
-    character: Annotated[Path, typer.Option(help="USD character: skeleton, skinned mesh, blend shapes.")],
-    out: Out,
-    groom: Annotated[
-        list[str] | None, typer.Option(help="USD groom, or 'library' for the procedural styles; repeat for more.")
-    ] = None,
-    motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
-    minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
-    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")] = False,
-    skeleton: Skeleton = None,
-    head: Head = None,
-    static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
-    rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
-    processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
-    credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
-    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
-) -> None:
-    """Train a strand model for a character (extra 'train')."""
-    from .progress import progress_bar
-    from .train import train
-
-    settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
-    with progress_bar("training") as progress:
-        path = train(
-            character, groom or [], motion or [], out, settings, skeleton=skeleton, head=head, resume=resume,
-            rollouts=rollouts, processes=processes, credits=credit or [], keep_work=keep_work,
-            progress=progress,
-        )  # fmt: skip
-    typer.echo(str(path))
-
-
-def _bake_report(result, as_json: bool) -> None:
-    note(result.notes)
-    if as_json:
-        print_json(
-            {
-                "path": str(result.path),
-                "frames": result.frames,
-                "grooms": result.grooms,
-                "notes": result.notes,
-                "seconds": round(result.seconds, 3),
-                "resumed": result.resumed,
-            }
-        )
-        return
-    for groom in result.grooms:
-        typer.echo(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}")
-    taken = f", {result.resumed} taken over from an interrupted bake" if result.resumed else ""
-    first, last = result.frames[0], result.frames[-1]
-    typer.echo(
-        f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} in {result.seconds:.1f} s{taken}"
-    )
-
-
-def _pairs(words: list[str] | None, option: str) -> dict[str, str]:
-    from neuralocks_core.errors import NeuralocksError
-
-    pairs = {}
-    for word in words or ():
-        name, equals, value = word.partition("=")
-        if not (name.strip() and equals and value.strip()):
-            raise NeuralocksError(f"{option} {word}: is not NAME=VALUE; give both sides of '='")
-        pairs[name.strip()] = value.strip()
-    return pairs
-
-
-def _numbers(words: list[str] | None, option: str) -> dict[str, float]:
-    from neuralocks_core.errors import NeuralocksError
-
-    try:
-        return {name: float(text) for name, text in _pairs(words, option).items()}
-    except ValueError:
-        raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None

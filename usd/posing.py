@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strands import StrandSet
 
 from .memory import give_back
 from .placing import GroomPlacer
@@ -51,16 +52,31 @@ class GroomPoser:
             self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
         give_back()  # 60 MB of a large groom
 
+    @property
+    def strands(self) -> StrandSet:
+        """The groom as the network sees it."""
+        return self._placer.strands
+
     def points(self, time_code: float) -> np.ndarray:
         """The groom's points (P, 3) float32 at a time code, in the prim's own space and units."""
         joints = self._rig.joints_at(time_code)
-        seconds = self._rig.border.seconds([time_code])
-        vector = self._sampler.vectors(seconds, self._material, self._strength, joints[None])[0]
         placed = self._placer.at(time_code, joints)
         if self._resolver is None:
-            self._session.each(vector, placed.put)
+            self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
-        moved = self._session.displacement(vector)
-        self._resolver.apply(moved, joints, self._rig.clip.shape_at(seconds)[0], self._model.map)
+        moved = self.moved(time_code)
         self._model.by_chunk(lambda strands: placed.put(strands, moved[strands]), len(moved))
         return placed.points
+
+    def moved(self, time_code: float) -> np.ndarray:
+        """Displacement (S, 24, 3) float32 [m] of the network's vertices, in canonical space."""
+        joints = self._rig.joints_at(time_code)
+        moved = self._session.displacement(self._vector(time_code, joints))
+        if self._resolver is not None:
+            shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+            self._resolver.apply(moved, joints, shape, self._model.map)
+        return moved
+
+    def _vector(self, time_code: float, joints: np.ndarray) -> np.ndarray:
+        seconds = self._rig.border.seconds([time_code])
+        return self._sampler.vectors(seconds, self._material, self._strength, joints[None])[0]

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks train`: from files to a model file."""
 
+import dataclasses
+import enum
+import math
 import shlex
 import sys
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+
+METHODS = ("rollouts", "selfsupervised")
 
 
 def train(
@@ -15,6 +20,8 @@ def train(
     out,
     settings: dict,
     *,
+    method: str = "rollouts",
+    paper: bool = False,
     skeleton: str | None = None,
     head: str | None = None,
     resume: bool = False,
@@ -31,7 +38,10 @@ def train(
         grooms: USD files, or "library".
         motion: BVH or USD files.
         out: `.neuralocks` file to write.
-        settings: fields of `training.regression.RegressionOptions`.
+        settings: fields of `training.regression.RegressionOptions`, or of
+            `training.selfsupervised.SelfSupervisedOptions`; values may be words.
+        method: "rollouts" of the solver, or "selfsupervised" as in the paper.
+        paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
         skeleton, head: as for `bake`.
         resume: go on with an interrupted training.
         rollouts, processes: how many simulations, made by how many processes.
@@ -40,8 +50,12 @@ def train(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: a file cannot be used, or the extra `train` is missing.
+        NeuralocksError: a file cannot be used, a setting is unknown, or the extra `train` is missing.
     """
+    if method not in METHODS:
+        raise NeuralocksError(f"--method {method}: is unknown; choose one of {', '.join(METHODS)}")
+    if paper and method != "selfsupervised":
+        raise NeuralocksError("--paper: goes with --method selfsupervised only; add it, or leave --paper out")
     try:
         import torch
         import warp  # noqa: F401  (the solver's)
@@ -50,13 +64,55 @@ def train(
     if settings.get("device") == "cuda" and not torch.cuda.is_available():
         raise NeuralocksError("--device cuda: this machine has no CUDA device; use --device cpu")
     from neuralocks_core.training.regression import RegressionOptions
+    from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary
     from neuralocks_core.training.train import train_strands
 
     from .training import training_scene
 
-    scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=settings.get("seed", 0))
+    kind = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
+    values = parsed(kind, settings)
+    options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
+    history = {"spec": paper_boundary()} if paper else {}
+    scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=options.seed, **history)
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
-        scene, out, RegressionOptions(**settings), rollouts=rollouts, processes=processes, resume=resume,
+        scene, out, options, rollouts=rollouts, processes=processes, resume=resume,
         credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
     )  # fmt: skip
+
+
+def parsed(kind: type, settings: dict) -> dict:
+    """Settings with words turned into what the fields of a dataclass hold.
+
+    Raises:
+        NeuralocksError: a name is no field, or a word is no such value.
+    """
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    result = {}
+    for name, value in settings.items():
+        if name not in fields:
+            raise NeuralocksError(f"--set {name}: is no option of this method; it has {', '.join(sorted(fields))}")
+        result[name] = _value(name, value, fields[name].default) if isinstance(value, str) else value
+    return result
+
+
+def _value(name: str, word: str, default):
+    """A word as a value of the default's kind."""
+    try:
+        if isinstance(default, bool):
+            return {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}[word.lower()]
+        if isinstance(default, enum.Enum):
+            return {member.name.lower(): member for member in type(default)}[word.lower()]
+        if isinstance(default, tuple):
+            return tuple(float(part) for part in word.split(","))
+        if default is None or isinstance(default, int):
+            return int(word)
+        if isinstance(default, float):
+            number = float(word)
+            if not math.isfinite(number):
+                raise ValueError
+            return number
+    except (KeyError, ValueError):
+        wanted = "|".join(m.name.lower() for m in type(default)) if isinstance(default, enum.Enum) else f"like {default}"
+        raise NeuralocksError(f"--set {name}={word}: is not a value for it; give {wanted}") from None
+    return word

@@ -134,3 +134,33 @@ def test_a_hair_file_becomes_a_usd_groom(tmp_path, capsys):
     points = np.asarray(UsdGeom.BasisCurves(prim).GetPointsAttr().Get())
     assert np.array_equal(again[0].points, points)
     assert write_groom(tmp_path / "third.usda", again[0]).exists()
+
+
+def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_path, capsys):
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    out = tmp_path / "m.neuralocks"
+    selfsupervised = ("--method", "selfsupervised")
+    for words, said in (
+        (("--method", "magic"), "selfsupervised"),
+        (("--paper",), "--method"),
+        ((*selfsupervised, "--set", "colour=red"), "undetached"),
+        ((*selfsupervised, "--set", "form=round"), "constant"),
+        ((*selfsupervised, "--set", "rate=nan"), "rate"),
+    ):
+        assert status("train", "--character", tmp_path / "nope.usda", "-o", out, *words) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and said in error and "nope" not in error
+
+
+def test_settings_are_words_for_fields():
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    from neuralocks_core.physics.bend_twist import Cosserat
+    from neuralocks_core.training.selfsupervised import SelfSupervisedOptions
+    from usd.train import parsed
+
+    words = {"form": "direct", "paper_adhesion": "yes", "style": "1,2.5", "poses": "4", "rate": "1e-4", "steps": "7"}
+    values = parsed(SelfSupervisedOptions, words)
+    assert values == {
+        "form": Cosserat.DIRECT, "paper_adhesion": True, "style": (1.0, 2.5), "poses": 4, "rate": 1e-4, "steps": 7
+    }  # fmt: skip
+    assert SelfSupervisedOptions.paper(**values).output == "displacement"

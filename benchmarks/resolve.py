@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What keeping hair out of the body costs per frame, beside what it gains.
+
+    python benchmarks/resolve.py [MODEL] [--shot SHOT] [--every 6]
+
+CPU time of the best of three calls, one thread, of the shot's first groom. Penetration is measured against the exact
+collider; a jump is how far a vertex goes from one frame to the next against the head.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+MEASURED = 4
+"""Of so many strands one is measured."""
+
+
+def main() -> None:
+    """Print the table."""
+    from neuralocks_core import metrics
+    from neuralocks_core.resolve import CLAMPED, Resolver
+    from neuralocks_core.runtime import StrandModel
+    from usd.demo import shipped_shot
+    from usd.posing import GroomPoser
+    from usd.stage import read_shot
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", nargs="?")
+    parser.add_argument("--shot", type=Path)
+    parser.add_argument("--every", type=int, default=6)
+    arguments = parser.parse_args()
+    model = StrandModel.load(arguments.model, threads=1)
+    shot = read_shot(arguments.shot or shipped_shot())
+    item = shot.grooms[0]
+    rig, character = item.attachment.rig, item.attachment.character
+    poser = {name: GroomPoser(item, model, resolve=name == "with") for name in ("without", "with")}
+    exact = Resolver(character, poser["with"].strands, rig.clip)
+    began = time.process_time()
+    exact.low  # noqa: B018  (made when first asked for)
+    print(f"{shot.path.name}: {item.groom.strand_count} strands; once: {time.process_time() - began:.2f} s of CPU time")
+    some = slice(None, None, MEASURED)
+    rest = exact.strands.rest[some, CLAMPED:]
+    rest_distance = exact.at_rest.distance(rest, limit=0.02)[0].ravel()
+    distances, jumps, cost = ({name: [] for name in poser} for _ in range(3))
+    codes = np.arange(shot.first, shot.last, arguments.every).tolist()
+    for done, code in enumerate(codes):
+        joints = rig.joints_at(code)
+        collider = exact.collider(joints, rig.clip.shape_at(rig.border.seconds([code]))[0])
+        for name, each in poser.items():
+            now, after = each.moved(code), each.moved(code + 1)
+            cost[name].append(min(_timed(each.points, code) for _ in range(3)))
+            jumps[name].append(np.linalg.norm(after - now, axis=2)[:, CLAMPED:])
+            where = exact.strands.rest[some, CLAMPED:] + now[some, CLAMPED:]
+            distances[name].append(collider.distance(where, limit=0.02)[0].ravel())
+        print(f"\r{done + 1} of {len(codes)} frames", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    print(f"{'':>8} {'ms a frame':>10} {'most':>6} | {'inside %':>8} {'3 mm %':>7} | jump a frame: {'mean':>8} {'99.9 %':>8} mm")
+    for name in poser:
+        depth = metrics.penetration(np.stack(distances[name]), rest_distance)
+        jump, spent = 1000 * np.stack(jumps[name]), 1000 * np.array(cost[name])
+        print(
+            f"{name:>8} {spent.mean():10.1f} {spent.max():6.1f} | {depth['penetration_percent']:8.3f} "
+            f"{depth['penetration_3mm_percent']:7.3f} | {jump.mean():23.2f} {np.quantile(jump, 0.999):8.2f}"
+        )
+    spent = {name: np.mean(values) for name, values in cost.items()}
+    print(f"with / without: {spent['with'] / spent['without']:.2f}, without writing the frame")
+
+
+def _timed(function, *arguments) -> float:
+    start = time.process_time()
+    function(*arguments)
+    return time.process_time() - start
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks train`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Head, Out, Skeleton, pairs
+
+
+def train_command(
+    character: Annotated[Path, typer.Option(help="USD character: skeleton, skinned mesh, blend shapes.")],
+    out: Out,
+    groom: Annotated[
+        list[str] | None, typer.Option(help="USD groom, or 'library' for the procedural styles; repeat for more.")
+    ] = None,
+    motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
+    minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
+    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")] = False,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
+    rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
+    processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
+    method: Annotated[
+        str,
+        typer.Option(help="rollouts: learn from simulations made meanwhile; selfsupervised: the paper's own, from the physics alone."),
+    ] = "rollouts",
+    paper: Annotated[
+        bool, typer.Option("--paper", help="With selfsupervised, the paper's choice wherever it states one.")
+    ] = False,
+    setting: Annotated[
+        list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; a wrong name lists them.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
+    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
+) -> None:
+    """Train a strand model for a character (extra 'train')."""
+    from .progress import progress_bar
+    from .train import train
+
+    settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
+    with progress_bar("training") as progress:
+        path = train(
+            character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
+            skeleton=skeleton, head=head, resume=resume, rollouts=rollouts, processes=processes,
+            credits=credit or [], keep_work=keep_work, progress=progress,
+        )  # fmt: skip
+    typer.echo(str(path))

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands share, and the words NAME=VALUE."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine to read.")]
+Grooms = Annotated[
+    list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All if left out.")
+]
+Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
+Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]
+Joints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, where names do not tell; repeat for more."
+    ),
+]
+Frames = Annotated[
+    str | None,
+    typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out."),
+]
+Materials = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--material",
+        help="NAME=VALUE, or NAME=2x for a factor. bend 0.0002..0.005 m^4/s^2, weight 0.5..2 (times gravity), "
+        "damping 4..20 /s, clumping 0..240 /s^2.",
+    ),
+]
+Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", help="Threads; all cores if left out. The result is the same.")]
+
+
+def pairs(words: list[str] | None, option: str) -> dict[str, str]:
+    """{NAME: VALUE} of words NAME=VALUE, given to `option`."""
+    found = {}
+    for word in words or ():
+        name, equals, value = word.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise NeuralocksError(f"{option} {word}: is not NAME=VALUE; give both sides of '='")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def numbers(words: list[str] | None, option: str) -> dict[str, float]:
+    """As `pairs`, of numbers."""
+    try:
+        return {name: float(text) for name, text in pairs(words, option).items()}
+    except ValueError:
+        raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None
