@@ -24,10 +24,13 @@ def on_update(scene, graph):
     """Something was edited: follow a pose made by hand, and notice edited animation."""
     if session.paused:
         return
+    changed = [update.id for update in graph.updates]
+    for thing in changed:
+        if isinstance(thing, bpy.types.Mesh):
+            session.weights.pop(thing.name_full, None)
     names = {a.name_full for a in live.carriers(scene)}
     if not names:
         return
-    changed = [update.id for update in graph.updates]
     if any(isinstance(thing, bpy.types.Action) for thing in changed):
         _mark_stale()
     if any(isinstance(o, bpy.types.Object) and (o.name_full in names or _mode_changed(o)) for o in changed):

@@ -49,6 +49,8 @@ class Session:
     readers: dict[str, object] = field(default_factory=dict)
     chains: dict[str, object] = field(default_factory=dict)
     models: dict[str, tuple] = field(default_factory=dict)
+    weights: dict[str, tuple] = field(default_factory=dict)
+    """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     messages: dict[str, str] = field(default_factory=dict)
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
@@ -66,6 +68,7 @@ class Session:
     def doubt(self) -> None:
         """Anything in the file may have changed: look before use."""
         self.doubtful.update(self.hairs)
+        self.weights.clear()
         self.chains.clear()
 
     def forget(self, name: str) -> None:

@@ -4,6 +4,10 @@
 import numpy as np
 
 from ..services.rig import BodyArrays
+from ..session import session
+
+PROBES = 500
+"""Vertices whose weights are compared with what is known."""
 
 
 def find(armature, objects) -> list:
@@ -25,7 +29,6 @@ def read(mesh_object) -> BodyArrays:
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    rows = [(v.index, g.group, g.weight) for v in mesh.vertices for g in v.groups]
     shapes = {}
     keys = mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
@@ -39,9 +42,23 @@ def read(mesh_object) -> BodyArrays:
         points,
         triangles,
         tuple(group.name for group in mesh_object.vertex_groups),
-        np.array(rows, float).reshape(-1, 3),
+        _weights(mesh, tuple(group.name for group in mesh_object.vertex_groups)),
         shapes,
     )
+
+
+def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
+    """Rows (N, 3) of vertex, group, weight: read again only when a few of them, or the groups, have changed.
+
+    Blender gives them one by one: half a second for a large body.
+    """
+    some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
+    probe = len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
+    known = session.weights.get(mesh.name_full)
+    if known is None or known[0] != probe:
+        rows = [(v.index, g.group, g.weight) for v in mesh.vertices for g in v.groups]
+        known = session.weights[mesh.name_full] = probe, np.array(rows, float).reshape(-1, 3)
+    return known[1]
 
 
 def shape_values(mesh_object) -> np.ndarray:
