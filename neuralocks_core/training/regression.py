@@ -23,6 +23,8 @@ from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
 
 MARGIN = 0.004
 """[m] Distance to the body that the solver keeps, and below which the collision term acts."""
+STILL = 0.01
+"""Motion, in strand lengths, below which a strand counts as standing."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class RegressionOptions:
         rate: first step size, falling along a cosine.
         optimiser: "muon" for the weight matrices (AdamW for the rest), or "adamw" for all.
         velocity: weight of the frame difference against the position, both in strand lengths.
+        swing: weight of the error about its mean over a strand's moments, relative to the strand's own motion.
         collision: weight of the depth under the target's body plane, in strand lengths.
         output: "direction" or "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
@@ -54,6 +57,7 @@ class RegressionOptions:
     rate: float = 2e-3
     optimiser: str = "muon"
     velocity: float = 8.0
+    swing: float = 0.15
     collision: float = 30.0
     output: str = "direction"
     motion: str = "modulated"
@@ -165,10 +169,11 @@ def regress(
 
 
 def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
-    """Weighted losses of a batch, each a mean over vertices in units of strand length.
+    """Weighted losses of a batch, each a mean in units of strand length, `swing` a ratio.
 
-    `position` |x - x*|, `velocity` the same of frame differences, `collision` how far x lies under the plane
-    of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
+    that motion, so that small motion counts as much as large, `collision` how far x lies under the plane of the body
+    next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])
@@ -179,6 +184,8 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     position = _norm(error) / length
     pairs = error.unflatten(1, (-1, 2))
     velocity = _norm(pairs[:, :, 1] - pairs[:, :, 0]) / length
+    true_swing = _spread(batch["moved"]) + STILL**2 * batch["length"].square()
+    swing = (_spread(error) / true_swing + 1e-6).sqrt()  # smooth at zero
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
     target = (normals * batch["moved"]).sum(-1) - offset
     depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
@@ -186,6 +193,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     return {
         "position": position.mean(),
         "velocity": options.velocity * velocity.mean(),
+        "swing": options.swing * swing.mean(),
         "collision": options.collision * (depth / length).mean(),
     }
 
@@ -213,6 +221,11 @@ def predicted(
         anchor = offsets[-1:] if anchored else None
         result[:, group] = deform(offsets[:-1], rest, anchor, output).cpu().numpy()
     return result
+
+
+def _spread(vectors: Tensor) -> Tensor:
+    """(M, n) mean square of (M, moments, n, 24, 3) about the mean over moments."""
+    return (vectors - vectors.mean(1, keepdim=True)).square().sum(-1).mean((1, 3))
 
 
 def _norm(vectors: Tensor) -> Tensor:
