@@ -33,34 +33,35 @@ ROWS = {
     "static (no history)": {"options": {"static": True}},
     "displacement output (paper)": {"options": {"output": "displacement"}},
     "no lock codes": {"locks": False},
-    "deep motion encoder": {"options": {"motion": "encoder"}},
-    "hidden layers scaled by the frame": {"options": {"motion": "modulated"}},
+    "frame part linear (paper)": {"options": {"motion": "linear"}},
+    "frame part deeper, scales nothing": {"options": {"motion": "encoder"}},
     "AdamW for all weights": {"options": {"optimiser": "adamw", "rate": 3e-3}},
     "N = 30 single steps (paper)": {"spec": BoundarySpec(bins=(1,) * 30, taper=0.0)},
     "no taper": {"spec": replace(SPEC, taper=0.0)},
     "half the history": {"spec": replace(SPEC, bins=(1,) * 12 + (2,) * 8)},
     "head's velocity instead of effective gravity": {"spec": replace(SPEC, linear="velocity")},
     "no head translation (paper)": {"spec": replace(SPEC, linear="none")},
+    "no loss relative to the strand's motion": {"options": {"swing": 0.0}},
     "no velocity loss": {"options": {"velocity": 0.0}},
     "no collision loss": {"options": {"collision": 0.0}},
 }
 """Variant -> what differs from the shipped settings."""
 
 
-def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollouts: int) -> None:
+def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollouts: int) -> None:
     """Train and measure each variant; prints a Markdown table as it goes."""
     coder = StrandAutoencoder()
     checkpoint.load(work / "codes.npz", {"coder": coder})
     codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
     scenes = {"rollouts": scene, "held_out": replace(scene, held_out=True)}
     files = {name: sorted((work / name).glob("*.npz"))[:rollouts] for name in scenes}
-    print(f"{len(files['rollouts'])} rollouts, {minutes:g} min each, seed {scene.seed}\n")
+    print(f"{len(files['rollouts'])} rollouts, {budget} each, seed {scene.seed}\n")
     names = "position rigid motion motion_static motion_ratio velocity droop penetration".split()
-    print("| variant | steps | " + " | ".join(names) + " |")
-    print("| --- |" + " ---: |" * (len(names) + 1))
+    print("| variant | steps | CPU s | " + " | ".join(names) + " |")
+    print("| --- |" + " ---: |" * (len(names) + 2))
     for row in rows:
         change = ROWS[row]
-        options = RegressionOptions(minutes=minutes, **change.get("options", {}))
+        options = RegressionOptions(**{**budget, **change.get("options", {})})
         spec = change.get("spec", scene.spec)
         banks = {}
         for name, which in scenes.items():
@@ -73,11 +74,12 @@ def run(scene: TrainingScene, work: Path, rows: list[str], minutes: float, rollo
                 for inputs in bank.inputs:
                     inputs[:, 34:66] = 0
         torch.manual_seed(options.seed)
+        began = time.process_time()
         net = StrandNet(spec.size, motion=options.motion)
         normalise(net, *samples(banks["rollouts"]), spec.slices["history"], options.static)
         *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
-        print(f"| {row} | {state.step} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
+        print(f"| {row} | {state.step} | {time.process_time() - began:.0f} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
 
 
 def main() -> None:
@@ -90,13 +92,18 @@ def main() -> None:
     parser.add_argument("--groom", action="append", required=True)
     parser.add_argument("--motion", action="append", default=[])
     parser.add_argument("--minutes", type=float, default=3.0)
+    parser.add_argument("--steps", type=int, help="in place of minutes; fair on a busy machine")
+    parser.add_argument("--rate", type=float, default=4e-3, help="first step size; short runs want a larger one")
     parser.add_argument("--rollouts", type=int, default=10**6)
     parser.add_argument("--row", action="append", choices=list(ROWS))
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
     start = time.monotonic()
-    run(scene, arguments.work, arguments.row or list(ROWS), arguments.minutes, arguments.rollouts)
+    budget = {"rate": arguments.rate} | (
+        {"steps": arguments.steps} if arguments.steps else {"minutes": arguments.minutes}
+    )
+    run(scene, arguments.work, arguments.row or list(ROWS), budget, arguments.rollouts)
     print(f"\n{(time.monotonic() - start) / 60:.0f} min in all, torch {torch.__version__}")
 
 

@@ -49,6 +49,9 @@ def train_strands(
 ) -> Path:
     """Train on rollouts of the solver, or on the physics of random moments, and write a model file.
 
+    The solver works in spawned processes, which import the calling script anew: a script calls this under
+    `if __name__ == "__main__":`.
+
     Args:
         scene: character, grooms, motion.
         out: the model file to write, `*.neuralocks`.
