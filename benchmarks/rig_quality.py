@@ -50,15 +50,19 @@ def main() -> None:
     _held_row("direct optimisation", held[first], "optimised")
     _held_row("carried rigidly", held[first], "rigid")
     print(
-        "\n| motion | error | motion ratio | 24 fps mm | 30 fps mm | flung by a teleport mm | for s | bytes carried on |"
+        "\n| motion | error | motion ratio | inside % | worst mm | 24 fps mm | 30 fps mm | flung by a teleport mm | for s | bytes carried on |"
     )
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    depth = motion["motion_depth"]
+    own = [f"{depth['simulation']['percent']:.2f}", f"{depth['simulation']['worst_mm']:.1f}"]
+    print("| simulation | 0 | 1 | " + " | ".join([*own, *"-----"]) + " |")
     for name, error in motion["motion_error"].items():
         row = [name, error, motion["motion_ratio"][name]]
+        row += [f"{depth[name]['percent']:.2f}", f"{depth[name]['worst_mm']:.1f}"]
         if name in motion["rates"]:
             row += [*motion["rates"][name].values(), *motion["teleport"][name].values()]
             row += [motion["cost"][name]["bytes_carried_on"]]
-        print("| " + " | ".join(map(str, row + ["-"] * (8 - len(row)))) + " |")
+        print("| " + " | ".join(map(str, row + ["-"] * (10 - len(row)))) + " |")
 
 
 def _held_row(name: str, report: dict, key: str) -> None:

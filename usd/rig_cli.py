@@ -199,6 +199,9 @@ def report_lines(report: dict) -> list[str]:
             )
     for name, error in report.get("motion_error", {}).items():
         line = f"in motion, {name}: error against the simulation {error:.3f} (carried rigidly 1)"
+        if name in report.get("motion_depth", {}):
+            depth = report["motion_depth"][name]
+            line += f"; {depth['percent']:.2f} % of vertices in the body, at most {depth['worst_mm']:.1f} mm"
         if name in report.get("rates", {}):
             rates = ", ".join(f"{gap} mm off at {rate}" for rate, gap in report["rates"][name].items())
             jump, cost = report["teleport"][name], report["cost"][name]

@@ -24,7 +24,7 @@ from neuralocks_core.training.rig_report import static_report
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
-_COLLISION = 3e-5
+_COLLISION = 1.5e-4
 """Of the skinned mesh's contact [m^2/s^2] against squared errors [m^2]."""
 
 

@@ -11,11 +11,12 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference.chains import BodyPoints, ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig_energy import RigMaterial, RodTree
-from neuralocks_core.training.rig_poses import body_around
+from neuralocks_core.training.rig_poses import body_around, posed_distances, rest_distances
+from neuralocks_core.training.rig_report import depths
 
 RATE = 30.0
 """Samples of the simulations [Hz]."""
@@ -46,31 +47,41 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1);
         `motion_error_by_kind`: the same for each kind of motion;
         `motion_ratio`: mean speed in the head's frame over the simulation's;
+        `motion_depth`: what lies in the body at every eighth sample, as `rig_report.depths`; of the simulation too;
         `rates`: rms difference at shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm];
-        `teleport`: see `_teleports`; `cost`: see `_costs`.
+        `teleport`: see `_teleports`; `cost`: see `_network_cost`.
     """
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)
     true = _ends(rig, truth)
     rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
     times = motions[0].start + np.arange(true.shape[1]) / RATE
-    heads = np.stack([rig.character.canonical_to_world(m.at(times)) for m in motions])
+    joints = np.stack([m.at(times) for m in motions])
+    heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
     fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
-    springs = [_ends(rig, spring_bones(rig.chains, heads, 1 / RATE, fit)) for fit in fits]
-    best = int(np.argmin([np.square(s - true).sum(-1).mean() for s in springs]))
-    candidates = {SPRINGS: springs[best], DEFAULTS: _ends(rig, spring_bones(rig.chains, heads, 1 / RATE))}
+    springs = [spring_bones(rig.chains, heads, 1 / RATE, fit) for fit in fits]
+    best = int(np.argmin([np.square(_ends(rig, s) - true).sum(-1).mean() for s in springs]))
+    candidates = {SPRINGS: springs[best], DEFAULTS: springs[fits.index(SpringSettings())]}
     for name, model in models.items():
-        candidates[name] = np.stack([_model_ends(rig, model, m, times) for m in motions])
+        candidates[name] = np.stack([_model_turns(rig, model, m, times) for m in motions])
     carried = np.square(rest - true).sum(-1).mean(axis=(1, 2))
     speed = np.linalg.norm(np.diff(true, axis=1), axis=-1).mean()
-    result = {"motion_error": {}, "motion_error_by_kind": {}, "motion_ratio": {}}
-    for name, ends in candidates.items():
+    result = {"motion_error": {}, "motion_error_by_kind": {}, "motion_ratio": {}, "motion_depth": {}}
+    for name, turns in candidates.items():
+        ends = _ends(rig, turns)
         values = np.square(ends - true).sum(-1).mean(axis=(1, 2))
         result["motion_error"][name] = round(float(np.sqrt(values.mean() / carried.mean())), 4)
         by_kind = np.sqrt(values / np.maximum(carried, 1e-12))
         result["motion_error_by_kind"][name] = {k: round(float(v), 3) for k, v in zip(kinds, by_kind)}
         ratio = np.linalg.norm(np.diff(ends, axis=1), axis=-1).mean() / speed
         result["motion_ratio"][name] = round(float(ratio), 3)
+    if rig.character.body is not None and len(rig.points):
+        outside = rest_distances(rig, rig.points) > 0
+        few = joints[:, ::8].reshape(-1, *joints.shape[2:])
+        for name, turns in {"simulation": truth, **candidates}.items():
+            matrices = quaternion_matrices(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
+            points = skin(rig.chains, *pose_chains(rig.chains, matrices), rig.points[outside], rig.weights[outside])
+            result["motion_depth"][name] = depths(posed_distances(rig, few, points))
     result["spring_settings"] = asdict(fits[best])
     result["rates"] = _rates(rig, models, fits[best])
     result["teleport"] = _teleports(rig, models, fits[best])
@@ -141,8 +152,11 @@ def _spring_ends(rig, clip: Clip, step: float, fit) -> np.ndarray:
 
 
 def _model_ends(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
-    features = RigSampler(model.spec, rig.character, motion).features(times)
-    return _ends(rig, model.canonical_turns(features)[None])[0]
+    return _ends(rig, _model_turns(rig, model, motion, times)[None])[0]
+
+
+def _model_turns(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
+    return model.canonical_turns(RigSampler(model.spec, rig.character, motion).features(times))
 
 
 def _ends(rig, turns: np.ndarray) -> np.ndarray:

@@ -150,6 +150,17 @@ class _BodyPatch:
         return points, _normals(points, self.triangles)
 
 
+def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
+    character = rig.character
+    patch = _BodyPatch(rig, np.random.default_rng(0), 1)
+    skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
+    shape = np.zeros(len(patch.offsets))
+    return np.stack(
+        [Collider(patch.posed(m, shape)[0], patch.triangles).distance(p)[0] for m, p in zip(skinning, points)]
+    )
+
+
 def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     """Signed distances (V,) [m] of canonical points (V, 3) to the body in bind pose; infinite without one."""
     body = rig.character.body

@@ -58,7 +58,7 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
         for name, state in states.items():
             points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(state)), rig.points, rig.weights)
             distance = pool.distances(poses[: len(state)], points)[:, outside]
-            report[f"penetration_{name}"] = _depths(distance)
+            report[f"penetration_{name}"] = depths(distance)
         report["hair_vertices"] = int(outside.sum())
         report["hair_vertices_inside_at_rest"] = int((~outside).sum())
         report["depth_at_rest_mm"] = 1e3 * float(max(0.0, -rest.min()))
@@ -66,10 +66,10 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
     return report
 
 
-def _depths(distance: np.ndarray) -> dict:
-    """Of signed distances (B, V) [m]."""
+def depths(distance: np.ndarray) -> dict:
+    """Shares and depths in the body of signed distances (B, V) [m]."""
     share = 100 / max(distance.size, 1)
-    deepest = np.maximum(0, -distance.min(axis=1, initial=0.0))
+    deepest = np.abs(distance.min(axis=1, initial=0.0))
     return {
         "poses": len(distance),
         "percent": share * float((distance < 0).sum()),
