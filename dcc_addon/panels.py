@@ -58,9 +58,9 @@ def _motion(layout, armature) -> None:
         row.label(text="Animation has changed", icon="ERROR")
     else:
         row.label(text=f"Motion of {len(sampled.motion.frames)} frames", icon="CHECKMARK")
-    row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
     character = armature.neuralocks_character
-    layout.prop(character, "loop")
+    row.prop(character, "loop", text="", icon="LOOP_FORWARDS")
+    row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
     if character.loop and sampled is not None:
         gap = sampled.motion.gap()
         if gap > LOOP_GAP:
@@ -97,9 +97,10 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             column.prop(own, name, slider=True)
-        column = layout.column()
-        column.enabled = settings.armature is not None
-        column.prop(own, "resolve")
+        layout.prop(own, "resolve")
+        sampled = session.rigs.get(own.armature.name_full) if own.armature is not None else None
+        if own.resolve and sampled is not None and sampled.character.body is None:
+            words(layout, "No body mesh is found; choose it above", "INFO")
         layout.operator("neuralocks.reset_look", icon="LOOP_BACK")
         layout.operator("neuralocks.report_card", icon="PRESET")
         for line in session.cards.get(hair.name_full, ()):

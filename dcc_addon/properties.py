@@ -218,10 +218,13 @@ class Preferences(bpy.types.AddonPreferences):
     def draw(self, _context):
         column = self.layout.column()
         column.prop(self, "python")
-        from .operators.training import training_python_problem
+        from .operators.training import known_problem
 
-        problem = training_python_problem()
-        column.label(text=problem or "Ready to train.", icon="INFO" if problem else "CHECKMARK")
+        problem = known_problem()
+        if problem is None:
+            column.label(text="Looking for what training needs", icon="TIME")
+        else:
+            column.label(text=problem or "Ready to train", icon="INFO" if problem else "CHECKMARK")
 
 
 CLASSES = (HairSettings, CharacterSettings, SceneSettings, Preferences)

@@ -16,7 +16,7 @@ from ..scene.export import write_shot
 from ..scene.lookup import find
 from ..scene.sampling import hairs_of, sample, stepping
 from ..session import session
-from .base import Stepwise, shown_armature, shown_hair
+from .base import Stepwise, Threaded, shown_armature, shown_hair
 
 
 def output_path(path: str) -> str:
@@ -79,7 +79,7 @@ def bake_steps(context, armature, hairs, path: str):
         shot = out.with_name(f"{out.stem}_shot.usdc")
         prims = write_shot(shot, armature, scene, sampled, group)
         settings = group[0].neuralocks_hair
-        job = _Threaded(
+        job = Threaded(
             lambda say, shot=shot, out=out, settings=settings: bake(
                 shot,
                 out,
@@ -102,44 +102,6 @@ def _look(hair) -> tuple:
     """What hair that is baked together has in common."""
     settings = hair.neuralocks_hair
     return *material_words(settings), settings.motion, settings.resolve, settings.model
-
-
-class _Threaded:
-    """Work in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
-
-    def __init__(self, function, title: str = "Baking the hair"):
-        self._function, self._title = function, title
-
-    def steps(self, parts: int, part: int):
-        import threading
-
-        state = {"done": (0, 1, "Baking"), "cancel": False}
-
-        def say(done, total, message):
-            if state["cancel"]:
-                raise NeuralocksError("Bake: cancelled")
-            state["done"] = done, total, message
-
-        def run():
-            try:
-                state["result"] = self._function(say)
-            except BaseException as error:
-                state["error"] = error
-
-        thread = threading.Thread(target=run, daemon=True)
-        thread.start()
-        try:
-            while thread.is_alive():
-                thread.join(0.02)
-                done, total, _ = state["done"]
-                share = (part + done / max(total, 1)) / parts
-                yield 0.5 + 0.5 * share, 1, self._title
-        finally:
-            state["cancel"] = True
-            thread.join()
-        if "error" in state:
-            raise state["error"]
-        return state["result"]
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
@@ -227,7 +189,7 @@ def _card(path: str):
 
     from ..services.card import lines_of
 
-    measuring = _Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
+    measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
     return lines_of((yield from measuring.steps(1, 0)))
 
 

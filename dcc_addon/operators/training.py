@@ -2,6 +2,7 @@
 """Training in the background: Blender stays usable, the panel shows how far it is."""
 
 import tempfile
+import threading
 from pathlib import Path
 
 import bpy
@@ -11,13 +12,14 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..scene.export import write_shot
 from ..scene.lookup import find
-from ..scene.sampling import ensure
+from ..scene.sampling import sample, stepping
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
-from .base import Hardened, shown_armature, shown_hair
+from .base import Hardened, Stepwise, Threaded, shown_armature, shown_hair
 
 _jobs: list = []
 _checked: dict[str, str] = {}
+_asked: set[str] = set()
 
 
 def job() -> TrainingJob | None:
@@ -41,15 +43,16 @@ def training_python() -> str:
     return bpy.path.abspath(chosen) if chosen else default_python()
 
 
-def training_python_problem(fresh: bool = False) -> str:
-    """Why training cannot run here, with the remedy; asked of the interpreter once."""
+def known_problem() -> str | None:
+    """Why training cannot run here, with the remedy; None while the interpreter is being asked, which takes seconds."""
     python = training_python()
-    if fresh or python not in _checked:
-        _checked[python] = problem(python)
-    return _checked[python]
+    if python not in _checked and python not in _asked:
+        _asked.add(python)
+        threading.Thread(target=lambda: _checked.setdefault(python, problem(python)), daemon=True).start()
+    return _checked.get(python)
 
 
-class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
+class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
     """Train a model for this character in the background; Blender stays usable"""
 
     bl_idname = "neuralocks.train"
@@ -63,16 +66,21 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
         default="strands",
     )
 
-    def work(self, context):
+    def steps(self, context):
         running = job()
         if running is not None and running.running:
             raise NeuralocksError("Training: one is running already; wait for it or cancel it")
-        trouble = training_python_problem(fresh=True)
-        if trouble:
-            raise NeuralocksError(trouble)
         armature = shown_armature(context)
         target = shown_hair(context) if self.kind == "strands" else armature
-        sampled = ensure(context, armature)
+        python, name, wanted = training_python(), armature.name_full, target.name_full
+        asking = Threaded(lambda _: problem(python), "Looking for what training needs", leave=True)
+        _checked[python] = yield from asking.steps(1, 0)
+        if _checked[python]:
+            raise NeuralocksError(_checked[python])
+        with stepping(context.scene):
+            for done, total in sample(context, armature):
+                yield done, total, f"Sampling the motion of {name}"
+        armature, target, sampled = find(name), find(wanted), session.rigs[name]
         folder = Path(tempfile.mkdtemp(prefix="neuralocks_"))
         character = folder / "character.usdc"
         write_shot(character, armature, context.scene, sampled, [target] if self.kind == "strands" else [])
@@ -86,7 +94,7 @@ class NEURALOCKS_OT_train(Hardened, bpy.types.Operator):
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
         stop()
-        _jobs.append(TrainingJob(training_python(), settings))
+        _jobs.append(TrainingJob(python, settings))
         _jobs[0].target = (target.name_full, self.kind)
         bpy.app.timers.register(_watch, first_interval=0.5)
         return f"Training a model for {target.name_full} in the background"

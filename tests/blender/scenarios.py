@@ -634,9 +634,11 @@ def trained_for_real(folder: Path) -> None:
     import time
 
     from dcc_addon.operators import training as operator
+    from dcc_addon.services.training_job import problem
 
-    if operator.training_python_problem():
-        print(operator.training_python_problem())
+    trouble = problem(operator.training_python())
+    if trouble:
+        print(trouble)
         return
     rig = scenes.armature()
     scenes.body(rig)
