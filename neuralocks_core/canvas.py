@@ -37,16 +37,17 @@ def backdrop(width: int, height: int) -> np.ndarray:
 
 
 class VtkCanvas:
-    """Draws with VTK in an off-screen window, twice as large as asked for and then reduced.
+    """Draws with VTK in an off-screen window, larger than asked for and then reduced.
 
     Raises:
         RuntimeError, ImportError: VTK is missing or has no way to draw here.
     """
 
-    def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, vertices: int, scale: float = 2.0):
+    def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
         import pyvista
 
-        self.size, self._pyvista = (width, height), pyvista
+        vertices, scale = detail.vertices, detail.scale
+        self.size, self._pyvista, self._width = (width, height), pyvista, detail.width
         pyvista.vtk_verbosity("off")
         self._plotter = pyvista.Plotter(off_screen=True, window_size=(round(width * scale), round(height * scale)))
         self._plotter.set_background("black")
@@ -64,7 +65,7 @@ class VtkCanvas:
         if self._hair is None:
             self._hair = self._pyvista.PolyData(hair, lines=self._lines)
             self._hair["rgb"] = hair_colours
-            self._plotter.add_mesh(self._hair, scalars="rgb", rgb=True, lighting=False, line_width=1.2)
+            self._plotter.add_mesh(self._hair, scalars="rgb", rgb=True, lighting=False, line_width=self._width)
             if body is not None:
                 self._body = self._pyvista.PolyData(body, faces=self._faces)
                 self._body["rgb"] = body_colours
@@ -96,9 +97,9 @@ class PlainCanvas:
     Slower and plainer than VTK, and works wherever numpy does.
     """
 
-    def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, vertices: int, scale: float = 2.0):
-        self.size, self._scale = (width, height), scale
-        self._triangles, self._shape = triangles, (strands, vertices)
+    def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
+        self.size, self._scale = (width, height), detail.scale
+        self._triangles, self._shape = triangles, (strands, detail.vertices)
         self._backdrop = backdrop(width, height).astype(np.float32)
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
@@ -150,14 +151,14 @@ class PlainCanvas:
         return both[:, 0], both[:, 1], both[:, 2], both[:, 3:]
 
 
-def open_canvas(width, height, triangles, strands, vertices, scale=2.0) -> VtkCanvas | PlainCanvas:
-    """The best canvas that works here."""
+def open_canvas(width, height, triangles, strands, detail) -> VtkCanvas | PlainCanvas:
+    """The best canvas that works here, for so many strands of `detail.vertices` points (see `preview.Detail`)."""
     try:
-        canvas = VtkCanvas(width, height, triangles, strands, vertices, scale)
+        canvas = VtkCanvas(width, height, triangles, strands, detail)
         canvas._plotter.render()
         return canvas
     except Exception:  # a missing wheel, library or driver each raises something of its own
-        return PlainCanvas(width, height, triangles, strands, vertices, scale)
+        return PlainCanvas(width, height, triangles, strands, detail)
 
 
 def _project(camera: Camera, points: np.ndarray, high: int) -> np.ndarray:

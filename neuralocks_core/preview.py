@@ -14,10 +14,29 @@ from neuralocks_core.canvas import Camera, open_canvas
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.report import write_whole
 
-STRANDS = {"picture": 16000, "clip": 8000}
-"""Strands drawn: of a larger groom only so many, of a smaller one copies beside its own."""
-VERTICES = 24
 SUFFIXES = (".png", ".mp4", ".gif")
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely hair is drawn.
+
+    Attributes:
+        strands: of a larger groom only so many, of a smaller one copies beside its own.
+        vertices: of each.
+        scale: how many times larger to draw before reducing.
+        width: of a strand, in pixels of the larger drawing.
+    """
+
+    strands: int
+    vertices: int
+    scale: float
+    width: float
+
+
+PICTURE = Detail(16000, 24, 2.0, 1.2)
+CLIP = Detail(4000, 16, 1.25, 1.8)
+"""A quarter of the strands, wider: in motion it looks the same, and a frame takes a third of the time."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +76,7 @@ def render(
     size: tuple[int, int] | None = None,
     panels: int = 6,
     rate: float = 24.0,
-    scale: float | None = None,
+    detail: Detail | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Path:
     """Write a strip of pictures (.png) or a clip (.mp4, .gif).
@@ -68,7 +87,7 @@ def render(
         size: width and height of one picture in pixels.
         panels: pictures in a strip, evenly over the time.
         rate: frames a second of a clip; in real time.
-        scale: how many times larger to draw before reducing.
+        detail: how finely; PICTURE or CLIP if left out.
         progress: called with (done, total, message).
 
     Raises:
@@ -86,9 +105,8 @@ def render(
         clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
         frames = np.abs(scene.times[None] - clock[:, None]).argmin(axis=1)
     width, height = size or ((440, 620) if still else (480, 600))
-    strands = STRANDS["picture" if still else "clip"]
     # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
-    film = _Film(scene, width, height, scale or (2.0 if still else 1.5), strands, 0.02 if still else 0.3)
+    film = _Film(scene, width, height, detail or (PICTURE if still else CLIP), 0.02 if still else 0.3)
     images = []
     try:
         for i, image in enumerate(film.shoot(frames)):
@@ -104,11 +122,11 @@ def render(
 class _Film:
     """A scene with its camera, strands and colours made ready."""
 
-    def __init__(self, scene: Scene, width: int, height: int, scale: float, strands: int, calm: float):
-        self.scene, self._calm = scene, calm
-        self._pick(strands)
+    def __init__(self, scene: Scene, width: int, height: int, detail: Detail, calm: float):
+        self.scene, self.detail, self._calm = scene, detail, calm
+        self._pick(detail.strands)
         triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
-        self._canvas = open_canvas(width, height, triangles, len(self._tone), VERTICES, scale)
+        self._canvas = open_canvas(width, height, triangles, len(self._tone), detail)
         self._albedo = None if scene.body_rest is None else self._dress()
         self._cameras = self._follow()
 
@@ -128,7 +146,7 @@ class _Film:
         head = scene.head[frame]
         own = self._own(scene.hair(frame))
         centre = head[:3, :3] @ scene.centre + head[:3, 3]
-        counts = np.full(len(own), VERTICES)
+        counts = np.full(len(own), self.detail.vertices)
         tint, shadow = shading.hair_colours(
             own.reshape(-1, 3), counts, camera.to_eye, centre, self._axes, scene.look
         )
@@ -153,7 +171,7 @@ class _Film:
             raise NeuralocksError("preview: the groom has no strand of two points; there is nothing to draw")
         rows = usable[:: max(1, -(-len(usable) // strands))]
         self._copies = copies = int(np.clip(round(strands / len(rows)), 1, 12))
-        place = np.linspace(0, 1, VERTICES)[None] * (scene.counts[rows] - 1)[:, None]
+        place = np.linspace(0, 1, self.detail.vertices)[None] * (scene.counts[rows] - 1)[:, None]
         low = np.minimum(place.astype(int), scene.counts[rows, None] - 2)
         self._low, self._part = starts[rows, None] + low, (place - low)[..., None]
         roots = scene.rest[starts[usable]]
@@ -162,10 +180,10 @@ class _Film:
         beside[::copies] = 0
         self._tone = np.exp(rng.normal(0, 0.25, (len(rows) * copies, 1, 1)))
         # Copies keep apart along the strand but close up towards the tip, as locks do.
-        self._beside = beside * np.linspace(1, 0.45, VERTICES)[None, :, None]
+        self._beside = beside * np.linspace(1, 0.45, self.detail.vertices)[None, :, None]
 
     def _own(self, points: np.ndarray) -> np.ndarray:
-        """The groom's own strands (S, VERTICES, 3), resampled."""
+        """The groom's own strands (S, detail.vertices, 3), resampled."""
         points = np.asarray(points, float)
         return points[self._low] * (1 - self._part) + points[self._low + 1] * self._part
 

@@ -17,6 +17,8 @@ MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
 ROUNDS = 5
 """Of finding the planes under a strand and laying it over them."""
+SLACK = np.float32(1e-5)
+"""A vertex that may rest inside must not be in trouble by the rounding of the network's output [m]."""
 CLAMPED = 2
 """Vertices at the root that never move."""
 STILL = 1e-3
@@ -40,7 +42,6 @@ class Resolver:
 
     Attributes:
         body: the part of the body that the hair can reach, or None.
-        low: distance (S, 24) float32 [m] under which a vertex is in trouble; made when first asked for.
     """
 
     def __init__(self, character: Character, strands: StrandSet, clip: Clip | None = None):
@@ -75,16 +76,16 @@ class Resolver:
         """
         if self.body is None or not len(displacement):
             return
-        rest, low = self.strands.rest, self.low
+        rest, clear = self.strands.rest, self.clear
         parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
         edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
         body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
-        hit = list(each(lambda s: body.violated(rest[s] + displacement[s], low[s]) + s.start, parts))
+        hit = list(each(lambda s: body.violated(rest[s] + displacement[s], clear[s] - SLACK) + s.start, parts))
         hit = np.concatenate(hit)
         hit = hit[self.strands.valid[hit]]
 
         def push(rows: np.ndarray) -> None:
-            displacement[rows] = resolved(rest[rows] + displacement[rows], body, self._clear[rows]) - rest[rows]
+            displacement[rows] = resolved(rest[rows] + displacement[rows], body, clear[rows]) - rest[rows]
 
         for _ in each(push, [hit[i : i + PUSHED] for i in range(0, len(hit), PUSHED)]):
             pass
@@ -95,13 +96,8 @@ class Resolver:
         return self._near.posed(self._skinning(joints), changed, low, high)
 
     @cached_property
-    def low(self) -> np.ndarray:
-        """Distance (S, 24) float32 [m] under which a vertex is in trouble."""
-        # A vertex that may rest inside must not be in trouble by the rounding of the network's output.
-        return self._clear - np.float32(1e-5)
-
-    @cached_property
-    def _clear(self) -> np.ndarray:
+    def clear(self) -> np.ndarray:
+        """Distance (S, 24) float32 [m] that each vertex must keep."""
         joints = self.character.skeleton.bind
         rest = self._posed(joints, self._constant, *_corners(self.strands.rest))
         parts = [rest.distance(self.strands.rest[i : i + 2048])[0] for i in range(0, len(self.strands.rest), 2048)]

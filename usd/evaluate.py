@@ -21,7 +21,7 @@ from .stage import StageGroom
 STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
 REFERENCE_STRANDS = 200
-COLLISION_FRAMES = 48
+COLLISION_FRAMES = 32
 """Frames in which distances to the body are measured, evenly over the bake."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
@@ -213,4 +213,4 @@ class _Subject:
 
     @cached_property
     def _resolver(self) -> Resolver:
-        return Resolver(self.character, self.strands)
+        return Resolver(self.character, self.strands, self.item.attachment.rig.clip)

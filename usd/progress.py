@@ -30,17 +30,21 @@ def progress_bar(title: str) -> Iterator:
     )
     bar = Progress(*columns, console=console, transient=True)
     began, shown = time.monotonic(), None
-    logged, first = began, None  # a resumed job begins in the middle: only what is done here tells the speed
+    # A resumed job begins in the middle, and one step follows another: only what is done of this step tells the speed.
+    logged, since, first, last = began, began, None, (0, 0)
     drawn = sys.stderr.isatty()
 
     def callback(done: int, total: int, message: str = "") -> None:
-        nonlocal shown, logged, first
+        nonlocal shown, logged, since, first, last
         now = time.monotonic()
-        first = done if first is None else first
+        another = total != last[1] or done < last[0]
+        if another:
+            since, first = now, done
+        last = done, total
         if not drawn:
             if now - logged > LOG_EVERY:
                 logged = now
-                left = f", {(now - began) * (total - done) / (done - first) / 60:.1f} min left" if done > first else ""
+                left = f", {(now - since) * (total - done) / (done - first) / 60:.1f} min left" if done > first else ""
                 print(f"{title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
             return
         if shown is None and now - began < QUIET_FOR:
@@ -48,6 +52,8 @@ def progress_bar(title: str) -> Iterator:
         if shown is None:
             bar.start()
             shown = bar.add_task(title, total=total, message="")
+        elif another:
+            bar.reset(shown, total=total)
         bar.update(shown, completed=done, total=total, message=message)
 
     try:

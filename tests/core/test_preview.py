@@ -9,6 +9,7 @@ from neuralocks_core import canvas, preview, shading
 from neuralocks_core.errors import NeuralocksError
 
 CENTRE = np.array([0.0, 1.5, 0.0])
+SMALL = preview.Detail(2000, 16, 1.0, 1.2)
 
 
 def scene(frames=4, strands=300):
@@ -40,7 +41,7 @@ def scene(frames=4, strands=300):
 @pytest.mark.parametrize("kind", [".png", ".mp4", ".gif"])
 def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
-    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), panels=2, scale=1.0)
+    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), panels=2, detail=SMALL)
     assert path.stat().st_size > 500 and list(tmp_path.iterdir()) == [path]
     if kind == ".png":
         from PIL import Image
@@ -54,14 +55,14 @@ def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
 def test_both_canvases_draw_the_same_picture():
     """VTK and the plain rasteriser agree on where body and hair are."""
     try:
-        canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, 2).close()
+        canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, SMALL).close()
     except Exception as error:
         pytest.skip(f"VTK cannot draw here: {error}")
-    pictures = []
+    pictures, detail = [], preview.Detail(600, 24, 2.0, 1.2)
     for kind in (canvas.VtkCanvas, canvas.PlainCanvas):
-        film = preview._Film(scene(), 120, 160, 2.0, 600, 0.02)
+        film = preview._Film(scene(), 120, 160, detail, 0.02)
         film._canvas.close()
-        film._canvas = kind(120, 160, film.scene.triangles, len(film._tone), preview.VERTICES, 2.0)
+        film._canvas = kind(120, 160, film.scene.triangles, len(film._tone), detail)
         pictures.append(next(film.shoot([0])).astype(float))
         film.close()
     background = canvas.backdrop(120, 160).astype(float)
