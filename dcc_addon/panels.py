@@ -97,7 +97,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             column.prop(own, name, slider=True)
-        layout.prop(own, "resolve")
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(own, "resolve")
         sampled = session.rigs.get(own.armature.name_full) if own.armature is not None else None
         if own.resolve and sampled is not None and sampled.character.body is None:
             words(layout, "No body mesh is found; choose it above", "INFO")
