@@ -23,7 +23,7 @@ from neuralocks_core.rig.kinematics import (  # noqa: E402
 from neuralocks_core.rig.rigging import HairRig  # noqa: E402
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns  # noqa: E402
 from neuralocks_core.training.rig_motion import SPRINGS, motion_report  # noqa: E402
-from neuralocks_core.training.rig_poses import PosePool, rest_distances  # noqa: E402
+from neuralocks_core.training.rig_poses import PosePool, posed_distances, rest_distances  # noqa: E402
 from tests.core.rig.builders import character, random_model, tail  # noqa: E402
 
 
@@ -145,6 +145,18 @@ def test_margins_are_those_at_rest_at_most():
     rig = replace(rig, points=points, weights=rig.weights[:3])
     np.testing.assert_allclose(rest_distances(rig, points), [-0.004, 0.003, 0.02], atol=1e-3)
     np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
+
+
+def test_depths_in_motion_are_those_of_the_bind_pose_there():
+    """Wherever the character stands: canonical points keep their distance."""
+    rig, radius = with_balls()
+    points = np.array([0, 0.07, 0.02]) + np.array([[radius + d, 0, 0] for d in (-0.004, 0.003, 0.02)])
+    rig = replace(rig, points=points, weights=rig.weights[:3])
+    moved = np.eye(4)
+    moved[:3, :3], moved[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], (3, 1, -2)
+    joints = np.stack([rig.character.skeleton.bind, moved @ rig.character.skeleton.bind])
+    found = posed_distances(rig, joints, np.stack([points, points]))
+    np.testing.assert_allclose(found, [rest_distances(rig, points)] * 2, atol=1e-5)
 
 
 def test_renewed_poses_take_the_place_of_the_oldest():
