@@ -57,7 +57,7 @@ def _motion(layout, armature) -> None:
     elif sampled.stale:
         row.label(text="Animation has changed", icon="ERROR")
     else:
-        row.label(text=f"Motion of {len(sampled.motion.frames)} frames", icon="CHECKMARK")
+        row.label(text=f"{len(sampled.motion.frames)} frames", icon="CHECKMARK")
     character = armature.neuralocks_character
     row.prop(character, "loop", text="", icon="LOOP_FORWARDS")
     row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
