@@ -96,6 +96,8 @@ def render(
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(SUFFIXES)}")
+    if path.parent.is_dir() and not os.access(path.parent, os.W_OK):
+        raise NeuralocksError(f"{path}: its folder cannot be written to; choose another one")
     _need("PIL", "pillow")
     still = path.suffix.lower() == ".png"
     if still:

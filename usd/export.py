@@ -52,17 +52,18 @@ def export_model(model, folder) -> list[Path]:
             "shape": MEASURES,
         }
     files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
-    written = []
+    parts = {name: folder / f".{name}.part" for name in files}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, data in files.items():
-            part = folder / f".{name}.part"
-            part.write_bytes(data)
+        for name, part in parts.items():
+            part.write_bytes(files[name])
+        for name, part in parts.items():
             os.replace(part, folder / name)
-            written.append(folder / name)
     except OSError as error:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
         raise cannot_write(folder, error) from None
-    return written
+    return [folder / name for name in files]
 
 
 def _graphs(file: model_file.ModelFile) -> dict:

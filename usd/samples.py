@@ -5,6 +5,7 @@ Each sample is a pure function of the shot and its time code. So order, chunks, 
 the file.
 """
 
+import math
 import os
 import shutil
 from collections.abc import Callable
@@ -158,6 +159,6 @@ def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:
     folder = next((p for p in [out.parent, *out.parent.parents] if p.is_dir()), None)
     if folder is not None and size > (free := shutil.disk_usage(folder).free):
         raise NeuralocksError(
-            f"{out}: needs {size / 1e9:.2f} GB while it is written, {free / 1e9:.2f} GB are free; "
+            f"{out}: needs {math.ceil(size / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "
             "free some, bake fewer frames or choose another folder"
         )

@@ -128,6 +128,6 @@ def cannot_write(path: Path, error: OSError) -> NeuralocksError:
 
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return NeuralocksError(
-            f"{path}: no space left on the disk; free some, bake fewer frames or choose another folder"
+            f"{path}: no space left on the disk; free some, or choose another folder"
         )
     return NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose a folder you can write to")

@@ -44,10 +44,11 @@ def test_distances_near_the_skin_are_those_of_the_sphere(body):
     rng = np.random.default_rng(3)
     away = rng.normal(size=(3000, 3))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
-    depth = rng.uniform(-0.02, 0.01, 3000)
+    depth = rng.uniform(-0.02, 0.008, 3000)
     value, direction = body.distance(((0.1 + depth)[:, None] * away).astype(np.float32))
-    error = np.abs(value - depth)
-    assert np.quantile(error, 0.99) < 6e-4 and error.max() < 2e-3
+    # Exact to a few tenths of a millimetre where hair is pushed to; deeper down a way out is enough.
+    error, near = np.abs(value - depth), depth > -0.006
+    assert np.quantile(error[near], 0.99) < 6e-4 and error[near].max() < 1.5e-3 and error.max() < 4e-3
     assert (direction * away).sum(axis=1).min() > 0.97
     assert np.isinf(body.distance(np.full((5, 3), 0.3, np.float32))[0]).all()
 

@@ -56,6 +56,21 @@ def test_wrong_usage_is_status_two(capsys):
     assert status("unknown") == 2
 
 
+def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
+    written, write = [], Path.write_bytes
+
+    def full(self, data):
+        if len(written) == 2:
+            raise OSError(28, "No space left on device")
+        written.append(self)
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert status("export", model, "-o", tmp_path / "onnx") == 1
+    assert "no space left" in capsys.readouterr().err
+    assert len(written) == 2 and list((tmp_path / "onnx").iterdir()) == []
+
+
 def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
     import onnxruntime
 
@@ -97,6 +112,17 @@ def test_help_comes_without_the_heavy_parts():
     assert result.stdout.strip() == "[]"
     words = [sys.executable, "-m", "usd", "--help"]
     assert "bake" in subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_runtime_imports_only_what_inference_needs():
+    """Half a second to start is kept by what is not imported: no training, drawing or statistics."""
+    absent = ("torch", "warp", "onnx", "bpy", "trimesh", "pyvista", "matplotlib", "PIL", "pandas", "sympy",
+              "scipy.stats", "scipy.signal", "scipy.ndimage", "scipy.integrate")  # fmt: skip
+    code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
+    for module in ("neuralocks_core.runtime, neuralocks_core.resolve", "usd.bake, usd.posing, usd.stage"):
+        command = [sys.executable, "-c", code % module]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == "[]", module
 
 
 def test_a_bake_needs_no_torch(tmp_path, model):

@@ -10,10 +10,10 @@ import pytest
 from usd.bake import bake
 
 from .shots import Recipe, write_shot
-from .test_bake import world_points
+from .test_bake import samples, world_points
 
 ROOT = Path(__file__).parents[2]
-PYTHON = next((p for p in sorted(ROOT.glob(".venv-blender-*/bin/python"))), None)
+PYTHONS = sorted(ROOT.glob(".venv-blender-*/bin/python"))
 
 SCRIPT = """
 import os, sys
@@ -31,18 +31,23 @@ for frame in (1, 4, 9):
     seen.data.attributes["position"].data.foreach_get("vector", points)
     matrix = np.array(seen.matrix_world)
     found[str(frame)] = points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    # Blender before 4.5 does not read velocities of curves.
+    if bpy.app.version >= (4, 5):
+        seen.data.attributes["velocity"].data.foreach_get("vector", points)
+        found[f"velocity {frame}"] = points.reshape(-1, 3) @ matrix[:3, :3].T
 np.savez(out, **found)
 sys.stdout.flush()
 os._exit(0)
 """
 
 
-@pytest.mark.skipif(PYTHON is None, reason="no .venv-blender-* with a Blender wheel (make test installs them)")
+@pytest.mark.skipif(not PYTHONS, reason="no .venv-blender-* with a Blender wheel (make test installs them)")
+@pytest.mark.parametrize("python", PYTHONS or [None], ids=lambda path: path.parents[1].name if path else "none")
 @pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z", bound="mesh")], ids=["m_y_up", "cm_z_up"])
-def test_blender_shows_the_baked_points(tmp_path, model, recipe):
+def test_blender_shows_the_baked_points(tmp_path, model, recipe, python):
     result = bake(write_shot(tmp_path, recipe), tmp_path / "bake.usdc", model)
     out = tmp_path / "seen.npz"
-    command = [PYTHON, "-c", SCRIPT, result.path, out]
+    command = [python, "-c", SCRIPT, result.path, out]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=240)
     assert out.exists(), done.stdout[-2000:] + done.stderr[-2000:]
     with np.load(out) as seen:
@@ -50,3 +55,7 @@ def test_blender_shows_the_baked_points(tmp_path, model, recipe):
         for frame in (1, 4, 9):
             x, y, z = world_points(result.path, float(frame)).T
             assert np.abs(unit * seen[str(frame)] - np.stack([x, -z, y], axis=1)).max() < 2e-5
+            if f"velocity {frame}" in seen:
+                x, y, z = samples(result.path, "velocities", at=float(frame)).T * recipe.unit
+                expected = np.stack([x, -z, y] if recipe.up == "Y" else [x, y, z], axis=1)
+                assert np.abs(unit * seen[f"velocity {frame}"] - expected).max() < 1e-3 * np.abs(expected).max() + 1e-5
