@@ -54,8 +54,8 @@ def _turns(rest: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """
     edges = rest[:, 1:] - rest[:, :-1]
     # One array a coordinate: three to a row leave a processor's vectors mostly empty.
-    a, b, c = np.ascontiguousarray(np.moveaxis(edges, -1, 0))
-    p, q, r = np.ascontiguousarray(np.moveaxis(edges + steps[:, :-1], -1, 0))
+    a, b, c = np.ascontiguousarray(edges.transpose(2, 0, 1))
+    p, q, r = np.ascontiguousarray((edges + steps[:, :-1]).transpose(2, 0, 1))
     lengths = np.sqrt((a * a + b * b + c * c) * (p * p + q * q + r * r))
     # Half way between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
     segment = np.empty((4, *a.shape), np.float32)
@@ -63,8 +63,8 @@ def _turns(rest: np.ndarray, steps: np.ndarray) -> np.ndarray:
     segment[3] = lengths + (a * p + b * q + c * r)
     segment /= np.sqrt(np.maximum((segment * segment).sum(axis=0), np.float32(1e-30)))
     turns = np.empty((*rest.shape[:2], 4), np.float32)
-    turns[:, 0], turns[:, -1] = np.moveaxis(segment[:, :, 0], 0, -1), np.moveaxis(segment[:, :, -1], 0, -1)
+    turns[:, 0], turns[:, -1] = segment[:, :, 0].T, segment[:, :, -1].T
     middle = segment[:, :, :-1] + segment[:, :, 1:]
     middle *= np.float32(0.5)
-    turns[:, 1:-1] = np.moveaxis(middle, 0, -1)
+    turns[:, 1:-1] = middle.transpose(1, 2, 0)
     return turns
