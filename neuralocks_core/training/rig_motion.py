@@ -47,7 +47,8 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1);
         `motion_error_by_kind`: the same for each kind of motion;
         `motion_ratio`: mean speed in the head's frame over the simulation's;
-        `motion_depth`: what lies in the body at every eighth sample, as `rig_report.depths`; of the simulation too;
+        `motion_depth`: what lies in the body at every eighth sample, as `rig_report.depths`; of the simulation too. The
+        spring bones have no colliders;
         `rates`: rms difference at shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm];
         `teleport`: see `_teleports`; `cost`: see `_network_cost`.
     """
