@@ -28,7 +28,8 @@ class NearBody:
         self.head = HeadField(points, body.triangles, still)
         self.box = Box(low, high)
         self.marks = np.zeros(self.box.count, np.uint8)
-        near = self.head.near(self.box.cell)
+        # A point is never farther than 1.8 node distances from the nearest node of its own cell.
+        near = self.head.near(self.box.cell + 1.8 * self.head.cell)
         self.marks[self.box.cells(near[self.box.inside(near, 1)])] = HEAD
         self.skin: Skin | None = None
         if len(self.head.moving):
