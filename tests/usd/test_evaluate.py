@@ -17,7 +17,7 @@ FRAMES = "1:60:4"
 @pytest.fixture(scope="module")
 def rigid(tmp_path_factory, still_model):
     out = tmp_path_factory.mktemp("bakes") / "rigid.usdc"
-    bake(shipped_shot(), out, still_model, frames=FRAMES, velocities=False)
+    bake(shipped_shot(), out, still_model, frames=FRAMES, velocities=False, resolve=False)
     return out
 
 
