@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sampling in the background: a few frames at a time while Blender is idle, so that live hair catches up with an
-edited animation by itself.
+"""Sampling in the background: a few frames at a time while Blender is idle, so that live hair catches up with an edited
+animation by itself.
 """
 
 import time
@@ -22,8 +22,8 @@ _work: list = []
 
 
 def request() -> None:
-    """Sample what is out of date, soon; without a window there is nobody to wait, and operators sample when they
-    need it.
+    """Sample what is out of date, soon; without a window there is nobody to wait, and operators sample when they need
+    it.
     """
     if bpy.app.background:
         return

@@ -11,8 +11,8 @@ from .session import session
 
 
 def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
-    """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for
-    bit as the bake reads them.
+    """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for bit
+    as the bake reads them.
     """
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:

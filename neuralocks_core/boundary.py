@@ -2,18 +2,15 @@
 """The boundary history: what the body did up to a time, as the vector that a network reads (paper section
 3.3).
 
-The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative
-to the head and the bind pose, so
-that joint orients and names cancel out; the shape is measured on the body, so that it means the same on
-every rig; and the history holds
-effective gravity in the head's frame, R^T (g - a), without which a jump cannot be seen. `docs/deviations.md`
-says why.
+The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative to the head
+and the bind pose, so that joint orients and names cancel out; the shape is measured on the body, so that it means the
+same on every rig; and the history holds effective gravity in the head's frame, R^T (g - a), without which a jump cannot
+be seen. `docs/deviations.md` says why.
 """
 
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
@@ -114,10 +111,9 @@ class BoundarySpec:
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
-    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the
-    accelerations of the motion and not
-    those of its polyline. Before the clip the head goes on with its first velocity and does not turn; a loop
-    is continued on both sides.
+    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the accelerations of
+    the motion and not those of its polyline. Before the clip the head goes on with its first velocity and does not
+    turn; a loop is continued on both sides.
     """
 
     GRAVITY_LIMIT = 6.0
@@ -128,6 +124,9 @@ class BoundarySampler:
     """Largest angular velocity that is passed on [rad/s]."""
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
+        # Here, because it takes as long to import as all else that a runtime needs.
+        from scipy.interpolate import CubicSpline
+
         self.spec, self.character, self.clip = spec, character, clip
         humanoid = character.humanoid
         self._indices = [
@@ -185,9 +184,7 @@ class BoundarySampler:
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
-        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured
-        from.
-        """
+        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured from."""
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
         result[parts["pose"]] = self._stance[..., :2].swapaxes(-1, -2).ravel()
@@ -251,8 +248,7 @@ class BoundarySampler:
 def _stance(character: Character, name: str) -> np.ndarray:
     """Rotation (3, 3) from a T-pose's upper arm to the rig's own bind pose; identity for other joints.
 
-    Without it the same hanging arm would read differently on a rig bound in T-pose and on one bound in
-    A-pose.
+    Without it the same hanging arm would read differently on a rig bound in T-pose and on one bound in A-pose.
     """
     side = name.removesuffix("_upper_arm")
     arm, elbow = character.humanoid.get(name), character.humanoid.get(f"{side}_lower_arm")
@@ -279,8 +275,8 @@ def _taper(spec: BoundarySpec) -> np.ndarray:
 
 
 def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its
-    seam is smooth.
+    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is
+    smooth.
     """
     if not clip.loop or len(clip.times) < 3:
         return clip.times, clip.joints

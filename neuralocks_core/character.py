@@ -73,9 +73,7 @@ class Body:
         )
 
     def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind)
-        transforms.
-        """
+        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""
         points = self.shaped(weights)
         blended = np.einsum("vi,vixy->vxy", self.joint_weights, skinning[self.joint_indices, :3])
         return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
@@ -113,8 +111,7 @@ class Character:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right
-        joints lie.
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie.
         """
         bind = self.skeleton.bind[:, :3, 3]
         for part in ("upper_arm", "shoulder", "upper_leg", "eye"):

@@ -121,8 +121,8 @@ class Collider:
 def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Closest point (..., 3) to p on triangle abc, and the feature it lies on.
 
-    Features: 0 the face; 1, 2, 3 the corners a, b, c; 4, 5, 6 the edges ab, bc, ca.
-    All arguments broadcast to (..., 3). Ericson, Real-Time Collision Detection, section 5.1.5, by Voronoi regions.
+    Features: 0 the face; 1, 2, 3 the corners a, b, c; 4, 5, 6 the edges ab, bc, ca. All arguments broadcast to (...,
+    3). Ericson, Real-Time Collision Detection, section 5.1.5, by Voronoi regions.
     """
     ab, ac, ap, bp, cp = b - a, c - a, p - a, p - b, p - c
     d1, d2, d3, d4, d5, d6 = (np.einsum("...i,...i->...", u, v) for u, v in

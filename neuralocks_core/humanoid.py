@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
-The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l`
-before a capital), parts by
-their usual names, and the trunk by hierarchy: the upper chest is where the ways from the head and from the
-    arms meet.
+The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
+capital), parts by their usual names, and the trunk by hierarchy: the upper chest is where the ways from the head and
+from the arms meet.
 """
 
 import re
@@ -79,8 +78,8 @@ class Humanoid(Mapping):
         return len(self.joints)
 
     def nearest(self, name: str) -> int:
-        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can
-        drive a model.
+        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can drive a
+        model.
         """
         side = name.split("_")[0] if name.split("_")[0] in ("left", "right") else ""
         ways = {

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Body shape as ten lengths that mean the same on every rig.
 
-The paper conditions on the coefficients of its statistical body; those mean nothing on another one. Ten
-lengths measured on the bind pose
-around the head tell the network the same: where head, neck, shoulders and back are.
+The paper conditions on the coefficients of its statistical body; those mean nothing on another one. Ten lengths
+measured on the bind pose around the head tell the network the same: where head, neck, shoulders and back are.
 """
 
 import numpy as np

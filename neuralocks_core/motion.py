@@ -73,9 +73,8 @@ class Clip:
     def at(self, times) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) at any times (n,) [s].
 
-        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the
-        nearest sample is held
-        (or the loop goes on).
+        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the nearest
+        sample is held (or the loop goes on).
         """
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
         low, fraction = self._bracket(times)

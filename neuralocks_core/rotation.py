@@ -34,8 +34,8 @@ def from_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about
-    any normal.
+    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any
+    normal.
     """
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)

@@ -2,9 +2,8 @@
 """Strand inference with onnxruntime: what is the same for all frames once, what is the same for all strands
 once a frame.
 
-The first layer is linear in the strand and in the body, so its two parts are computed apart and added:
-    exact, and a third of the
-arithmetic is left per strand and frame. Strands go through in chunks that stay in a core's cache, several
+The first layer is linear in the strand and in the body, so its two parts are computed apart and added: exact, and a
+third of the arithmetic is left per strand and frame. Strands go through in chunks that stay in a core's cache, several
 cores each at one of its own.
 """
 
@@ -70,9 +69,7 @@ class StrandModel:
         return self._sessions[graph].run([output], inputs)[0]
 
     def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
-        """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds
-        `start` on.
-        """
+        """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds `start` on."""
         chunks = [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
         for _ in self.map(function, chunks):
             pass
@@ -215,8 +212,7 @@ def _edges(rest: np.ndarray) -> np.ndarray:
 
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
-    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3,
-    length 1.
+    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1.
     """
     locks = lock_codes(codes, strands.lock, strands.valid)
     return np.concatenate(

@@ -150,8 +150,8 @@ def _without_tongue(points, faces):
 def _on_same_skeleton(shape, default, parents, weights, keep):
     """Points (V, 3) of a shape carried onto the default's joints, so that it can be a plain blend shape.
 
-    Blend shapes do not move joints. Each bone's piece of skin is shifted to the default joint and scaled along the
-    bone to the default length: limbs keep their length, while girth, head and trunk change.
+    Blend shapes do not move joints. Each bone's piece of skin is shifted to the default joint and scaled along the bone
+    to the default length: limbs keep their length, while girth, head and trunk change.
     """
     points = np.zeros((len(keep), 3))
     for joint in range(len(default.heads)):

@@ -30,8 +30,8 @@ def bake_command(
 ) -> None:
     """Bake moving hair into a layer that goes over the shot.
 
-    The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back.
-    A bake that was stopped goes on where it was when the same command is given again.
+    The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back. A bake
+    that was stopped goes on where it was when the same command is given again.
     """
     from .bake import bake
     from .progress import progress_bar

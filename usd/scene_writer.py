@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write an animated character with hair as a shot, from arrays: what an application without a USD exporter of its
-own hands over.
+"""Write an animated character with hair as a shot, from arrays: what an application without a USD exporter of its own
+hands over.
 """
 
 import os

@@ -113,8 +113,8 @@ class NEURALOCKS_OT_cancel_training(Hardened, bpy.types.Operator):
 
 
 def finish() -> str | None:
-    """Take over the result of an ended training: the model goes to what it was trained for. A message for the
-    panel, or None while it runs.
+    """Take over the result of an ended training: the model goes to what it was trained for. A message for the panel, or
+    None while it runs.
     """
     from ..live import refresh
 

@@ -2,8 +2,7 @@
 """A hair Curves object: its strands, and where its rest shape is kept while the live view moves the points.
 
 The rest shape lies in the attribute `neuralocks_rest` of the Curves while it is live, so it is saved, appended and
-undone with the hair; the absence of
-the attribute says that the points themselves are at rest.
+undone with the hair; the absence of the attribute says that the points themselves are at rest.
 """
 
 import numpy as np
@@ -103,8 +102,8 @@ def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None)
 
 
 def _make_poly(data) -> None:
-    """Straight segments: Catmull-Rom, the default, is evaluated at twelve times the points by Blender 5.2, in vain
-    for 24-point strands.
+    """Straight segments: Catmull-Rom, the default, is evaluated at twelve times the points by Blender 5.2, in vain for
+    24-point strands.
     """
     if hasattr(data, "set_types"):
         data.set_types(type="POLY")

@@ -20,8 +20,8 @@ def bind_place(hair, armature, sampled) -> np.ndarray:
 
 
 def world(thing, graph) -> np.ndarray:
-    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded is not evaluated: its place then
-    comes from its parent's.
+    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded is not evaluated: its place
+    then comes from its parent's.
     """
     evaluated = thing.evaluated_get(graph)
     if evaluated.is_evaluated:
@@ -40,8 +40,7 @@ def world(thing, graph) -> np.ndarray:
 
 
 def mute_deformers(hair) -> None:
-    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done
-    that.
+    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done that.
     """
     settings = hair.neuralocks_hair
     if settings.muted:

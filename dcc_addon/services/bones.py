@@ -57,7 +57,7 @@ class LiveBones:
             self._clip, self._sampler = clip, RigSampler(self.model.spec, character, clip)
 
     def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
-        """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4)
-        are the poses drawn.
+        """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are
+        the poses drawn.
         """
         return self.model.evaluate(self._sampler.features(times, strength, joints))

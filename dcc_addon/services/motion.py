@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A rig's motion, sampled once: joint by joint translation, rotation and scale, as USD will store it.
 
-Blender's matrices are turned at once into the float32 channels of a SkelAnimation, and everything else is computed
-from these: live view, bake and the
-exported stage then see the very same numbers.
+Blender's matrices are turned at once into the float32 channels of a SkelAnimation, and everything else is computed from
+these: live view, bake and the exported stage then see the very same numbers.
 """
 
 from dataclasses import dataclass, field
@@ -21,8 +20,8 @@ TOLERANCE = 1e-4
 def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
     """Transforms (..., 4, 4) with rotation, translation and one scale each: what a chain of joints can carry.
 
-    Stretched bones (IK stretch, squash) have a different scale along each axis, which relative to a parent is
-    shear; hair does not need it.
+    Stretched bones (IK stretch, squash) have a different scale along each axis, which relative to a parent is shear;
+    hair does not need it.
     """
     joints = np.asarray(joints, float)
     try:

@@ -42,8 +42,8 @@ def problem(python: str) -> str:
 
 
 def environment() -> dict[str, str]:
-    """This process's environment without what belongs to Blender's own Python; the packages lying beside the add-on
-    can be found.
+    """This process's environment without what belongs to Blender's own Python; the packages lying beside the add-on can
+    be found.
     """
     import neuralocks_core
 

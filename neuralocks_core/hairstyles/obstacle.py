@@ -77,8 +77,8 @@ class Obstacle:
 def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(N,) signed distance to a mesh by its nearest corner or face middle.
 
-    Near the surface the distance is that to the sample's tangent plane. That is coarser than
-    `collider.Collider` and many times faster; grown hair keeps some millimetres away.
+    Near the surface the distance is that to the sample's tangent plane. That is coarser than `collider.Collider` and
+    many times faster; grown hair keeps some millimetres away.
     """
     points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
     if (

@@ -5,8 +5,8 @@ Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per u
 
     sum m / (2 h^2) |x - y|^2 + sum m c / (2 h) |x - x_before|^2 + bend(D) - sum m (g + support) x + contact(x)
 
-with x the bones' far ends in the head's frame now and y where free flight would have taken them. Bones meet the
-body as spheres at their ends and middles, so that a clip needs no skin.
+with x the bones' far ends in the head's frame now and y where free flight would have taken them. Bones meet the body as
+spheres at their ends and middles, so that a clip needs no skin.
 """
 
 from dataclasses import dataclass
@@ -167,8 +167,8 @@ class ChainSolver:
 
 
 def _plane_distance(spheres, points, normals):
-    """Distance (C, R, M) to the plane of the nearest body vertex, and its normal; spheres (C, R, M, 3), points (C,
-    P, 3).
+    """Distance (C, R, M) to the plane of the nearest body vertex, and its normal; spheres (C, R, M, 3), points (C, P,
+    3).
     """
     clips = len(spheres)
     flat = spheres.reshape(clips, -1, 3).astype(np.float32)
@@ -181,8 +181,7 @@ def _plane_distance(spheres, points, normals):
 
 
 def _between(a, b, share):
-    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations the nearest to the blend of the
-    matrices.
+    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations the nearest to the blend of the matrices.
     """
     if share >= 1:
         return b

@@ -4,9 +4,8 @@
     next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt + gravity
     direction * gravity power dt
 
-then back to the bone's length, out of colliders, and the joint turns from its rest axis to the new one. State
-is carried from frame to frame, and
-drag acts per frame, whatever its length: that is the specified behaviour.
+then back to the bone's length, out of colliders, and the joint turns from its rest axis to the new one. State is
+carried from frame to frame, and drag acts per frame, whatever its length: that is the specified behaviour.
 """
 
 from dataclasses import dataclass

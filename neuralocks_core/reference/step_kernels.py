@@ -119,9 +119,9 @@ def body_planes(
     """Nearest body element as a plane through its closest point; inside is negative.
 
     drift: how far any point of the body has gone in the head's frame since the beginning, summed over steps. A vertex
-    that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`)
-    has no plane; one that hardly moved on a body that stands still (`moved` 0) keeps its plane; else its strand is
-    woken. The element found last, where it is now, bounds the search.
+    that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`) has no plane;
+    one that hardly moved on a body that stands still (`moved` 0) keeps its plane; else its strand is woken. The element
+    found last, where it is now, bounds the search.
     """
     k, s = wp.tid()
     if k < 2:

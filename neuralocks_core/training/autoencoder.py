@@ -104,8 +104,8 @@ class StrandAutoencoder(nn.Module):
 
     @torch.no_grad()
     def set_normalisation(self, shapes: Tensor) -> None:
-        """Takes the mean of each coordinate, the spread of each vertex in all three, and the principal components
-        from (n, 72) shapes.
+        """Takes the mean of each coordinate, the spread of each vertex in all three, and the principal components from
+        (n, 72) shapes.
         """
         self.mean.copy_(shapes.mean(0))
         spread = (shapes - self.mean).square().reshape(-1, 24, 3).mean((0, 2)).sqrt()

@@ -2,8 +2,8 @@
 """The live gauge: do gravity and motion matter to the network yet?
 
 A loss cannot tell: hair that stays rigid has a small one. The gauge compares the network with the solver on motion and
-    strands that training
-never sees, beside hair carried rigidly (= 1) and the network's own answer for each pose held still.
+strands that training never sees, beside hair carried rigidly (= 1) and the network's own answer for each pose held
+still.
 """
 
 from __future__ import annotations

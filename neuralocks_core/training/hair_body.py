@@ -49,9 +49,7 @@ def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | 
 
 
 def posed_over_time(body: Body, skinning: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:
-    """World points (T, V, 3) float32 for skinning transforms (T, J, 4, 4): one matrix product for all
-    frames.
-    """
+    """World points (T, V, 3) float32 for skinning transforms (T, J, 4, 4): one matrix product for all frames."""
     joints, local = np.unique(body.joint_indices, return_inverse=True)
     weights = np.zeros((len(body.points), len(joints)), np.float32)
     np.add.at(

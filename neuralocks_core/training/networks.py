@@ -17,10 +17,8 @@ CODES = slice(2, 66)
 class StrandNet(nn.Module):
     """Maps what a strand is and what the body did to offsets of 24 vertices (paper section 3.3, figure 2).
 
-    The first layer is one linear map of the whole input, written as a sum of two: the strand part is
-    constant for a groom,
-    the frame part for a frame, so a bake computes each once. Inputs are SI; normalisation lies in buffers
-    and is
+    The first layer is one linear map of the whole input, written as a sum of two: the strand part is constant for a
+    groom, the frame part for a frame, so a bake computes each once. Inputs are SI; normalisation lies in buffers and is
     folded into the weights at export.
 
     Args:
@@ -156,10 +154,8 @@ def deform(
 ) -> Tensor:
     """Displacement of the vertices that the network's offsets stand for.
 
-    `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch
-    cannot happen and
-    hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest +
-    o`.
+    `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch cannot happen
+    and hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest + o`.
     Vertices 0 and 1 are clamped in both; zero offsets give exactly zero.
 
     Args:

@@ -110,8 +110,8 @@ class RolloutBank:
         return rng.choice(strands, count, replace=len(strands) < count)
 
     def batch(self, rng: np.random.Generator, options: RegressionOptions) -> dict[str, Tensor]:
-        """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's
-        vector last.
+        """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's vector
+        last.
         """
         rows: dict[str, list] = {name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")}
         for index in rng.integers(len(self.rollouts), size=options.clips):

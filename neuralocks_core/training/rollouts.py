@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training material made on the fly: short simulations of a few locks of hair on a moving body.
 
-No data from anyone is needed: the motion is random, the solver is our own. Rollout number i depends on the
-    seed and on i alone, so any
-process can make any of them, and a run that was killed goes on where it stopped.
+No data from anyone is needed: the motion is random, the solver is our own. Rollout number i depends on the seed and on
+i alone, so any process can make any of them, and a run that was killed goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -195,8 +194,7 @@ class RolloutMaker:
         return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
-        """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a
-        neighbourhood.
+        """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a neighbourhood.
         """
         groom, usable = self.scene.grooms[which], self._usable[which]
         chosen: list[int] = []
@@ -241,8 +239,8 @@ class RolloutMaker:
 
 
 def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
-    """Indices of the valid strands in every eighth lock (`held_out`), or in the others; all where there are
-    too few locks.
+    """Indices of the valid strands in every eighth lock (`held_out`), or in the others; all where there are too few
+    locks.
     """
     kept_back = (groom.lock % 8 == 7) == held_out
     usable = np.flatnonzero(groom.valid & kept_back)
