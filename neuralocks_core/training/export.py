@@ -21,6 +21,9 @@ def strand_graphs(
 
     Normalisation is folded into the weights, so all inputs are SI:
 
+    The deep maps, of a strand's shape and of the frame, hold most weights and are stored in float16, which keeps the
+    file small; all is computed in float32.
+
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
     - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, P), P = 256, or 768 where the frame also scales both hidden
@@ -29,11 +32,11 @@ def strand_graphs(
       (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
     """
     into = None if autoencoder.into is None else _folded(autoencoder.into, autoencoder.mean, autoencoder.scale)
-    encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale), *autoencoder.encoder[1:]]
+    encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale, True), *autoencoder.encoder[1:]]
     frame = _folded(net.frame, net.frame_mean, net.frame_scale)
     deep = None
     if net.encoder is not None:
-        deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale), *net.encoder[1:]]
+        deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale, True), *net.encoder[1:]]
         # What scales the hidden layers has no linear part: zeros beside it.
         wider = net.encoder[-1].out_features - net.frame.out_features
         frame = (np.pad(frame[0], ((0, 0), (0, wider))), np.pad(frame[1], (0, wider)))
@@ -45,9 +48,16 @@ def strand_graphs(
     }
 
 
-def _folded(layer: nn.Linear, mean: torch.Tensor, scale: torch.Tensor) -> tuple[np.ndarray, np.ndarray]:
-    """(in, out) weight and (out,) bias of `layer((x - mean) * scale)`, summed in float64."""
+def _folded(
+    layer: nn.Linear, mean: torch.Tensor, scale: torch.Tensor, half: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """(in, out) weight and (out,) bias of `layer((x - mean) * scale)`, summed in float64.
+
+    half: with the weight as float16 holds it, so that its rounding meets x - mean and not x.
+    """
     weight = layer.weight.detach().double() * scale.double()
+    if half:
+        weight = weight.half().double()
     bias = torch.zeros(len(weight)) if layer.bias is None else layer.bias.detach()
     bias = bias.double().to(weight.device) - weight @ mean.double()
     return weight.T.float().cpu().numpy(), bias.float().cpu().numpy()
@@ -68,21 +78,25 @@ class _Graph:
         self.helper, self.numpy_helper = helper, numpy_helper
         self.name, self.nodes, self.constants = name, [], []
 
-    def linear(self, value: str, layer, output: str | None = None) -> str:
+    def linear(self, value: str, layer, output: str | None = None, *, half: bool = False) -> str:
         output = output or f"linear{len(self.nodes)}"
-        names = [f"{output}.weight", f"{output}.bias"]
-        for name, array in zip(names, _weights(layer), strict=True):
-            self.constant(name, array)
-        return self.node("Gemm", [value, *names], output)
+        weight, bias = _weights(layer)
+        if half:
+            stored = self.constant(f"{output}.half", weight.astype(np.float16))
+            node = self.helper.make_node("Cast", [stored], [f"{output}.weight"], to=1)  # float32
+            self.nodes.append(node)
+        else:
+            self.constant(f"{output}.weight", weight)
+        return self.node("Gemm", [value, f"{output}.weight", self.constant(f"{output}.bias", bias)], output)
 
     def mlp(self, value: str, layers, output: str) -> str:
-        """Layers as in `nn.Sequential`: linear ones (or their folded arrays) with ReLU between."""
+        """Layers as in `nn.Sequential`: linear ones (or their folded arrays) with ReLU between, stored in float16."""
         last = len(layers) - 1
         for i, layer in enumerate(layers):
             value = (
                 self.node("Relu", [value], f"relu{len(self.nodes)}")
                 if isinstance(layer, nn.ReLU)
-                else self.linear(value, layer, output if i == last else None)
+                else self.linear(value, layer, output if i == last else None, half=True)
             )
         return value
 

@@ -62,7 +62,7 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
     graphs = strand_graphs(autoencoder, net, output)
     assert set(graphs) == {"encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"}
     np.testing.assert_allclose(
-        _run(graphs["encoder.onnx"], shape=shapes), autoencoder.encode(shapes).detach(), atol=1e-5
+        _run(graphs["encoder.onnx"], shape=shapes), autoencoder.encode(shapes).detach(), atol=2e-3
     )
     strands, frame = torch.randn(9, 70) * 3 + 1, torch.randn(1, 100) * torch.linspace(0.01, 30, 100) + 2
     rest = (torch.randn(9, 24, 3) * 0.01 + torch.tensor([0.0, -0.01, 0.0])).cumsum(1)
@@ -73,7 +73,10 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
         "anchor": anchor.reshape(9, 72),
         "edges": torch.cat([torch.zeros(9, 1, 3), rest.diff(dim=1)], 1).reshape(9, 72),
     }
-    offsets = net(strands, frame)[0]
+    close = 1e-4 if motion == "linear" else 2e-3  # deep maps are stored in float16
+    np.testing.assert_allclose(inputs["frame_part"], net.frame_part(frame).detach(), atol=close)
+    # From here on exact: what is computed per strand and frame is stored as it is.
+    offsets = net.tail(net.strand_part(strands), inputs["frame_part"]).reshape(9, 24, 3)
     np.testing.assert_allclose(_run(graphs["tail.onnx"], **inputs), offsets.detach().reshape(9, 72), atol=1e-5)
     moved = _run(graphs["tail.onnx"], "displacement", **inputs)
     np.testing.assert_allclose(moved, deform(offsets, rest, anchor, output).detach().reshape(9, 72), atol=2e-6)
