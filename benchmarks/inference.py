@@ -117,23 +117,25 @@ def shipped(model):
 
 
 def whole_graph(model):
-    """One ONNX graph over (S, 70 + F): the two parts of the first layer put back together."""
+    """One ONNX graph over (S, 70 + F): the network as a user without the split would run it, deep maps and all."""
     import onnx
     import onnxruntime
-    from onnx import helper, numpy_helper
+    from onnx import compose, helper, numpy_helper
 
     parts = {name: onnx.load_from_string(model.file.graphs[f"{name}.onnx"]) for name in ("strand", "frame", "tail")}
-    values = {t.name: numpy_helper.to_array(t) for part in parts.values() for t in part.graph.initializer}
-    weight = np.concatenate([values["strand_part.weight"], values["frame_part.weight"]])
-    bias = values["strand_part.bias"] + values["frame_part.bias"]
-    tail = parts["tail"].graph
-    nodes = [helper.make_node("Gemm", ["input", "whole.weight", "whole.bias"], ["sum"]), *list(tail.node)[1:]]
+    tail, nodes, weights, widths = parts["tail"].graph, [], list(parts["tail"].graph.initializer), []
+    for name in ("strand", "frame"):
+        graph = compose.add_prefix(parts[name], f"{name}/").graph
+        widths.append(graph.input[0].type.tensor_type.shape.dim[1].dim_value)
+        nodes += [*graph.node, helper.make_node("Identity", [f"{name}/{name}_part"], [f"{name}_part"])]
+        weights += graph.initializer
+    weights.append(numpy_helper.from_array(np.array(widths, np.int64), "widths"))
+    nodes = [helper.make_node("Split", ["input", "widths"], ["strand/strand", "frame/frame"], axis=1), *nodes, *tail.node]
     inputs = [
-        helper.make_tensor_value_info("input", onnx.TensorProto.FLOAT, ["S", len(weight)]),
+        helper.make_tensor_value_info("input", onnx.TensorProto.FLOAT, ["S", sum(widths)]),
         *(i for i in tail.input if i.name in ("anchor", "edges")),
     ]
-    weights = [numpy_helper.from_array(weight, "whole.weight"), numpy_helper.from_array(bias, "whole.bias")]
-    graph = helper.make_graph(nodes, "whole", inputs, list(tail.output), [*tail.initializer, *weights])
+    graph = helper.make_graph(nodes, "whole", inputs, list(tail.output), weights)
     whole = helper.make_model(graph, opset_imports=parts["tail"].opset_import, ir_version=parts["tail"].ir_version)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = model.threads
