@@ -49,8 +49,9 @@ class Collider:
 
         Args:
             points: (..., 3) [m].
-            limit: farther than this from the surface [m], the distance is that to the nearest surface sample instead
-                of the exact one (a few millimetres too large), which saves most of the work.
+            limit: farther outside than this [m], the distance is that to the nearest surface sample instead of the
+                exact one (a few millimetres too large), which saves most of the work. What seems inside is
+                always measured exactly.
             proven: go on until no other triangle can be nearer; else only those around the nearest four samples are
                 looked at, which may miss the nearest one by a fraction of a millimetre.
         """
@@ -66,7 +67,9 @@ class Collider:
         triangle = self._owner[sample]
         closest = self._tree.data[sample]
         normal = self._normals[triangle]
-        near = np.flatnonzero(rough <= limit + self._reach)
+        # The nearest sample's face may lie about the side near ears and other thin parts: what seems inside is proven.
+        inside = ((points - closest) * normal).sum(axis=1) < 0
+        near = np.flatnonzero((rough <= limit + self._reach) | inside)
         closest, normal, triangle = closest.copy(), normal.copy(), triangle.copy()
         pending, k = near, 8 if proven else 4
         while len(pending):

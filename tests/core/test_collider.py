@@ -38,6 +38,14 @@ def test_limit_keeps_near_points_exact_and_far_points_signed():
     assert (np.sign(limited) == np.sign(exact)).mean() > 0.999
 
 
+def test_points_far_beyond_a_sharp_rim_are_not_inside():
+    """The nearest sample there lies on a face that may look away."""
+    cone, rng = trimesh.creation.cone(0.01, 0.1, sections=16), np.random.default_rng(7)
+    angle, radius = rng.uniform(0, 2 * np.pi, 2000), rng.uniform(0.05, 0.08, 2000)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0, 0.004, 2000)], axis=1)
+    assert Collider(cone.vertices, cone.faces).distance(points, limit=0.02)[0].min() > 0.03
+
+
 def test_box_is_analytic_with_two_huge_triangles_a_side():
     """Large triangles are found by points near their middle and near their corners."""
     mesh = trimesh.creation.box((2.0, 2.0, 2.0))
