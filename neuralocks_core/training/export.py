@@ -37,9 +37,9 @@ def strand_graphs(
     deep = None
     if net.encoder is not None:
         deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale, True), *net.encoder[1:]]
-        # What scales the hidden layers has no linear part: zeros beside it.
+        # What scales the hidden layers has no linear part, and is one before the deep map adds to it.
         wider = net.encoder[-1].out_features - net.frame.out_features
-        frame = (np.pad(frame[0], ((0, 0), (0, wider))), np.pad(frame[1], (0, wider)))
+        frame = (np.pad(frame[0], ((0, 0), (0, wider))), np.pad(frame[1], (0, wider), constant_values=1.0))
     return {
         "encoder.onnx": _encoder_graph(encoder, into),
         "strand.onnx": _linear_graph("strand", _folded(net.strand, net.strand_mean, net.strand_scale)),
@@ -157,10 +157,13 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
     if net.motion == "modulated":
         parts = ["added", "factor1", "factor2"]
         graph.nodes.append(graph.helper.make_node("Split", ["frame_part"], parts, axis=1))
-        graph.constant("one", np.float32(1.0))
-    first = graph.node("Relu", [graph.node("Add", ["strand_part", parts[0]], "sum")], "first")
-    second = graph.node("Relu", [graph.linear(_scaled(graph, first, parts[1:2]), net.middle)], "second")
-    graph.linear(_scaled(graph, second, parts[2:3]), net.out, "offsets")
+    value = graph.node("Relu", [graph.node("Add", ["strand_part", parts[0]], "sum")], "first")
+    if parts[1:]:
+        value = graph.node("Mul", [value, parts[1]], "first.scaled")
+    value = graph.node("Relu", [graph.linear(value, net.middle)], "second")
+    if parts[1:]:
+        value = graph.node("Mul", [value, parts[2]], "second.scaled")
+    graph.linear(value, net.out, "offsets")
     free = np.repeat(np.arange(count) >= 2, 3).astype(np.float32)
     graph.node("Sub", ["offsets", "anchor"], "change")
     graph.node(
@@ -188,11 +191,3 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
         "edges": ("S", width),
     }
     return graph.finish(inputs, {"offsets": ("S", width), "displacement": ("S", width)})
-
-
-def _scaled(graph: _Graph, value: str, factor: list[str]) -> str:
-    """`value * (1 + factor)`, or the value where there is no factor."""
-    if not factor:
-        return value
-    more = graph.node("Add", [factor[0], "one"], f"{factor[0]}.more")
-    return graph.node("Mul", [value, more], f"{value}.scaled")

@@ -111,8 +111,7 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
     frames = []
     for r in bank.rollouts:
         frames.append(r.vectors.copy())
-        if r.materials is not None:
-            frames[-1][:, bank.material] = r.materials[np.arange(len(r.vectors)) % len(r.materials)]
+        frames[-1][:, bank.material] = r.materials[np.arange(len(r.vectors)) % len(r.materials)]
     return strands, np.concatenate(frames)
 
 

@@ -123,7 +123,8 @@ class StrandNet(nn.Module):
         if self.encoder is None:
             return part
         deep = self.encoder(normal)
-        return deep + nn.functional.pad(part, (0, deep.shape[-1] - part.shape[-1]))
+        # Factors have no linear part: they are one and what the deep map adds.
+        return deep + nn.functional.pad(part, (0, deep.shape[-1] - part.shape[-1]), value=1.0)
 
     def tail(self, strand_part: Tensor, frame_part: Tensor) -> Tensor:
         """All that is left per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
@@ -131,8 +132,8 @@ class StrandNet(nn.Module):
         first = torch.relu(strand_part + added)
         if not factors:
             return self.out(torch.relu(self.middle(first)))
-        second = torch.relu(self.middle(first * (1 + factors[0])))
-        return self.out(second * (1 + factors[1]))
+        second = torch.relu(self.middle(first * factors[0]))
+        return self.out(second * factors[1])
 
     def forward(self, strands: Tensor, frames: Tensor) -> Tensor:
         """Offsets for every frame and strand.

@@ -103,10 +103,8 @@ class RolloutBank:
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:
         """Random strands of one material: they share the frame's part of the first layer."""
-        strands = np.arange(len(rollout.strands))
-        if rollout.materials is not None:
-            same = (rollout.materials == rollout.materials[rng.integers(len(strands))]).all(axis=1)
-            strands = np.flatnonzero(same)
+        same = rollout.materials == rollout.materials[rng.integers(len(rollout.strands))]
+        strands = np.flatnonzero(same.all(axis=1))
         return rng.choice(strands, count, replace=len(strands) < count)
 
     def batch(self, rng: np.random.Generator, options: RegressionOptions) -> dict[str, Tensor]:
@@ -124,8 +122,7 @@ class RolloutBank:
             rows["rest"].append(rollout.rest[pick])
             rows["length"].append(self.lengths[rollout.groom][chosen])
             frames = np.concatenate([rollout.vectors[moments], rollout.bind[None]])
-            if rollout.materials is not None:
-                frames[:, self.material] = rollout.materials[pick[0]]
+            frames[:, self.material] = rollout.materials[pick[0]]
             rows["frames"].append(frames)
             rows["moved"].append(rollout.moved[moments[:, None], pick])
             rows["planes"].append(rollout.planes[moments[:, None], pick])
@@ -208,13 +205,10 @@ def predicted(
     strands = net.strand_part(torch.from_numpy(bank.inputs[rollout.groom][chosen]).to(device))
     frames = np.concatenate([rollout.vectors, rollout.bind[None]])
     result = np.empty((len(rollout.vectors), len(chosen), 24, 3), np.float32)
-    groups = [np.arange(len(chosen))]
-    if rollout.materials is not None:
-        kinds, kind = np.unique(rollout.materials, axis=0, return_inverse=True)
-        groups = [np.flatnonzero(kind.ravel() == i) for i in range(len(kinds))]
-    for group in groups:
-        if rollout.materials is not None:
-            frames[:, bank.material] = rollout.materials[group[0]]
+    kinds, kind = np.unique(rollout.materials, axis=0, return_inverse=True)
+    for i, material in enumerate(kinds):
+        group = np.flatnonzero(kind.ravel() == i)
+        frames[:, bank.material] = material
         offsets = net.tail(strands[None, group], net.frame_part(torch.from_numpy(frames).to(device))[:, None])
         offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
         rest = torch.from_numpy(rollout.rest[group]).to(device)

@@ -5,27 +5,21 @@ section 4.4).
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import torch
 
-from neuralocks_core.rig.network import POSE, RigModel, input_limits, rig_spec
+from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend
-from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial
+from neuralocks_core.training.rig_energy import RigMaterial
+from neuralocks_core.training.rig_held import HeldPoses
 from neuralocks_core.training.rig_network import TinyNet
-from neuralocks_core.training.rig_poses import PosePool
 from neuralocks_core.training.rig_report import static_report
 
-COLLIDING = 96
-"""Hair vertices that collide in one step, drawn anew: finding the nearest body is half of a step's time."""
 _POOL = 512
-"""Poses to draw from. Each step draws `batch` of them, and every other step renews one: with a fixed pool the hair kept
-clear of the bodies that it knew, and went twice as deep into others."""
-ROOM = 0.006
-"""Kept from the body over the material's margin while learning [m]: the network cannot see the body's shape, nor hit the
-mark to the millimetre, and so goes less deep into the body."""
+"""Poses to draw from."""
 Progress = Callable[[int, int, str], None]
 
 
@@ -60,20 +54,11 @@ def train_static(
     spec = rig_spec()
     say = progress or (lambda done, total, message: None)
     say(0, 1, "posing bodies")
-    pool = PosePool(rig, _POOL, rng)
-    energy = RigEnergy(rig, replace(material, margin=material.margin + ROOM))
-    net = TinyNet(POSE, hidden, len(rig.chains), pool, spec, max_angle)
-    renewed = 0
+    held = HeldPoses(rig, material, _POOL, rng, spec)
+    net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec, max_angle)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
-        nonlocal renewed
-        renewed += 1
-        if renewed % 16 == 0:
-            pool.renew(8)
-        poses = rng.integers(0, pool.count, batch)
-        gravity = pool.gravity(poses)
-        turns = net(torch.as_tensor(pool.features(spec, poses, gravity)))
-        elastic, collision = energy.parts(pool, poses, turns, gravity, energy.draw(rng, COLLIDING))
+        elastic, collision = held.parts(net, batch)
         return {"elastic": elastic.mean(), "collision": collision.mean()}
 
     began = time.monotonic()
@@ -89,8 +74,7 @@ def train_static(
         "hidden": hidden,
         "material": asdict(material),
     }
-    layers = net.plain_layers(rig.chains.axes)
-    model = RigModel(rig.chains, spec, layers, input_limits(spec), max_angle, training=training)
+    model = net.model(rig.chains, training)
     if report_poses:
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, say))
     return model

@@ -6,20 +6,19 @@ after the same history.
 """
 
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import torch
 
 from neuralocks_core.random_motion import random_clip
-from neuralocks_core.rig.network import RigModel, input_limits, rig_spec
+from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend
-from neuralocks_core.training.rig import COLLIDING, ROOM
-from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial
+from neuralocks_core.training.rig_energy import RigMaterial
+from neuralocks_core.training.rig_held import HeldPoses
 from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig_network import TinyNet
-from neuralocks_core.training.rig_poses import PosePool
 from neuralocks_core.training.rig_report import static_report
 
 _VELOCITY = 20.0
@@ -63,37 +62,26 @@ def train_dynamic(
     say = progress or (lambda done, total, message: None)
     spec = rig_spec(dynamic=True)
     features, turns = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
-    energy = RigEnergy(rig, replace(material, margin=material.margin + ROOM))
+    held = HeldPoses(rig, material, 256, rng, spec)
     with torch.no_grad():
-        wanted = energy.pose(torch.as_tensor(turns.reshape(-1, len(rig.chains), 4)))[2]
+        wanted = held.energy.pose(torch.as_tensor(turns.reshape(-1, len(rig.chains), 4)))[2]
     wanted = wanted.reshape(*turns.shape[:2], -1, 3)
     inputs = torch.as_tensor(features)
-    pool = PosePool(rig, 256, rng)
-    net = TinyNet(features.shape[-1], hidden, len(rig.chains), pool, spec, max_angle)
+    net = TinyNet(features.shape[-1], hidden, len(rig.chains), held.pool, spec, max_angle)
     net.normalise(features.reshape(-1, features.shape[-1]))
-    taken = 0
 
     def losses(done: float) -> dict[str, torch.Tensor]:
-        nonlocal taken
-        taken += 1
         clip = torch.as_tensor(rng.integers(0, inputs.shape[0], batch))
         frame = torch.as_tensor(rng.integers(1, inputs.shape[1], batch))
         both = torch.cat([inputs[clip, frame], inputs[clip, frame - 1]])
-        now, before = (energy.pose(net(both))[2] - torch.cat([wanted[clip, frame], wanted[clip, frame - 1]])).chunk(2)
+        now, before = (held.energy.pose(net(both))[2] - torch.cat([wanted[clip, frame], wanted[clip, frame - 1]])).chunk(2)
         result = {
             "place": now.square().sum(-1).mean(),
             "motion": _VELOCITY * (now - before).square().sum(-1).mean(),
         }
-        if pool.collides:
+        if held.pool.collides:
             # The simulation meets the body with a few spheres; held poses teach the skinned mesh to stay out.
-            if taken % 16 == 0:
-                pool.renew(8)
-            poses = rng.integers(0, pool.count, 8)
-            gravity = pool.gravity(poses)
-            held = net(torch.as_tensor(pool.features(spec, poses, gravity)))
-            result["collision"] = (
-                _COLLISION * energy.parts(pool, poses, held, gravity, energy.draw(rng, COLLIDING))[1].mean()
-            )
+            result["collision"] = _COLLISION * held.parts(net, 8)[1].mean()
         return result
 
     began = time.monotonic()
@@ -112,8 +100,7 @@ def train_dynamic(
         "hidden": hidden,
         "material": asdict(material),
     }
-    layers = net.plain_layers(rig.chains.axes)
-    model = RigModel(rig.chains, spec, layers, input_limits(spec), max_angle, training=training)
+    model = net.model(rig.chains, training)
     if report_poses:
         say(950, 1000, "comparing on held-out motion")
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, optimised=16))

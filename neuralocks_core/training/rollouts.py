@@ -87,7 +87,7 @@ class Rollout:
     moved: np.ndarray
     planes: np.ndarray
     residual: float
-    materials: np.ndarray | None = None
+    materials: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def train_strands(
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
                 last, gauge = now, look()
-                curve = [*meta.get("curve", []), *_told(now - began, gauge)]
+                curve = [*meta["curve"], *_told(now - began, gauge)]
                 meta = {"step": state.step, "seconds": now - began, "curve": curve}
                 checkpoint.save(saved, meta, modules, optimisers)
             losses = " ".join(f"{name} {value:.4f}" for name, value in state.losses.items())
