@@ -19,6 +19,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 HIDDEN, OUTPUTS, CHUNK = 256, 72, 512
+MATRICES = ("middle", "out")
+"""Weights that depend on the frame."""
 clock = time.perf_counter
 
 
@@ -43,8 +45,8 @@ def main() -> None:
         f"{'strands':>8} {'whole':>9} {'split':>9} {'int8':>9} {'floor':>9} | {'whole/split':>11} {'split/floor':>11}"
         f" | {'split error':>12} {'int8 error':>11}"
     )
-    whole, eight = whole_graph(model), quantised(model)
     real, vector = shipped(model)
+    whole, eight = whole_graph(model), quantised(model, vector)
     refused = half_refused()
     print(f"bfloat16 matrix products: {'refused by onnxruntime: ' + refused if refused else 'possible here'}")
     for strands in arguments.strands:
@@ -77,21 +79,25 @@ class Inputs:
 
     def split(self, model, vector, tail=None) -> np.ndarray:
         """As the runtime does it: the body once, then chunks of strands."""
-        frame = model.frame_part(vector)
+        frame = model.frame(vector)
         result = np.empty_like(self.edges)
-        run = (
-            (lambda feed: tail.run(["displacement"], feed)[0])
-            if tail
-            else (lambda feed: model.run("tail.onnx", "displacement", **feed))
-        )
+        if tail:
+
+            def run(feed):
+                return tail.run(["displacement"], {k: v for k, v in feed.items() if k not in MATRICES})[0]
+
+        else:
+
+            def run(feed):
+                return model.run("tail.onnx", "displacement", **feed)
 
         def work(chunk):
             result[chunk] = run(
                 {
                     "strand_part": self.part[chunk],
-                    "frame_part": frame,
                     "anchor": self.anchor[chunk],
                     "edges": self.edges[chunk],
+                    **frame,
                 }
             )
 
@@ -130,7 +136,10 @@ def whole_graph(model):
         nodes += [*graph.node, helper.make_node("Identity", [f"{name}/{name}_part"], [f"{name}_part"])]
         weights += graph.initializer
     weights.append(numpy_helper.from_array(np.array(widths, np.int64), "widths"))
-    nodes = [helper.make_node("Split", ["input", "widths"], ["strand/strand", "frame/frame"], axis=1), *nodes, *tail.node]
+    split = helper.make_node("Split", ["input", "widths"], ["strand/strand", "frame/frame"], axis=1)
+    nodes = [split, *(n for n in nodes if n.output[0].split(".")[-1] not in (*ONE_FRAME, "frame/middle", "frame/out"))]
+    for node in tail.node:
+        nodes += own_weights(node, helper.make_node)
     inputs = [
         helper.make_tensor_value_info("input", onnx.TensorProto.FLOAT, ["S", sum(widths)]),
         *(i for i in tail.input if i.name in ("anchor", "edges")),
@@ -142,12 +151,32 @@ def whole_graph(model):
     return onnxruntime.InferenceSession(whole.SerializeToString(), options, providers=["CPUExecutionProvider"])
 
 
-def quantised(model):
-    """The tail with dynamic 8-bit matrix products, or None where onnxruntime's tools are missing."""
+ONE_FRAME = ("weighed", "change", "whole", "rows")
+"""What the frame's graph makes of the weights behind it; there is one for all strands only where the frame is one."""
+
+
+def own_weights(node, make) -> list:
+    """A node of the tail as it is where each strand comes with a frame of its own."""
+    if node.op_type != "Gemm" or node.input[1] not in MATRICES:
+        return [node]
+    value, name, bias = node.input
+    return [
+        make("Mul", [value, f"frame/{name}.factor"], [f"{name}.scaled"]),
+        make("Gemm", [f"{name}.scaled", f"frame/{name}.plain", bias], [f"{name}.flat"]),
+        make("MatMul", [f"{name}.scaled", f"frame/{name}.to_terms"], [f"{name}.terms"]),
+        make("Mul", [f"{name}.terms", f"frame/{name}.weights"], [f"{name}.weighed"]),
+        make("MatMul", [f"{name}.weighed", f"frame/{name}.back"], [f"{name}.change"]),
+        make("Add", [f"{name}.flat", f"{name}.change"], node.output),
+    ]
+
+
+def quantised(model, vector):
+    """The tail with dynamic 8-bit matrix products for one frame, or None where onnxruntime's tools are missing."""
     import tempfile
 
     import onnx
     import onnxruntime
+    from onnx import numpy_helper
 
     logging.disable(logging.WARNING)
     try:
@@ -157,11 +186,16 @@ def quantised(model):
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "tail.onnx", Path(folder) / "tail8.onnx"
         proto = onnx.load_from_string(model.file.graphs["tail.onnx"])
+        for name in MATRICES:
+            proto.graph.initializer.append(numpy_helper.from_array(model.frame(vector)[name], name))
+        kept = [value for value in proto.graph.input if value.name not in MATRICES]
+        del proto.graph.input[:]
+        proto.graph.input.extend(kept)
         for number, node in enumerate(proto.graph.node):
             node.name = node.output[0] or str(number)
         onnx.save(proto, source)
-        kept = ["lsum", "nsum", "displacement"]  # sums whose errors would add up along the strand
-        quantize_dynamic(source, target, weight_type=QuantType.QInt8, nodes_to_exclude=kept, per_channel=True)
+        sums = [n.name for n in proto.graph.node if n.op_type == "MatMul"]  # their errors add up along the strand
+        quantize_dynamic(source, target, weight_type=QuantType.QInt8, nodes_to_exclude=sums, per_channel=True)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         return onnxruntime.InferenceSession(target.read_bytes(), options, providers=["CPUExecutionProvider"])

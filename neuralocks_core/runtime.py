@@ -68,6 +68,13 @@ class StrandModel:
         """One output of one graph, float32."""
         return self._sessions[graph].run([output], inputs)[0]
 
+    def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
+        """What all strands share in a frame, by the names under which the tail reads it, of a boundary vector
+        (spec.size,)."""
+        session = self._sessions["frame.onnx"]
+        values = session.run(None, {"frame": np.asarray(vector, np.float32).reshape(1, -1)})
+        return {output.name: value for output, value in zip(session.get_outputs(), values)}
+
     def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
         """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds `start` on."""
         chunks = [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
@@ -77,10 +84,6 @@ class StrandModel:
     def map(self, function: Callable, items) -> Iterable:
         """Results of calls on this model's threads, in order; a single one is made where it stands."""
         return map(function, items) if len(items) < 2 else self._pool.map(function, items)
-
-    def frame_part(self, vector: np.ndarray) -> np.ndarray:
-        """First layer, body part (1, 256), of a boundary vector (spec.size,)."""
-        return self.run("frame.onnx", "frame_part", frame=np.asarray(vector, np.float32).reshape(1, -1))
 
     def _session(self, name: str):
         import onnxruntime
@@ -147,7 +150,7 @@ class StrandSession:
         return result.reshape(len(result), K, 3)
 
     def _tail(self, output, vector, strands: slice = slice(None), out=None) -> np.ndarray:
-        frame = self.model.frame_part(vector)
+        frame = self.model.frame(vector)
         start, stop, _ = strands.indices(len(self.strands.rest))
         result = (
             np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
@@ -168,7 +171,7 @@ class StrandSession:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
         computed it and still has it in its cache.
         """
-        frame, valid = self.model.frame_part(vector), self.strands.valid
+        frame, valid = self.model.frame(vector), self.strands.valid
 
         def work(chunk: slice) -> None:
             values = self._chunk("displacement", chunk, frame)
@@ -178,15 +181,15 @@ class StrandSession:
 
         self.model.by_chunk(work, len(self.strands.rest))
 
-    def _chunk(self, output: str, chunk: slice, frame: np.ndarray) -> np.ndarray:
+    def _chunk(self, output: str, chunk: slice, frame: dict[str, np.ndarray]) -> np.ndarray:
         """(n, 72) of one whole chunk."""
         return self.model.run(
             "tail.onnx",
             output,
             strand_part=self._strand_part[chunk],
-            frame_part=frame,
             anchor=self._anchor[chunk],
             edges=_edges(self.strands.rest[chunk]),
+            **frame,
         )
 
     def _by_chunk(self, function, width: int) -> np.ndarray:

@@ -16,8 +16,9 @@ STRANDS = {
     "-> `code` (S, 32)",
     "strand.onnx": "once a groom: `strand` (S, 70): root UV 2, own code 32, mean code of its lock 32, root normal 3, "
     "length 1 [m] -> `strand_part` (S, 256)",
-    "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, P), P as the model has it",
-    "tail.onnx": "per strand and frame: `strand_part` (S, 256), `frame_part` (1, P), `anchor` (S, 72): the `offsets` "
+    "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, 256), and where the frame "
+    "changes the weights behind, `middle` (256, 256) and `out` (256, 72)",
+    "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
     "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
     "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
 }

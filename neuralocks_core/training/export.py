@@ -14,36 +14,26 @@ OPSET = 17
 IR_VERSION = 8  # the oldest that goes with this opset, for the oldest onnxruntime a user may have
 
 
-def strand_graphs(
-    autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction"
-) -> dict[str, bytes]:
+def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction") -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
-    Normalisation is folded into the weights, so all inputs are SI:
-
-    The deep maps, of a strand's shape and of the frame, hold most weights and are stored in float16, which keeps the
-    file small; all is computed in float32.
+    Normalisation is folded into the weights, so all inputs are SI. The deep maps, of a strand's shape and of the frame,
+    and the frame's linear one beside them, hold most weights and are stored in float16, which keeps the file small; all
+    is computed in float32.
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
-    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, P), P = 256, or 768 where the frame also scales both hidden
-      layers;
-    - `tail.onnx`: `strand_part` (S, 256), `frame_part` (1, P), `anchor` (S, 72) offsets of the held bind pose, `edges`
-      (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
+    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256), and where the frame also changes the weights behind,
+      `middle` (256, 256) and `out` (256, 72);
+    - `tail.onnx`: `strand_part` (S, 256), what `frame.onnx` gave, `anchor` (S, 72) offsets of the held bind pose,
+      `edges` (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
     """
     into = None if autoencoder.into is None else _folded(autoencoder.into, autoencoder.mean, autoencoder.scale)
     encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale, True), *autoencoder.encoder[1:]]
-    frame = _folded(net.frame, net.frame_mean, net.frame_scale)
-    deep = None
-    if net.encoder is not None:
-        deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale, True), *net.encoder[1:]]
-        # What scales the hidden layers has no linear part, and is one before the deep map adds to it.
-        wider = net.encoder[-1].out_features - net.frame.out_features
-        frame = (np.pad(frame[0], ((0, 0), (0, wider))), np.pad(frame[1], (0, wider), constant_values=1.0))
     return {
         "encoder.onnx": _encoder_graph(encoder, into),
-        "strand.onnx": _linear_graph("strand", _folded(net.strand, net.strand_mean, net.strand_scale)),
-        "frame.onnx": _linear_graph("frame", frame, deep),
+        "strand.onnx": _strand_graph(_folded(net.strand, net.strand_mean, net.strand_scale)),
+        "frame.onnx": _frame_graph(net),
         "tail.onnx": _tail_graph(net, output),
     }
 
@@ -64,9 +54,7 @@ def _folded(
 
 
 def _weights(layer: nn.Linear | tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    if isinstance(layer, tuple):
-        return layer
-    return layer.weight.detach().T.float().cpu().numpy(), layer.bias.detach().float().cpu().numpy()
+    return layer if isinstance(layer, tuple) else (_array(layer), layer.bias.detach().float().cpu().numpy())
 
 
 class _Graph:
@@ -81,13 +69,8 @@ class _Graph:
     def linear(self, value: str, layer, output: str | None = None, *, half: bool = False) -> str:
         output = output or f"linear{len(self.nodes)}"
         weight, bias = _weights(layer)
-        if half:
-            stored = self.constant(f"{output}.half", weight.astype(np.float16))
-            node = self.helper.make_node("Cast", [stored], [f"{output}.weight"], to=1)  # float32
-            self.nodes.append(node)
-        else:
-            self.constant(f"{output}.weight", weight)
-        return self.node("Gemm", [value, f"{output}.weight", self.constant(f"{output}.bias", bias)], output)
+        stored = (self.half if half else self.constant)(f"{output}.weight", weight)
+        return self.node("Gemm", [value, stored, self.constant(f"{output}.bias", bias)], output)
 
     def mlp(self, value: str, layers, output: str) -> str:
         """Layers as in `nn.Sequential`: linear ones (or their folded arrays) with ReLU between, stored in float16."""
@@ -99,6 +82,12 @@ class _Graph:
                 else self.linear(value, layer, output if i == last else None, half=True)
             )
         return value
+
+    def half(self, name: str, array: np.ndarray) -> str:
+        """A constant that is stored in float16 and read as float32."""
+        stored = self.constant(f"{name}.half", array.astype(np.float16))
+        self.nodes.append(self.helper.make_node("Cast", [stored], [name], to=1))
+        return name
 
     def constant(self, name: str, array: np.ndarray) -> str:
         self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
@@ -112,13 +101,9 @@ class _Graph:
         import onnx
 
         def describe(values):
-            return [
-                self.helper.make_tensor_value_info(k, onnx.TensorProto.FLOAT, v) for k, v in values.items()
-            ]
+            return [self.helper.make_tensor_value_info(k, onnx.TensorProto.FLOAT, v) for k, v in values.items()]
 
-        graph = self.helper.make_graph(
-            self.nodes, self.name, describe(inputs), describe(outputs), self.constants
-        )
+        graph = self.helper.make_graph(self.nodes, self.name, describe(inputs), describe(outputs), self.constants)
         model = self.helper.make_model(
             graph,
             opset_imports=[self.helper.make_opsetid("", OPSET)],
@@ -138,56 +123,101 @@ def _encoder_graph(layers, into) -> bytes:
     return graph.finish({"shape": ("S", 72)}, {"code": ("S", len(_weights(layers[-1])[1]))})
 
 
-def _linear_graph(name: str, layer, deep=None) -> bytes:
-    graph, (weight, bias) = _Graph(name), layer
-    if deep is None:
-        graph.linear(name, layer, f"{name}_part")
+def _strand_graph(layer) -> bytes:
+    graph = _Graph("strand")
+    graph.linear("strand", layer, "strand_part")
+    return graph.finish({"strand": ("S", len(layer[0]))}, {"strand_part": ("S", len(layer[1]))})
+
+
+def _frame_graph(net: StrandNet) -> bytes:
+    """The body's part of the first layer, and the weights that a frame changes."""
+    half = net.encoder is not None
+    graph, layer = _Graph("frame"), _folded(net.frame, net.frame_mean, net.frame_scale, half)
+    hidden, outputs = len(layer[1]), {"frame_part": (1, len(layer[1]))}
+    if not half:
+        graph.linear("frame", layer, "frame_part")
+        return graph.finish({"frame": (1, len(layer[0]))}, outputs)
+    deep = [_folded(net.encoder[0], net.frame_mean, net.frame_scale, True), *net.encoder[1:]]
+    if net.motion == "encoder":
+        graph.mlp("frame", deep, "bent")
     else:
-        graph.node("Add", [graph.linear(name, layer, "flat"), graph.mlp(name, deep, "deep")], f"{name}_part")
-    rows = "S" if name == "strand" else "B"
-    return graph.finish({name: (rows, len(weight))}, {f"{name}_part": (rows, len(bias))})
+        graph.mlp("frame", deep, "deep")
+        changes = {"middle": (net.middle, net.middle_change), "out": (net.out, net.out_change)}
+        sizes = [hidden, hidden, hidden, *(change.to_terms.out_features for _, change in changes.values())]
+        parts = ["bent", "middle.deep", "out.deep", "middle.terms", "out.terms"]
+        graph.nodes.append(
+            graph.helper.make_node("Split", ["deep", graph.constant("sizes", np.array(sizes))], parts, axis=1)
+        )
+        graph.constant("one", np.float32(1))
+        for name, (plain, change) in changes.items():
+            graph.node("Add", [f"{name}.deep", "one"], f"{name}.factor")
+            graph.node("Add", [f"{name}.terms", "one"], f"{name}.weights")
+            free = _free(net) if name == "out" else np.float32(1)
+            graph.half(f"{name}.to_terms", _array(change.to_terms))
+            graph.half(f"{name}.back", _array(change.back) * free)
+            terms = graph.node("Mul", [f"{name}.to_terms", f"{name}.weights"], f"{name}.weighed")
+            graph.constant(f"{name}.plain", _array(plain) * free)
+            whole = graph.node(
+                "Add",
+                [f"{name}.plain", graph.node("MatMul", [terms, f"{name}.back"], f"{name}.change")],
+                f"{name}.whole",
+            )
+            rows = graph.node("Transpose", [f"{name}.factor"], f"{name}.rows")
+            graph.node("Mul", [whole, rows], name)
+            outputs[name] = (hidden, plain.out_features)
+    graph.node("Add", [graph.linear("frame", layer, "flat", half=True), "bent"], "frame_part")
+    return graph.finish({"frame": (1, len(layer[0]))}, outputs)
 
 
 def _tail_graph(net: StrandNet, output: str) -> bytes:
-    """Second layer, output layer, and `networks.deform` written in ONNX, so that all of it runs in the
-    runtime's chunks."""
+    """Second layer, output layer, and `networks.deform` written in ONNX, so that all of it runs in the runtime's chunks."""
     graph, hidden, width = _Graph("tail"), net.middle.in_features, net.out.out_features
-    count = width // 3
-    parts = ["frame_part"]
+    inputs = {"strand_part": ("S", hidden), "frame_part": (1, hidden), "anchor": ("S", width), "edges": ("S", width)}
     if net.motion == "modulated":
-        parts = ["added", "factor1", "factor2"]
-        graph.nodes.append(graph.helper.make_node("Split", ["frame_part"], parts, axis=1))
-    value = graph.node("Relu", [graph.node("Add", ["strand_part", parts[0]], "sum")], "first")
-    if parts[1:]:
-        value = graph.node("Mul", [value, parts[1]], "first.scaled")
-    value = graph.node("Relu", [graph.linear(value, net.middle)], "second")
-    if parts[1:]:
-        value = graph.node("Mul", [value, parts[2]], "second.scaled")
-    graph.linear(value, net.out, "offsets")
-    free = np.repeat(np.arange(count) >= 2, 3).astype(np.float32)
-    graph.node("Sub", ["offsets", "anchor"], "change")
-    graph.node(
-        "Mul", ["change", graph.constant("free", free)], "o" if output == "direction" else "displacement"
-    )
+        inputs |= {"middle": (hidden, hidden), "out": (hidden, width)}
+    else:
+        graph.constant("middle", _array(net.middle))
+        graph.constant("out", _array(net.out) * _free(net))
+    value = graph.node("Relu", [graph.node("Add", ["strand_part", "frame_part"], "sum")], "first")
+    bias = graph.constant("middle.bias", _weights(net.middle)[1])
+    value = graph.node("Relu", [graph.node("Gemm", [value, "middle", bias], "linear")], "second")
+    graph.node("Gemm", [value, "out", graph.constant("out.bias", _weights(net.out)[1] * _free(net))], "offsets")
+    graph.node("Sub", ["offsets", "anchor"], "change" if output == "direction" else "displacement")
     if output == "direction":
-        # Sums over x, y, z as a matrix product, so that all arrays stay (S, 72): three times as fast as sums over
-        # rows of three.
-        graph.constant("trio", np.kron(np.eye(count), np.ones((3, 3))).astype(np.float32))
-        graph.constant("tiny", np.float32(1e-18))
-        for name, source in (("l", "edges"), ("n", "v")):
-            if name == "n":
-                graph.node("Add", ["edges", graph.node("Mul", ["l", "o"], "lo")], "v")
-            graph.node("MatMul", [graph.node("Mul", [source, source], f"{name}2"), "trio"], f"{name}sum")
-            graph.node("Sqrt", [graph.node("Max", [f"{name}sum", "tiny"], f"{name}max")], name)
-        graph.node("Mul", ["v", graph.node("Div", ["l", "n"], "stretch")], "turned")
-        graph.node("Sub", ["turned", "edges"], "d")
-        # A running sum along the strand as one matrix product, which runtimes do faster than a scan.
-        running = np.kron(np.triu(np.ones((count, count))), np.eye(3)).astype(np.float32)
-        graph.node("MatMul", ["d", graph.constant("running", running)], "displacement")
-    inputs = {
-        "strand_part": ("S", hidden),
-        "frame_part": (1, len(parts) * hidden),
-        "anchor": ("S", width),
-        "edges": ("S", width),
-    }
+        _turned_edges(graph, width // 3)
     return graph.finish(inputs, {"offsets": ("S", width), "displacement": ("S", width)})
+
+
+def _turned_edges(graph: _Graph, count: int) -> None:
+    """`change`, `edges` (S, 3 count) -> `displacement`: edges keep their length where they turn.
+
+    Sums over x, y, z, their spreading, and the running sum along the strand are matrix products, so that all arrays stay
+    flat: runtimes do that three times as fast as sums over rows of three, and a scan.
+    """
+    sums, eye = np.kron(np.eye(count), np.ones((3, 1))), np.eye(3)
+    graph.constant("sums", sums.astype(np.float32))
+    graph.constant("spread", sums.T.astype(np.float32))
+    graph.constant("running", np.kron(np.triu(np.ones((count, count))), eye).astype(np.float32))
+    graph.constant("tiny", np.float32(1e-18))
+
+    def lengths(vectors: str) -> str:
+        squares = graph.node(
+            "MatMul", [graph.node("Mul", [vectors, vectors], f"{vectors}.squares"), "sums"], f"{vectors}.sum"
+        )
+        return graph.node("Sqrt", [graph.node("Max", [squares, "tiny"], f"{vectors}.some")], f"{vectors}.length")
+
+    long = graph.node("MatMul", [lengths("edges"), "spread"], "long")
+    graph.node("Add", ["edges", graph.node("Mul", [long, "change"], "bent")], "way")
+    stretch = graph.node("Div", ["edges.length", lengths("way")], "stretch")
+    turned = graph.node("Mul", ["way", graph.node("MatMul", [stretch, "spread"], "stretches")], "turned")
+    graph.node("MatMul", [graph.node("Sub", [turned, "edges"], "turn"), "running"], "displacement")
+
+
+def _free(net: StrandNet) -> np.ndarray:
+    """One for each output that may move: vertices 0 and 1 are clamped."""
+    return np.repeat(np.arange(net.out.out_features // 3) >= 2, 3).astype(np.float32)
+
+
+def _array(layer: nn.Linear) -> np.ndarray:
+    """(in, out) weight."""
+    return layer.weight.detach().T.float().cpu().numpy()

@@ -12,6 +12,10 @@ OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
 CODES = slice(2, 66)
 """Where the strand's and its lock's code lie among the strand inputs."""
+DEEP = 192
+"""Width of the deep map of the frame."""
+RANKS = (64, 32)
+"""Ranks of the matrices that a frame adds to the second layer's and to the output layer's."""
 
 
 class StrandNet(nn.Module):
@@ -27,8 +31,9 @@ class StrandNet(nn.Module):
         hidden: width of both hidden layers.
         outputs: 3 for each of the 24 vertices.
         motion: `"linear"`, as in the paper; `"encoder"`: a deeper map of the boundary vector is added to the linear
-            one; `"modulated"`: that map also scales the units of both hidden layers. It runs once per frame, so it
-            costs next to nothing per strand.
+            one; `"modulated"`: that map also scales the units of both hidden layers and adds matrices of low rank to
+            the weights behind them. It runs once per frame, and so do these changes of the weights: nothing is added
+            per strand.
     """
 
     def __init__(
@@ -53,14 +58,19 @@ class StrandNet(nn.Module):
         self.encoder = None
         if motion != "linear":
             self.encoder = nn.Sequential(
-                nn.Linear(frame_size, hidden),
+                nn.Linear(frame_size, DEEP),
                 nn.ReLU(),
-                nn.Linear(hidden, hidden),
+                nn.Linear(DEEP, DEEP),
                 nn.ReLU(),
-                nn.Linear(hidden, 3 * hidden if motion == "modulated" else hidden),
+                nn.Linear(DEEP, DEEP),
+                nn.ReLU(),
+                nn.Linear(DEEP, 3 * hidden + sum(RANKS) if motion == "modulated" else hidden),
             )
         self.middle = nn.Linear(hidden, hidden)
         self.out = nn.Linear(hidden, outputs)
+        if motion == "modulated":
+            self.middle_change = LowRank(hidden, RANKS[0], hidden)
+            self.out_change = LowRank(hidden, RANKS[1], outputs)
         with torch.no_grad():
             # Hair starts at rest: zero offsets are both the groom and a direction that exists.
             self.out.weight.mul_(0.1)
@@ -68,6 +78,8 @@ class StrandNet(nn.Module):
             if motion == "modulated":
                 self.encoder[-1].weight.mul_(0.1)
                 self.encoder[-1].bias.zero_()
+                self.middle_change.back.weight.mul_(0.3)
+                self.out_change.back.weight.mul_(0.1)
         for name, size in (("strand", strand_size), ("frame", frame_size)):
             self.register_buffer(f"{name}_mean", torch.zeros(size))
             self.register_buffer(f"{name}_scale", torch.ones(size))
@@ -115,8 +127,8 @@ class StrandNet(nn.Module):
         return self.strand((strands - self.strand_mean) * self.strand_scale)
 
     def frame_part(self, frames: Tensor) -> Tensor:
-        """First layer, body part and bias: (..., frame_size) -> (..., hidden), or (..., 3 hidden) with the factors of
-        both hidden layers behind it.
+        """First layer, body part and bias: (..., frame_size) -> (..., hidden), or (..., 3 hidden + sum(RANKS)) with the
+        factors of both hidden layers and of the matrices of low rank behind it.
         """
         normal = (frames - self.frame_mean) * self.frame_scale
         part = self.frame(normal)
@@ -128,12 +140,13 @@ class StrandNet(nn.Module):
 
     def tail(self, strand_part: Tensor, frame_part: Tensor) -> Tensor:
         """All that is left per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
-        added, *factors = frame_part.split(strand_part.shape[-1], dim=-1)
-        first = torch.relu(strand_part + added)
-        if not factors:
-            return self.out(torch.relu(self.middle(first)))
-        second = torch.relu(self.middle(first * factors[0]))
-        return self.out(second * factors[1])
+        hidden = strand_part.shape[-1]
+        if self.motion != "modulated":
+            return self.out(torch.relu(self.middle(torch.relu(strand_part + frame_part))))
+        added, one, two, middle, out = frame_part.split([hidden, hidden, hidden, *RANKS], dim=-1)
+        first = torch.relu(strand_part + added) * one
+        second = torch.relu(self.middle(first) + self.middle_change(first, middle)) * two
+        return self.out(second) + self.out_change(second, out)
 
     def forward(self, strands: Tensor, frames: Tensor) -> Tensor:
         """Offsets for every frame and strand.
@@ -148,6 +161,19 @@ class StrandNet(nn.Module):
         """
         out = self.tail(self.strand_part(strands), self.frame_part(frames)[:, None, :])
         return out.reshape(*out.shape[:-1], -1, 3)
+
+
+class LowRank(nn.Module):
+    """Adds a matrix of low rank whose terms a frame weighs: x -> back(weights * to(x))."""
+
+    def __init__(self, inputs: int, rank: int, outputs: int):
+        super().__init__()
+        self.to_terms = nn.Linear(inputs, rank, bias=False)
+        self.back = nn.Linear(rank, outputs, bias=False)
+
+    def forward(self, x: Tensor, weights: Tensor) -> Tensor:
+        """(..., inputs), (..., rank) -> (..., outputs)."""
+        return self.back(self.to_terms(x) * weights)
 
 
 def deform(

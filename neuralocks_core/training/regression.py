@@ -56,8 +56,8 @@ class RegressionOptions:
     strands: int = 8
     rate: float = 2e-3
     optimiser: str = "muon"
-    velocity: float = 8.0
-    swing: float = 0.15
+    velocity: float = 6.0
+    swing: float = 0.4
     collision: float = 30.0
     output: str = "direction"
     motion: str = "modulated"
