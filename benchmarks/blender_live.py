@@ -189,13 +189,6 @@ def _median(scene, frames: int) -> float:
 
 
 if __name__ == "__main__":
-    status = 1
-    try:
-        main()
-        status = 0
-    except Exception:
-        import traceback
+    from examples.blender_exit import run_and_leave
 
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(status)  # some builds of bpy hang at exit
+    run_and_leave(main)

@@ -7,7 +7,6 @@ Writes `clip.mp4` (or `clip.gif`, where imageio has no encoder) and the single f
 """
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
@@ -124,13 +123,6 @@ def clip(folder: Path, pictures: list[str]) -> Path:
 
 
 if __name__ == "__main__":
-    status = 1
-    try:
-        main()
-        status = 0
-    except Exception:
-        import traceback
+    from blender_exit import run_and_leave
 
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(status)  # some builds of bpy hang at exit
+    run_and_leave(main)

@@ -9,10 +9,8 @@ of Blender's files are the pose at the first frame; bind transforms are right, a
 
 import argparse
 import json
-import os
 import shutil
 import struct
-import sys
 import tempfile
 from pathlib import Path
 
@@ -34,8 +32,6 @@ def main() -> None:
         bpy.data.objects.remove(shape)  # the importer's own drawing of bones
     bpy.ops.wm.usd_export(filepath=str(options.out), export_armatures=True, only_deform_bones=False)
     print(" ".join(f"--chains {name}" for name in spring_bone_names(options.avatar)))
-    sys.stdout.flush()
-    os._exit(0)  # bpy may hang when Python ends
 
 
 def spring_bone_names(path: Path) -> list[str]:
@@ -54,4 +50,6 @@ def spring_bone_names(path: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    main()
+    from blender_exit import run_and_leave
+
+    run_and_leave(main)

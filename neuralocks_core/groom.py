@@ -114,7 +114,7 @@ class Groom:
         ends = np.cumsum(self.counts, dtype=np.int64)
         return ends - self.counts
 
-    @cached_property
+    @property
     def strand_of_point(self) -> np.ndarray:
         """(P,) int32, the strand that each point belongs to."""
         return np.repeat(np.arange(self.strand_count, dtype=np.int32), self.counts)

@@ -33,6 +33,7 @@ class GroomPlacer:
         strands: as the network sees it.
         carriers: one for every PART strands.
         ends: (S + 1,) first point of each strand, and the number of all.
+        same_size: whether every strand has as many points as the network gives it.
         centre: (3,) float32 [m], the head's own place in bind world.
     """
 
@@ -44,16 +45,24 @@ class GroomPlacer:
         slices = (slice(low, low + PART) for low in range(0, item.groom.strand_count, PART))
         self.carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
         self.ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
+        self.same_size = bool((item.groom.counts == self.strands.rest.shape[1]).all())
         self.centre = character.canonical_to_bind[:3, 3].astype(np.float32)
         low, high = item.groom.points.min(axis=0), item.groom.points.max(axis=0)
         self._corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
 
-    def at(self, time_code: float, joints: np.ndarray) -> "Placed":
-        """The groom at a time code, to be filled in; `joints` (J, 4, 4) are world joint transforms [m] there."""
+    def at(self, time_code: float, joints: np.ndarray, into: np.ndarray | None = None) -> "Placed":
+        """The groom at a time code, to be filled in.
+
+        Args:
+            time_code: when.
+            joints: (J, 4, 4) world joint transforms [m] there.
+            into: (P, 3) float32 that the points are put into; made if left out.
+        """
         item = self.item
         to_prim = np.linalg.inv(item.attachment.rig.border.to_core @ item.placement.at(time_code))
         to_local = to_prim @ item.attachment.character.carrying(joints)
-        return Placed(self, to_local, self._rest_in_place(to_local))
+        points = np.empty((len(item.groom.points), 3), np.float32) if into is None else into
+        return Placed(self, to_local, self._rest_in_place(to_local), points)
 
     def points(self, time_code: float, joints: np.ndarray, displacement: Callable[[slice], np.ndarray]) -> np.ndarray:
         """Points (P, 3) float32 in the prim's own space and units.
@@ -83,11 +92,11 @@ class Placed:
         points: (P, 3) float32 in the prim's own space and units.
     """
 
-    def __init__(self, placer: GroomPlacer, to_local: np.ndarray, rest: np.ndarray | None):
+    def __init__(self, placer: GroomPlacer, to_local: np.ndarray, rest: np.ndarray | None, points: np.ndarray):
         self._placer, self._rest = placer, rest
         self._linear = to_local[:3, :3].astype(np.float32)
         self._origin = (to_local[:3, :3] @ placer.centre.astype(float) + to_local[:3, 3]).astype(np.float32)
-        self.points = np.empty((len(placer.item.groom.points), 3), np.float32)
+        self.points = points
 
     def put(self, strands: slice, displacement: np.ndarray) -> None:
         """Place consecutive strands of one PART.

@@ -50,7 +50,8 @@ class GroomPoser:
             from neuralocks_core.resolve import Resolver
 
             self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
-        give_back()  # 60 MB of a large groom
+            self._resolver.clear  # noqa: B018  (made when first asked for)
+        give_back()  # 150 MB of a large groom
 
     @property
     def strands(self) -> StrandSet:
@@ -60,12 +61,14 @@ class GroomPoser:
     def points(self, time_code: float) -> np.ndarray:
         """The groom's points (P, 3) float32 at a time code, in the prim's own space and units."""
         joints = self._rig.joints_at(time_code)
-        placed = self._placer.at(time_code, joints)
         if self._resolver is None:
+            placed = self._placer.at(time_code, joints)
             self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
         moved = self.moved(time_code)
-        self._model.by_chunk(lambda strands: placed.put(strands, moved[strands]), len(moved))
+        # Each chunk's points take the place of its displacement where they are as many.
+        placed = self._placer.at(time_code, joints, moved.reshape(-1, 3) if self._placer.same_size else None)
+        self._model.by_chunk(lambda strands: placed.put(strands, moved[strands].copy()), len(moved))
         return placed.points
 
     def moved(self, time_code: float) -> np.ndarray:

@@ -1,20 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run one scenario inside a Blender: `python tests/blender/run.py SCENARIO WORK_FOLDER`, with `bpy` importable.
+"""Run one scenario inside a Blender: `python tests/blender/run.py SCENARIO WORK_FOLDER`, with `bpy` importable."""
 
-Leaves by `os._exit`: some builds of bpy hang or crash at exit when a handler or class is left, which a failing
-scenario does.
-"""
-
-import os
+import importlib
 import sys
-import traceback
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 
-def main() -> int:
-    """0 when the scenario holds."""
+def main() -> None:
+    """Raises when the scenario does not hold."""
     import bpy
 
     from tests.blender import scenarios, scenes
@@ -26,16 +21,10 @@ def main() -> int:
     dcc_addon.register()
     scenes.empty()
     print(f"{name} in Blender {bpy.app.version_string}")
-    getattr(scenarios, name)(folder)
-    return 0
+    getattr(importlib.import_module(scenarios.modules()[name]), name)(folder)
 
 
 if __name__ == "__main__":
-    status = 1
-    try:
-        status = main()
-    except BaseException:
-        traceback.print_exc()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)
+    from examples.blender_exit import run_and_leave
+
+    run_and_leave(main)

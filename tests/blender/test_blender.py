@@ -4,13 +4,14 @@
 The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a list, `4.5,5.0`) chooses others.
 """
 
-import ast
 import os
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+
+from . import scenarios
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -24,12 +25,6 @@ SLOW = {"trained_for_real": 900}
 def _wanted() -> list[str]:
     chosen = os.environ.get("NEURALOCKS_BLENDERS", "4.2,5.2")
     return [*VERSIONS, WINDOWED] if chosen == "all" else chosen.split(",")
-
-
-def _scenarios() -> list[str]:
-    """Names of the scenarios; their module needs bpy, so it is read, not imported."""
-    tree = ast.parse((HERE / "scenarios.py").read_text())
-    return [n.name for n in tree.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_")]
 
 
 def _command(version: str) -> list[str]:
@@ -65,7 +60,7 @@ def random_model(tmp_path_factory):
     return model.write(path, meta, strand_graphs(encoder, net, "direction"))
 
 
-@pytest.mark.parametrize("scenario", _scenarios())
+@pytest.mark.parametrize("scenario", scenarios.modules())
 @pytest.mark.parametrize("version", _wanted())
 def test_scenario(version, scenario, random_model, tmp_path):
     """Runs one scenario; its output is shown when it fails."""

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the scenarios share: hair made live, and its points as they are shown and as they are baked."""
+
+import os
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+
+MODEL = os.environ.get("NEURALOCKS_TEST_MODEL", "")
+SAME = 1e-5
+"""Points that are nearer to each other are the same [m]."""
+
+
+def make_live(rig, strands, **look):
+    """Make the hair live on a sampled rig."""
+    scene = bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    strands.neuralocks_hair.armature = rig
+    strands.neuralocks_hair.model = MODEL
+    for name, value in look.items():
+        setattr(strands.neuralocks_hair, name, value)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    strands.neuralocks_hair.live = True
+
+
+def messages():
+    """What the panel says is wrong, by object name."""
+    from dcc_addon.session import session
+
+    return session.messages
+
+
+def points_at(strands, frame, subframe=0.0):
+    """Points (P, 3) of a hair object at a frame, as it is drawn."""
+    bpy.context.scene.frame_set(frame, subframe=subframe)
+    return scenes.points(strands)
+
+
+def baked_points(path, prim, frame):
+    """Points (P, 3) of a groom at a frame, in the world of a baked stage."""
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
+    points = np.array(curves.GetPointsAttr().Get(frame), float)
+    matrix = np.array(UsdGeom.XformCache(frame).GetLocalToWorldTransform(curves.GetPrim())).T
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def apart(a, b):
+    """Largest difference of two arrays of one shape."""
+    assert a.shape == b.shape
+    return float(np.abs(a - b).max())
+
+
+def own_handlers():
+    """Handlers of the add-on on any of Blender's lists."""
+    lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers))
+    return [
+        f for calls in lists if isinstance(calls, list) for f in calls if "dcc_addon" in getattr(f, "__module__", "")
+    ]

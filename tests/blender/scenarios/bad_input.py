@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What cannot work is refused in plain words."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at
+
+
+def bad_input(folder: Path) -> None:
+    """Each in plain words, no traceback, nothing lost."""
+    operators, scene = bpy.ops.neuralocks, bpy.context.scene
+
+    def refused(call, *words):
+        try:
+            result = call()
+        except RuntimeError as error:
+            text = str(error)
+            assert "unexpected" not in text, text
+            assert all(word in text for word in words), text
+        else:
+            raise AssertionError(f"not refused: {result}")
+
+    refused(operators.find, "no armature")
+    refused(operators.sample_motion, "no armature")
+    refused(operators.bake, "no armature")
+    refused(operators.from_particles, "particle system")
+    headless = scenes.armature("Snake", (("a", "", (0, 0, 0), (0, 0, 1)), ("b", "a", (0, 0, 1), (0, 0, 2))))
+    scene.neuralocks.armature = headless
+    refused(operators.sample_motion, "Snake", "head")
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    own = strands.neuralocks_hair
+    own.model = MODEL
+    refused(lambda: operators.bake(filepath="//x.usdc"), "not saved")
+    refused(lambda: operators.bake(filepath="/proc/nowhere/x.usdc"), "/proc/nowhere")
+
+    assert operators.sample_motion() == {"FINISHED"}
+    groomed = scenes.points(strands)
+    (folder / "torn.neuralocks").write_bytes(Path(MODEL).read_bytes()[:5000])
+    for path, word in (
+        ("/nowhere.neuralocks", "no such"),
+        (str(folder / "torn.neuralocks"), "damaged"),
+        ("//m.neuralocks", "not saved"),
+    ):
+        own.model = path
+        own.live = True
+        scene.frame_set(7)
+        assert word in messages()["Hair"], messages()
+        assert apart(scenes.points(strands), scenes.points(strands)) == 0.0
+        own.live = False
+    scene.frame_set(1)
+    assert apart(scenes.points(strands), groomed) < 1e-6
+    own.model = MODEL
+
+    for name, counts in (("Empty", []), ("Dots", [1, 1, 1])):
+        bad = bpy.data.objects.new(name, bpy.data.hair_curves.new(name))
+        if counts and hasattr(bad.data, "add_curves"):
+            bad.data.add_curves(counts)
+        scene.collection.objects.link(bad)
+        bad.neuralocks_hair.armature, bad.neuralocks_hair.model = rig, MODEL
+        operators.sample_motion()
+        bad.neuralocks_hair.live = True
+        scene.frame_set(5)
+        assert name in messages(), name
+        bad.neuralocks_hair.live = False
+        bpy.data.objects.remove(bad)
+
+    operators.sample_motion()
+    own.live = True
+    rig.scale = (-1, 1, 1)
+    refused(operators.sample_motion, "mirrored")
+    rig.scale = (1, 1, 1)
+    scene.frame_start = scene.frame_end = 4
+    assert operators.sample_motion() == {"FINISHED"}
+    assert operators.bake(filepath=str(folder / "one.usdc")) == {"FINISHED"}
+    scene.frame_set(4)
+    assert apart(baked_points(folder / "one.usdc", "/Character/Hair_Hair", 4), scenes.points(strands)) < SAME
+    away = bpy.data.collections.new("Away")
+    scene.collection.children.link(away)
+    away.objects.link(rig)
+    scene.collection.objects.unlink(rig)
+    bpy.context.view_layer.layer_collection.children["Away"].exclude = True
+    assert operators.sample_motion() == {"FINISHED"}, "what is excluded is still evaluated, as the hair depends on it"
+    scene.frame_set(4)
+    assert not messages(), messages()
+
+
+def bad_hair(folder: Path) -> None:
+    """Hair and models that cannot be live say why, and what is deleted or hidden meanwhile takes nothing along."""
+    import zipfile
+
+    from dcc_addon.scene.sampling import sample
+    from neuralocks_core.errors import NeuralocksError
+
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    strands, other = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Other")
+    scene = bpy.context.scene
+
+    later = folder / "later.neuralocks"
+    with zipfile.ZipFile(MODEL) as old, zipfile.ZipFile(later, "w") as new:
+        for item in old.infolist():
+            data = old.read(item)
+            new.writestr(item, data.replace(b'"format": 1', b'"format": 99') if item.filename == "model.json" else data)
+    make_live(rig, strands)
+    groomed = np.array([p.position for p in other.data.points])
+    points_at(strands, 7)
+    strands.neuralocks_hair.model = str(later)
+    assert "99" in messages()["Hair"], messages()
+    strands.neuralocks_hair.model = MODEL
+    assert not messages(), messages()
+
+    first = other.data.points[0].position.copy()
+    other.data.points[0].position = (float("nan"), 0, 0)
+    other.neuralocks_hair.model = MODEL
+    other.neuralocks_hair.live = True
+    assert "finite" in messages()["Other"], messages()
+    other.data.points[0].position = first
+    other.neuralocks_hair.live = False
+    assert apart(np.array([p.position for p in other.data.points]), groomed) == 0.0
+
+    # Hair in an excluded collection while the motion is sampled, and shown afterwards.
+    away = bpy.data.collections.new("Away")
+    scene.collection.children.link(away)
+    away.objects.link(other)
+    scene.collection.objects.unlink(other)
+    layer = bpy.context.view_layer.layer_collection.children["Away"]
+    other.location, other.rotation_euler, other.scale = (0.1, 0.2, 0.0), (0.1, 0.2, 0.4), (1.5, 0.7, -1.0)
+    bpy.context.view_layer.update()
+    layer.exclude = True
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    scene.frame_set(17)
+    layer.exclude = False
+    other.neuralocks_hair.live = True
+    shown = points_at(other, 9)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert apart(points_at(other, 9), shown) < SAME
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "away.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "away.usdc", "/Character/Hair_Other", 9), shown) < SAME
+
+    steps = sample(bpy.context, rig)
+    next(steps)
+    bpy.data.objects.remove(skin)
+    try:
+        list(steps)
+    except NeuralocksError as error:
+        assert "deleted" in str(error), error
+    else:
+        raise AssertionError("the body was deleted half way")
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    points_at(strands, 3)
+    bpy.data.objects.remove(other)
+    points_at(strands, 4)
+    assert not messages(), messages()
+    rig.name, strands.name = "Renamed", "Locks"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    points_at(strands, 5)
+    assert not messages(), messages()

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair bones."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, messages
+
+
+def bones(folder: Path) -> None:
+    """Hair bones: live equals baked keys; keys on exactly these bones, in an action of their own that can be muted."""
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    before = {c.data_path: len(c.keyframe_points) for c in scenes.fcurves(rig)}
+    scene = bpy.context.scene
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+    def turns(frame):
+        scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        pose = rig.evaluated_get(graph).pose
+        return np.array([np.array(bone.matrix) for bone in pose.bones])
+
+    still = {f: turns(f) for f in (3, 11, 24)}
+    rig.neuralocks_character.rig_live = True
+    live = {f: turns(f) for f in (24, 3, 11)}
+    assert not messages(), messages()
+    hair = [i for i, b in enumerate(rig.pose.bones) if b.name.startswith("hair")]
+    others = [i for i in range(len(rig.pose.bones)) if i not in hair]
+    for f in still:
+        assert apart(live[f][others], still[f][others]) < 1e-6
+        assert apart(live[f][hair], still[f][hair]) > 1e-3
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    for f in still:
+        assert apart(turns(f), live[f]) < SAME
+    assert {c.data_path: len(c.keyframe_points) for c in scenes.fcurves(rig)} == before, "other keys were touched"
+    track = rig.animation_data.nla_tracks["Neuralocks Hair"]
+    keyed = {c.data_path.split('"')[1] for c in scenes.fcurves_of(track.strips[0].action)}
+    assert keyed == {"hair.01", "hair.02"}, keyed
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+    assert bpy.ops.neuralocks.export_skel(filepath=str(folder / "skel.usdc")) == {"FINISHED"}
+    from usd.stage import read_rigs
+
+    written = read_rigs(folder / "skel.usdc")[0]
+    leaves = [name.split("/")[-1] for name in written.character.skeleton.names]
+    order = [leaves.index(bone.name.replace(".", "_")) for bone in rig.pose.bones]
+    z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for f in live:
+        scene.frame_set(f)
+        joints = written.joints_at(f)[order]
+        place = np.array(rig.matrix_world)
+        world = place @ live[f]
+        assert apart(z_up @ joints[:, :3, :3], world[:, :3, :3]) < SAME
+        assert apart(joints[:, :3, 3] @ z_up.T, world[:, :3, 3]) < SAME
+    assert bpy.ops.neuralocks.export_c(filepath=str(folder / "hair.h")) == {"FINISHED"}
+    assert "hair_02" in (folder / "hair.h").read_text()
+    for f in still:
+        assert apart(turns(f)[others], still[f][others]) < 1e-6

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Undo, and data of other files."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at
+
+
+def undo(folder: Path) -> None:
+    """Undo and redo after Live, a slider, a bake with its cache and keyframes: the scene is whole, the view right."""
+    if bpy.app.version < (4, 0):
+        return  # without a window, older ones keep no undo steps
+    push, back, again = bpy.ops.ed.undo_push, bpy.ops.ed.undo, bpy.ops.ed.redo
+
+    def own():
+        return bpy.data.objects["Hair"]
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    scene = bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    strands.neuralocks_hair.model = MODEL
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    scene.frame_set(9)
+    push(message="groomed")
+    groomed = scenes.points(own())
+    own().neuralocks_hair.live = True
+    push(message="live")
+    live = scenes.points(own())
+    own().neuralocks_hair.motion = 0.2
+    push(message="slider")
+    slow = scenes.points(own())
+    assert apart(live, groomed) > 0.01 and apart(slow, live) > 0.001
+
+    back()
+    assert own().neuralocks_hair.motion == 1.0 and apart(scenes.points(own()), live) == 0.0
+    back()
+    assert not own().neuralocks_hair.live and "neuralocks_rest" not in own().data.attributes
+    assert apart(scenes.points(own()), groomed) == 0.0
+    again()
+    assert apart(scenes.points(own()), live) == 0.0
+    again()
+    assert apart(scenes.points(own()), slow) == 0.0
+    again_at = bpy.context.scene
+    again_at.frame_set(14)
+    after = scenes.points(own())
+
+    if getattr(bpy.app.build_options, "usd", True):
+        push(message="before the bake")
+        assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+        push(message="attached")
+        assert "Neuralocks Cache" in own().modifiers and not own().neuralocks_hair.live
+        back()
+        assert "Neuralocks Cache" not in own().modifiers and own().neuralocks_hair.live
+        bpy.context.scene.frame_set(14)
+        assert apart(scenes.points(own()), after) == 0.0
+    own().neuralocks_hair.live = False
+    own_points = np.array([p.position for p in own().data.points])
+    own().neuralocks_hair.live = True
+    own().neuralocks_hair.live = False
+    assert apart(np.array([p.position for p in own().data.points]), own_points) == 0.0
+    assert not messages(), messages()
+
+
+def linked(folder: Path) -> None:
+    """A linked character: clear words; an override plays its bake; local curves are live; nothing is lost."""
+    if not hasattr(bpy.types.ID, "override_hierarchy_create") or bpy.app.version < (4, 0):
+        return
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 20)
+    scene = bpy.context.scene
+    character = bpy.data.collections.new("Character")
+    scene.collection.children.link(character)
+    for thing in list(scene.collection.objects):
+        character.objects.link(thing)
+        scene.collection.objects.unlink(thing)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    scenes.empty()
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    scene = bpy.context.scene
+    scene.collection.children.link(bpy.data.collections["Character"])
+    rig, strands = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    groomed = scenes.points(strands)
+    make_live(rig, strands)
+    points_at(strands, 9)
+    message = next(text for name, text in messages().items() if "Hair" in name)
+    assert "linked" in message and "Make Local" in message, messages()
+    strands.neuralocks_hair.live = False
+    for refused in (bpy.ops.neuralocks.bake_attach, bpy.ops.neuralocks.assign):
+        try:
+            refused()
+        except RuntimeError as error:
+            assert "linked from library.blend" in str(error), error
+        else:
+            raise AssertionError("what is done to linked data is not saved")
+    assert not strands.modifiers
+    assert apart(points_at(strands, 1), groomed) < 1e-6
+
+    bpy.data.collections["Character"].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    rig, strands = (
+        next(o for o in bpy.data.objects if o.type == kind and not o.library) for kind in ("ARMATURE", "CURVES")
+    )
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    strands.neuralocks_hair.armature, strands.neuralocks_hair.model = rig, MODEL
+    assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+    played = points_at(strands, 9)
+    assert apart(played, scenes.points(bpy.data.objects["Hair", str(bpy.data.libraries[0].filepath)])) > 0.01
+    assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+    strands.make_local()
+    strands.data.make_local()
+    make_live(rig, strands)
+    assert apart(points_at(strands, 9), played) < SAME
+    assert not messages(), messages()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    strands = next(o for o in bpy.data.objects if o.type == "CURVES" and not o.library)
+    assert strands.neuralocks_hair.live and "neuralocks_rest" not in strands.data.attributes

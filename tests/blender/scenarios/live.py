@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The live view: posed by hand, rendered, saved, two characters at a time."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at
+
+
+def rest_is_safe(folder: Path) -> None:
+    """Live off, the add-on off, or a file opened without it: the hair is as it was groomed."""
+    import dcc_addon
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 50)
+    groomed = np.array([p.position for p in strands.data.points])
+    make_live(rig, strands)
+    moved = points_at(strands, 14)
+
+    def own():
+        return np.array([p.position for p in bpy.data.objects["Hair"].data.points])
+
+    assert apart(own(), groomed) > 1e-3
+
+    file = folder / "live.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    assert apart(scenes.points(strands), moved) < 1e-6, "saving must not disturb the view"
+    dcc_addon.unregister()
+    assert apart(own(), groomed) == 0.0
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    assert apart(own(), groomed) == 0.0
+    assert "neuralocks_rest" not in bpy.data.objects["Hair"].data.attributes
+
+    dcc_addon.register()
+    strands, rig = bpy.data.objects["Hair"], bpy.data.objects["Rig"]
+    assert strands.neuralocks_hair.live
+    bpy.context.scene.neuralocks.armature = rig
+    bpy.ops.neuralocks.sample_motion()
+    assert apart(points_at(strands, 14), moved) < 1e-6
+    strands.neuralocks_hair.live = False
+    assert apart(own(), groomed) == 0.0
+
+
+def posing(folder: Path) -> None:
+    """The hair follows a pose made by hand without a frame change; edited animation is noticed and sampled again."""
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 50)
+    make_live(rig, strands)
+    before = points_at(strands, 9)
+    rig.pose.bones["head"].rotation_euler[1] += 0.5
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
+    posed = scenes.points(strands)
+    assert apart(posed, before) > 0.02
+    assert apart(points_at(strands, 9), before) < 1e-6, (
+        "the pose was not keyed, so the frame brings the animated one back"
+    )
+    assert not session.rigs["Rig"].stale
+
+    rig.pose.bones["head"].rotation_euler[1] += 0.5
+    rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
+    points_at(strands, 8)
+    assert session.rigs["Rig"].stale
+    bpy.ops.neuralocks.sample_motion()
+    assert not session.rigs["Rig"].stale
+    after = points_at(strands, 9)
+    assert apart(after, before) > 0.02
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "b.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "b.usdc", "/Character/Hair_Hair", 9), after) < SAME
+
+
+def rendering(folder: Path) -> None:
+    """A final render sees the hair of the viewport, frame by frame, and samples what is out of date."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 30)
+    make_live(rig, strands)
+    shown = {f: points_at(strands, f) for f in (3, 4, 5)}
+    scene = bpy.context.scene
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "CYCLES", 16, 16
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.frame_start, scene.frame_end = 3, 5
+    scene.render.filepath = str(folder / "r_")
+    rendered = {}
+
+    def look(current, graph):
+        if graph.mode == "RENDER":
+            values = np.empty((len(strands.data.points), 3), np.float32)
+            strands.data.attributes["position"].data.foreach_get("vector", values.ravel())
+            matrix = np.array(strands.evaluated_get(graph).matrix_world)
+            rendered[current.frame_current] = values @ matrix[:3, :3].T + matrix[:3, 3]
+
+    bpy.app.handlers.frame_change_post.append(look)  # called after the add-on's own
+    scene.frame_set(20)
+    bpy.ops.render.render(animation=True)
+    bpy.app.handlers.frame_change_post.remove(look)
+    assert sorted(rendered) == [3, 4, 5]
+    for f, points in rendered.items():
+        assert apart(points_at(strands, f), points) < SAME
+    # The range was shortened before the render, so it had to sample anew: the run-up of frames 1 and 2 is gone.
+    assert max(apart(rendered[f], shown[f]) for f in shown) > SAME
+    rig.pose.bones["head"].rotation_euler[0] += 0.4
+    rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=4)
+    scene.frame_set(4)
+    bpy.ops.render.render()
+    after = scenes.points(strands)
+    bpy.ops.neuralocks.sample_motion()
+    assert apart(points_at(strands, 4), after) < SAME, "the render used a motion that was out of date"
+
+
+def two_characters(_folder: Path) -> None:
+    """Both live, each with its own hair; deleting one leaves the other alive and the hair at rest."""
+    first, second = scenes.armature("Anna"), scenes.armature("Ben")
+    scenes.dance(first)
+    scenes.dance(second)
+    for curve in scenes.fcurves(second):
+        for key in curve.keyframe_points:
+            key.co[1] *= -0.7
+    one, two = scenes.hair(first, 20, name="One"), scenes.hair(second, 30, name="Two")
+    groomed = np.array([p.position for p in two.data.points])
+    make_live(first, one)
+    make_live(second, two)
+    a, b = points_at(one, 12), points_at(two, 12)
+    assert len(a) != len(b)
+    bpy.data.objects.remove(second)
+    bpy.context.view_layer.update()
+    assert apart(points_at(one, 12), a) < 1e-6
+    points_at(one, 13)
+    assert "Two" in messages() and "armature" in messages()["Two"]
+    assert apart(np.array([p.position for p in two.data.points]), groomed) == 0.0

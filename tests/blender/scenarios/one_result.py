@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is shown live is what every way to a bake gives."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at
+
+
+def one_result(folder: Path) -> None:
+    """Live view, operator and Python call give the same points, with IK, constraints, drivers and moved objects in
+    the rig.
+    """
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    scenes.constrain(rig)
+    strands = scenes.hair(rig, 80)
+    strands.scale = (1.2, 1.0, 0.8)  # unapplied
+    make_live(rig, strands, bend=2.0, weight=1.3, motion=0.8)
+    scene = bpy.context.scene
+    rng = np.random.default_rng(0)
+    frames = [int(f) for f in rng.permutation(np.arange(1, 25))]
+    shown = {f: points_at(strands, f) for f in frames}
+    for f in frames[::-1]:
+        assert apart(points_at(strands, f), shown[f]) == 0.0, "scrubbing back changes the hair"
+    assert apart(shown[1], shown[12]) > 0.01
+    assert not messages(), messages()
+
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "bake.usdc")) == {"FINISHED"}
+    for f in frames:
+        assert apart(baked_points(folder / "bake.usdc", "/Character/Hair_Hair", f), shown[f]) < SAME
+
+    from usd.bake import bake
+
+    words = ["bend=2x", "weight=1.3x", "damping=1x", "clumping=1x"]
+    bake(folder / "bake_shot.usdc", folder / "again.usdc", MODEL, material=words, strength=0.8)
+    for f in frames[:6]:
+        a, b = (baked_points(folder / name, "/Character/Hair_Hair", f) for name in ("bake.usdc", "again.usdc"))
+        assert apart(a, b) < SAME, (f, apart(a, b))
+    assert scene.frame_current == frames[0]
+    assert skin.name in bpy.data.objects
+
+
+def out_of_the_body(folder: Path) -> None:
+    """Keep out of Body and a looped range: live equals the bake, and each makes a difference."""
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 60, length=0.4)
+    make_live(rig, strands, resolve=False)
+    free = {f: points_at(strands, f) for f in (2, 13, 24)}
+    strands.neuralocks_hair.resolve = True
+    shown = {f: points_at(strands, f) for f in (13, 2, 24)}
+    assert not messages(), messages()
+    assert max(apart(free[f], shown[f]) for f in free) > 1e-4, "no hair was in the body"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", f), points) < SAME
+
+    strands.neuralocks_hair.resolve = False
+    assert apart(points_at(strands, 2), free[2]) == 0.0
+    rig.neuralocks_character.loop = True
+    shown = {f: points_at(strands, f) for f in (2, 13, 24)}
+    assert apart(free[2], shown[2]) > 1e-4, "the second frame must remember the end of the range"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "loop.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert apart(baked_points(folder / "loop.usdc", "/Character/Hair_Hair", f), points) < SAME
+    rig.neuralocks_character.loop = False
+    assert apart(points_at(strands, 2), free[2]) == 0.0
+
+
+def blender_export(folder: Path) -> None:
+    """A bake of the scene as Blender itself exports it equals the live view."""
+    if not hasattr(bpy.ops.wm, "usd_export") or not getattr(bpy.app.build_options, "usd", False):
+        print("no USD in this Blender")
+        return
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    make_live(rig, strands)
+    shown = {f: points_at(strands, f) for f in (2, 13, 24)}
+    strands.neuralocks_hair.live = False
+    bpy.context.scene.frame_set(1)
+    shot = folder / "scene.usdc"
+    bpy.ops.wm.usd_export(filepath=str(shot), export_animation=True, export_armatures=True, export_materials=False)
+    from pxr import Usd, UsdGeom
+
+    from usd.bake import bake
+
+    bake(shot, folder / "baked.usdc", MODEL)
+    stage = Usd.Stage.Open(str(folder / "baked.usdc"))
+    prim = next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves))
+    for f, points in shown.items():
+        gap = apart(baked_points(folder / "baked.usdc", str(prim.GetPath()), f), points)
+        print(f, gap)
+        assert gap < SAME
+
+
+def attached(folder: Path) -> None:
+    """Bake and Attach: the cache on the hair object shows what was live, without the add-on."""
+    import dcc_addon
+
+    if not getattr(bpy.app.build_options, "usd", False):
+        scenes_only = bpy.ops.neuralocks
+        assert scenes_only
+        return
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    make_live(rig, strands)
+    shown = {f: points_at(strands, f) for f in (1, 8, 17, 24)}
+    assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert apart(points_at(strands, f), points) < SAME
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "farm.blend"))
+    dcc_addon.unregister()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "farm.blend"))
+    for f, points in shown.items():
+        assert apart(points_at(bpy.data.objects["Hair"], f), points) < SAME

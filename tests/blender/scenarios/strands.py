@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where strands come from and what they hang on."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, baked_points, messages
+
+
+def particles(_folder: Path) -> None:
+    """Particle hair becomes Curves with all its keys, on the head."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
+    ball = bpy.context.active_object
+    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = ball.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length, settings.hair_step = "HAIR", 40, 0.2, 7
+    bpy.context.view_layer.update()
+    assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+    strands = bpy.context.scene.neuralocks.hair
+    assert len(strands.data.curves) == 40 and len(strands.data.points) == 40 * 8
+    points = scenes.points(strands).reshape(40, 8, 3)
+    away = np.linalg.norm(points - [0, 0, 1.6], axis=2)
+    assert np.abs(away[:, 0] - 0.1).max() < 2e-3 and (away[:, -1] > 0.25).all()
+
+
+def ways_of_parenting(folder: Path) -> None:
+    """Hair parented to the armature, to its head bone, or grown on a deformed surface moves in the same way."""
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    scene = bpy.context.scene
+    by_object = scenes.hair(rig, 30, name="ByObject")
+    by_bone = scenes.hair(rig, 30, name="ByBone")
+    rest = rig.data.bones["head"]
+    by_bone.parent_type, by_bone.parent_bone = "BONE", "head"
+    # Bone parents count from the bone's tail.
+    tail = rest.matrix_local @ scenes.translation((0, rest.length, 0))
+    by_bone.matrix_parent_inverse = tail.inverted()
+    on_surface = scenes.hair(rig, 30, name="OnSurface")
+    on_surface.parent = skin
+    on_surface.data.surface = skin
+    deform = scenes.surface_deform(on_surface)
+    scene.neuralocks.armature = rig
+    for hair in (by_object, by_bone, on_surface):
+        hair.neuralocks_hair.model = MODEL
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for hair in (by_object, by_bone, on_surface):
+        hair.neuralocks_hair.live = True
+    assert not deform.show_viewport and not deform.show_render
+    for frame in (1, 9, 22):
+        scene.frame_set(frame)
+        assert not messages(), messages()
+        points = {h.name: scenes.points(h) for h in (by_object, by_bone, on_surface)}
+        assert apart(points["ByBone"], points["ByObject"]) < SAME
+        assert apart(points["OnSurface"], points["ByObject"]) < SAME
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "three.usdc")) == {"FINISHED"}
+    for name, shown in points.items():
+        assert apart(baked_points(folder / "three.usdc", f"/Character/Hair_{name}", 22), shown) < SAME
+    on_surface.neuralocks_hair.live = False
+    assert deform.show_viewport and deform.show_render

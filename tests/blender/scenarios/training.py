@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Training from the panel."""
+
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, messages
+
+
+def training(folder: Path) -> None:
+    """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused."""
+    import shutil
+    import sys
+    import time
+
+    from dcc_addon.operators import training as operator
+    from dcc_addon.services import training_job
+
+    child = folder / "child.py"
+    child.write_text(
+        "import json, shutil, sys, time\n"
+        "if '--check' not in sys.argv:\n"
+        "    settings = json.load(sys.stdin)\n"
+        "    assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
+        "    print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
+        "    time.sleep(1)\n"
+        f"    shutil.copy({MODEL!r}, settings['out'])\n"
+    )
+    training_job.CHILD = child
+    operator.training_python = lambda: shutil.which("python3") or sys.executable
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    try:
+        bpy.ops.neuralocks.train()
+    except RuntimeError as error:
+        assert "one is running already" in str(error)
+    else:
+        raise AssertionError("two trainings at a time")
+    end = time.monotonic() + 60
+    while operator.finish() is None and time.monotonic() < end:
+        time.sleep(0.1)
+    assert "trained" in messages()["training"], messages()
+    assert Path(strands.neuralocks_hair.model).parent == folder
+    strands.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(9)
+    assert "Hair" not in messages(), messages()
+
+
+def trained_for_real(folder: Path) -> None:
+    """Train from the panel's own operator in a real second Python, with progress, cancel, and a model at the end."""
+    import time
+
+    from dcc_addon.operators import training as operator
+    from dcc_addon.services.training_job import problem
+
+    trouble = problem(operator.training_python())
+    if trouble:
+        print(trouble)
+        return
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    scene = bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    scene.neuralocks.train_minutes = 0.05
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+
+    def wait(until, seconds):
+        end = time.monotonic() + seconds
+        while not until():
+            assert time.monotonic() < end, operator.job() and (operator.job().message, operator.job().failure())
+            time.sleep(0.2)
+
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    running = operator.job()
+    wait(lambda: running.message not in ("Starting",), 120)
+    assert bpy.ops.neuralocks.cancel_training() == {"FINISHED"}
+    assert operator.job() is None and not running.running and not running.succeeded
+    assert not list(folder.glob("*.neuralocks")), "a cancelled training leaves no model"
+
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    running, said, shares = operator.job(), set(), []
+
+    def follow():
+        said.add(running.message)
+        shares.append(running.done)
+        return operator.finish() is not None
+
+    wait(follow, 400)
+    print(sorted(said))
+    assert "trained" in messages()["training"], messages()
+    assert len(said) > 3 and shares == sorted(shares)
+    assert Path(strands.neuralocks_hair.model).parent == folder and Path(strands.neuralocks_hair.model).exists()
+    strands.neuralocks_hair.live = True
+    scene.frame_set(9)
+    assert "Hair" not in messages(), messages()
+    assert "neuralocks_rest" in strands.data.attributes
