@@ -50,7 +50,8 @@ class GroomPoser:
             from neuralocks_core.resolve import Resolver
 
             self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
-            self._resolver.clear  # noqa: B018  (made when first asked for)
+            if self._resolver.body is not None:  # the hair may be out of its reach
+                self._resolver.clear  # noqa: B018  (made when first asked for)
         give_back()  # 150 MB of a large groom
 
     @property
