@@ -143,7 +143,8 @@ class _Block:
         first, weights, fine = spans.weights(rest, own, strand, place)
         self._fine = fine & valid
         if not self._fine.all():
-            self._first, self._weights = first + (strand * vertices).astype(np.int32), weights
+            # Numbers within a block are small: two bytes for each of the groom's points instead of four.
+            self._first, self._weights = (first + strand * vertices).astype(np.uint16), weights
         self._own = np.flatnonzero(self._fine[strand]).astype(np.int32)
         own, strand, place = own[self._own], strand[self._own], place[self._own]
         segment = np.clip(place.astype(np.int32), 0, vertices - 2)
@@ -167,7 +168,7 @@ class _Block:
             return self._turned(displacement, self._rest[start : start + len(fine)], start, coils)
         first, weights = self._first[own], self._weights[own]
         if start:
-            first = first - np.int32(start * vertices)
+            first = first - np.uint16(start * vertices)
         flat = displacement.reshape(-1, 3)
         moved = flat.take(first, axis=0)
         moved *= weights[:, :1]

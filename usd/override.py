@@ -2,6 +2,7 @@
 """The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -57,28 +58,32 @@ class OverrideWriter:
         if velocities:
             Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
 
-    def sample(self, item: StageGroom, time_code: float, name: str, held: list[np.ndarray]) -> None:
+    def sample(self, item: StageGroom, time_code: float, name: str, blocks: Iterable[np.ndarray]) -> None:
         """Add one time sample of `points` (and of the extent with it) or `velocities`.
 
         Args:
             item: the groom.
             time_code: when.
             name: "points" or "velocities".
-            held: one array (P, 3) float32; taken out of the list.
+            blocks: consecutive parts (n, 3) float32 of all P values: a large groom's are never all there twice.
         """
+        array, first, corners = Vt.Vec3fArray(len(item.groom.points)), 0, []
+        for block in blocks:
+            # Flat arrays convert a fifth faster than rows of three.
+            array[first : first + len(block)] = Vt.Vec3fArray.FromNumpy(block.reshape(-1))
+            first += len(block)
+            if name == "points":
+                corners += _corners(block)
         with _named(self._out):
             if name == "points":
                 pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
-                low, high = _corners(held[0])
-                extent = np.stack([low - pad, high + pad])
-                self._set(item, time_code, "extent", [extent])
-            self._set(item, time_code, name, held)
+                low, high = _corners(np.array(corners))
+                self._set(item, time_code, "extent", Vt.Vec3fArray.FromNumpy(np.stack([low - pad, high + pad])))
+            self._set(item, time_code, name, array)
             if self._held >= SAVE_EVERY:
                 self._save()
 
-    def _set(self, item: StageGroom, time_code: float, name: str, held: list[np.ndarray]) -> None:
-        # Flat arrays convert a fifth faster than rows of three.
-        array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(held.pop()).reshape(-1))
+    def _set(self, item: StageGroom, time_code: float, name: str, array: Vt.Vec3fArray) -> None:
         self._layer.SetTimeSample(item.prim.GetPath().AppendProperty(name), float(time_code), array)
         self._held += 12 * len(array)
 

@@ -8,7 +8,7 @@ the file.
 import math
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -23,7 +23,8 @@ from .stage import Shot, StageGroom
 from .stencils import Stencils
 
 BLOCK = 1 << 16
-"""Points of which velocities are measured at a time."""
+"""Points that are read back and written at a time."""
+
 
 class Poser(Protocol):
     """What gives a groom's points."""
@@ -125,27 +126,31 @@ class _Store:
     def frame(self, code: float, held: list[np.ndarray]) -> None:
         """The points (P, 3) of the next time code in the list; an empty list if they are in the spool already."""
         if held:
-            self._spool.write(self._number, code, held[0])
-        elif code in self._plan.wanted:
-            held.append(self._spool.read(self._number, code, slice(None)))
+            self._spool.write(self._number, code, held.pop())
         if code in self._plan.wanted:
-            self._writer.sample(self._item, code, "points", held)
-        held.clear()
+            self._writer.sample(self._item, code, "points", self._points(code))
         while self._due and self._plan.last(self._due[0]) <= code:
             due = self._due.pop(0)
-            self._writer.sample(self._item, due, "velocities", [self._velocity(due)])
+            self._writer.sample(self._item, due, "velocities", self._velocities(due))
 
-    def _velocity(self, code: float) -> np.ndarray:
-        """(P, 3) float32, in units of the prim per second."""
-        result = np.zeros((len(self._item.groom.points), 3), np.float32)
+    def _rows(self) -> Iterator[slice]:
+        count = len(self._item.groom.points)
+        return (slice(low, min(low + BLOCK, count)) for low in range(0, count, BLOCK))
+
+    def _points(self, code: float) -> Iterator[np.ndarray]:
+        """Blocks (n, 3) float32, in units of the prim."""
+        return (self._spool.read(self._number, code, rows) for rows in self._rows())
+
+    def _velocities(self, code: float) -> Iterator[np.ndarray]:
+        """Blocks (n, 3) float32, in units of the prim per second."""
         terms = self._plan.terms(code)
-        for low in range(0, len(result), BLOCK):
-            rows = slice(low, min(low + BLOCK, len(result)))
+        for rows in self._rows():
+            result = np.zeros((rows.stop - rows.start, 3), np.float32)
             for other, weight in terms:
                 part = self._spool.read(self._number, other, rows)
                 part *= np.float32(weight)
-                result[rows] += part
-        return result
+                result += part
+            yield result
 
 
 def _check_not_input(out: Path, shot: Shot) -> None:
