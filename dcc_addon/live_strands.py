@@ -75,8 +75,7 @@ def prepare(hair, armature, sampled) -> LiveHair:
         own, counts, place = curves.points(data), curves.counts(data), bind_place(hair, armature, sampled)
         made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), model_path(path), armature.name_full
         if prepared is None or prepared.made_of != made_of:
-            unit, radius = sampled.motion.metres_per_unit, curves.radius(data)
-            groom = rig_service.groom(name, own, counts, place, unit, radius)
+            groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, curves.radius(data))
             prepared = session.hairs[name] = LiveHair(groom, sampled.character, load_model(path))
             prepared.made_of = made_of
         session.doubtful.discard(name)

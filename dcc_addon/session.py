@@ -31,6 +31,8 @@ class SampledRig:
     stale: bool = False
     """Whether the animation has changed since."""
 
+    bind_metres: float = 1.0
+    """Metres of one unit of the bind pose: the scene's unit scale, times the size at which the motion shows the head."""
     drawn: np.ndarray = None
     """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
 

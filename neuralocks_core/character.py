@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
-from neuralocks_core.rotation import rotation_part
+from neuralocks_core.rotation import rotation_part, sizes
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,19 @@ class Skeleton:
             raise NeuralocksError(
                 f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose"
             )
+
+
+def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
+    """Signed sizes (n,) at which some samples of an animation show what a joint carries, 1 as in the bind pose.
+
+    A character is measured, and its hair read by the network, at their median: a rig may draw its head twice as large
+    as it was bound, and hair twice as long moves differently.
+
+    Args:
+        posed: (T, 4, 4) transforms of the joint; bind: (4, 4) in the bind pose.
+    """
+    few = np.unique(np.linspace(0, len(posed) - 1, 16).astype(int))
+    return sizes(posed[few] @ np.linalg.inv(bind))
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,11 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return from_quaternion(np.where(opposite, np.concatenate([0 * cosine, fallback], axis=-1), quaternion))
 
 
+def sizes(transforms: np.ndarray) -> np.ndarray:
+    """Signed sizes (...) of transforms (..., 4, 4): edge of the cube that a unit cube becomes, negative if mirrored."""
+    return np.cbrt(np.linalg.det(np.asarray(transforms, float)[..., :3, :3]))
+
+
 def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
     """Rotation (..., 3, 3) of transforms (..., 4, 4) after scale is divided out.
 

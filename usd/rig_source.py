@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from pxr import Usd
 
-from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
 from neuralocks_core.motion import Clip
@@ -151,14 +151,13 @@ def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) ->
         )
     humanoid = find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
     head = humanoid.get("head", 0)
-    few = posed[np.unique(np.linspace(0, len(posed) - 1, 16).astype(int)), head]
-    shown = np.linalg.det((few @ np.linalg.inv(source.bind[head]))[:, :3, :3])
+    shown = sizes_shown(posed[:, head], source.bind[head])
     if (shown < 0).any():
         raise NeuralocksError(
             f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
             "apply or remove the negative scale"
         )
-    wanted, own = np.cbrt(np.median(shown)), np.cbrt(np.linalg.det(placed))
+    wanted, own = np.median(shown), np.cbrt(np.linalg.det(placed))
     ratio = wanted / own
     if abs(ratio - 1) < 1e-4:
         ratio = 1.0

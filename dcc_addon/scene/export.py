@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..services import names
-from ..services.motion import Motion
+from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names
 from . import body as body_reader
 from . import curves
@@ -32,7 +32,7 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     from usd.scene_writer import HairArrays, SceneArrays, SkinArrays, hair_path, write_scene
 
     motion, rig = sampled.motion, sampled.rig
-    from_core = np.linalg.inv(_core(motion))
+    from_core = np.linalg.inv(to_core(sampled.bind_metres))
     bind = from_core @ sampled.character.skeleton.bind
     hairs = hairs_of(armature, scene) if hairs is None else hairs
     labels = names.unique([f"Hair_{h.name}" for h in hairs])
@@ -82,9 +82,3 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
         ),
     )
     return {hair.name_full: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
-
-
-def _core(motion: Motion) -> np.ndarray:
-    from ..services.axes import to_core
-
-    return to_core(motion.metres_per_unit)

@@ -87,12 +87,13 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     untrimmed = places[""][0] @ rig.rest
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
     arrays = [(body_reader.read(find(body)), places[body][0]) for body in bodies]
-    character = rig_service.character(rig, places[""][0], arrays, unit)
+    metres = unit * rig_service.size_shown(rig, places[""][0], motion)
+    character = rig_service.character(rig, places[""][0], arrays, metres)
     clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
     session.forget_motion(name)
     trim = trim_of(untrimmed, name)
     drawn = (joints @ trim).astype(np.float32)
-    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, drawn=drawn)
+    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, bind_metres=metres, drawn=drawn)
     session.readers[name] = reader
 
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Body, Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.humanoid import find_humanoid
 
 from . import names
 from .axes import to_core, transformed
-from .motion import similar, trim_of
+from .motion import Motion, similar, trim_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def character(
     rig: RigArrays,
     place: np.ndarray,
     bodies: Sequence[tuple[BodyArrays, np.ndarray]] = (),
-    metres_per_unit: float = 1.0,
+    metres: float = 1.0,
 ) -> Character:
     """The character in the core's space.
 
@@ -116,13 +116,20 @@ def character(
         rig: the armature at rest.
         place: world transform (4, 4) of the armature object at the first sampled frame.
         bodies: skinned meshes, each with its world transform at that frame; together they are the body.
-        metres_per_unit: the scene's unit scale.
+        metres: of one unit of this bind pose; see `SampledRig.bind_metres`.
     """
-    core = to_core(metres_per_unit)
+    core = to_core(metres)
     humanoid = rig.humanoid()
     skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
     parts = [_body(body, core @ body_place, rig.bones) for body, body_place in bodies]
     return Character(skeleton, _merged(parts), humanoid)
+
+
+def size_shown(rig: RigArrays, place: np.ndarray, motion: Motion) -> float:
+    """How much larger than in the bind pose the motion shows the head, as `usd` measures the same in a stage."""
+    head = rig.humanoid()["head"]
+    size = float(np.median(sizes_shown(motion.world()[:, head], bind_world(rig, place)[head])))
+    return 1.0 if abs(size - 1) < 1e-4 else size
 
 
 def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:
@@ -169,7 +176,7 @@ def groom(
     points: np.ndarray,
     counts: np.ndarray,
     place: np.ndarray,
-    metres_per_unit: float = 1.0,
+    metres: float = 1.0,
     radius: np.ndarray | None = None,
 ) -> Groom:
     """The groom in bind world space.
@@ -178,7 +185,7 @@ def groom(
         name: what messages call it.
         points: (P, 3) in the hair object's space; counts: (S,).
         place: world transform (4, 4) of the hair object in the bind pose.
-        metres_per_unit: the scene's unit scale.
+        metres: of one unit of the bind pose; see `SampledRig.bind_metres`.
         radius: (P,) in the hair object's space.
     """
     if not len(counts) or not len(points):
@@ -187,7 +194,7 @@ def groom(
         raise NeuralocksError(f"{name}: every strand has one point only; give the strands two points or more")
     if not np.isfinite(points).all():
         raise NeuralocksError(f"{name}: some points are not finite; delete these strands")
-    matrix = to_core(metres_per_unit) @ place
+    matrix = to_core(metres) @ place
     widths = None if radius is None or not len(radius) else 2 * radius * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     return Groom(name, transformed(points, matrix), counts, widths)
 

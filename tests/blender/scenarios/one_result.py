@@ -122,3 +122,26 @@ def attached(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(folder / "farm.blend"))
     for f, points in shown.items():
         assert apart(points_at(bpy.data.objects["Hair"], f), points) < SAME
+
+
+def scaled_head(folder: Path) -> None:
+    """A head that its bones scale, throughout or for a while, with hair parented to the bone or to the armature."""
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    for number, (bone, sizes) in enumerate((("head", (1.25, 1.25)), ("spine", (0.7, 1.3)))):
+        for frame, size in zip((1, 24), sizes, strict=True):
+            rig.pose.bones[bone].scale = (size, size, size)
+            rig.pose.bones[bone].keyframe_insert("scale", frame=frame)
+        if number:
+            rest = rig.data.bones["head"]
+            strands.parent_type, strands.parent_bone = "BONE", "head"
+            strands.matrix_parent_inverse = (rest.matrix_local @ scenes.translation((0, rest.length, 0))).inverted()
+        make_live(rig, strands)
+        shown = {f: points_at(strands, f) for f in (2, 13, 24)}
+        assert not messages(), messages()
+        out = folder / f"scaled_{number}.usdc"
+        assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
+        for f, points in shown.items():
+            assert apart(baked_points(out, "/Character/Hair_Hair", f), points) < SAME
