@@ -15,6 +15,8 @@ import numpy as np
 from mathutils import Matrix
 
 SHOT = ROOT / "examples" / "shot" / "shot.usda"
+COLLAR = -0.25
+"""Height over the middle of the head [m] below which the body is dressed."""
 
 
 def build(shot_path=SHOT, strands: int | None = None):
@@ -99,7 +101,10 @@ def _body(armature, names, rig, up):
                 groups[joint].add([vertex], weight, "REPLACE")
     body.parent = armature
     body.modifiers.new("Armature", "ARMATURE").object = armature
-    mesh.materials.append(_material("Skin", (0.52, 0.30, 0.22, 1), 0.45))
+    middle = rig.character.canonical_to_bind[1, 3] + rig.character.head_centre[1]
+    height = mesh.attributes.new("height", "FLOAT", "POINT")
+    height.data.foreach_set("value", (source.points[:, 1] - middle - COLLAR + 0.5).astype(np.float32))
+    mesh.materials.append(_skin())
     return body
 
 
@@ -129,6 +134,21 @@ def _material(name, colour, roughness):
     shader.inputs["Base Color"].default_value = colour
     shader.inputs["Roughness"].default_value = roughness
     material.diffuse_color = colour
+    return material
+
+
+def _skin():
+    """Skin above the collar, dark cloth below: the attribute `height` is one half there."""
+    material = _material("Skin", (0.52, 0.30, 0.22, 1), 0.45)
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    shader = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
+    height, ramp = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeValToRGB")
+    height.attribute_name = "height"
+    ramp.color_ramp.interpolation = "CONSTANT"
+    cloth, skin = ramp.color_ramp.elements
+    cloth.color, skin.color, skin.position = (0.018, 0.022, 0.032, 1), material.diffuse_color, 0.5
+    links.new(height.outputs["Fac"], ramp.inputs["Fac"])
+    links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
     return material
 
 
