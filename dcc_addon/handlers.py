@@ -76,7 +76,7 @@ def before_render(scene, *_):
             ensure(bpy.context, armature)
         except NeuralocksError as error:
             session.messages[armature.name_full] = str(error)
-    live.refresh(scene)
+    live.refresh(scene, wait=True)
 
 
 def _mark_stale() -> None:

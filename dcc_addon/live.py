@@ -10,11 +10,11 @@ from .scene.sampling import key_of
 from .session import session
 
 
-def strands_toggled(hair, context) -> None:
-    """The Live switch of strands was used."""
+def strands_toggled(hair, context, wait: bool) -> None:
+    """The Live switch of strands was used; `wait` as for `update`."""
     session.forget(hair.name_full)
     if hair.neuralocks_hair.live:
-        refresh(context.scene)
+        refresh(context.scene, wait)
     else:
         live_strands.rest(hair)
 
@@ -36,28 +36,29 @@ def loop_changed(armature, scene) -> None:
     refresh(scene)
 
 
-def refresh(scene) -> None:
-    """Show the hair of the current frame, outside of a frame change."""
+def refresh(scene, wait: bool = False) -> None:
+    """Show the hair of the current frame, outside of a frame change; `wait` as for `update`."""
     if session.paused or scene is None:
         return
     graph = bpy.context.evaluated_depsgraph_get() if bpy.context.scene == scene else None
     if graph is not None:
-        update(scene, graph)
+        update(scene, graph, wait=wait)
 
 
-def update(scene, graph, moved: bool = False) -> None:
+def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
     """Move all live hair to the pose that `graph` has evaluated.
 
     Args:
         scene: its frame says the time.
         graph: viewport or render depsgraph.
         moved: whether the frame has just changed, so that a pose unlike the sampled one means that the animation has
-        changed.
+            changed.
+        wait: hair that is not prepared yet is prepared before this returns, not beside Blender.
     """
     if session.paused:
         return
     for hair in live_strands.live_hairs(scene):
-        live_strands.update(hair, scene, graph, moved)
+        live_strands.update(hair, scene, graph, moved, wait)
     for armature in live_rig.live_armatures(scene):
         live_rig.update(armature, scene, graph, moved)
 

@@ -3,14 +3,17 @@
 
 import zlib
 
+import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 
+from . import preparing
 from .models import load_model, model_path
 from .pose import pose
 from .scene import curves
+from .scene.lookup import find
 from .scene.placing import bind_place, mute_deformers, unmute_deformers, world
 from .services import rig as rig_service
 from .services.axes import to_core
@@ -25,19 +28,24 @@ def live_hairs(scene) -> list:
     return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.live]
 
 
-def update(hair, scene, graph, moved: bool) -> None:
+def update(hair, scene, graph, moved: bool, wait: bool) -> None:
     """Write the points of a hair object for the pose that `graph` has evaluated; rest hair, with a message that says
-    why, where that cannot be.
+    why, where that cannot be, and rest hair while it is being prepared. The arguments are those of `live.update`.
     """
     try:
-        _update(hair, scene, graph, moved)
+        _update(hair, scene, graph, moved, wait or at_once(graph))
     except NeuralocksError as error:
         _give_up(hair, str(error))
     except ReferenceError:
         _give_up(hair, f"{hair.name_full}: something it depends on was deleted; choose the armature again")
 
 
-def _update(hair, scene, graph, moved: bool) -> None:
+def at_once(graph) -> bool:
+    """Whether hair must be there when a call returns: a render is made, or nobody looks on."""
+    return bpy.app.background or graph.mode == "RENDER"
+
+
+def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     armature = hair.neuralocks_hair.armature
     if armature is None or armature.name_full not in scene.objects:
         raise NeuralocksError(
@@ -55,11 +63,15 @@ def _update(hair, scene, graph, moved: bool) -> None:
         sampled.stale = session.wanting = True
         raise NeuralocksError(f"{armature.name_full}: its motion was sampled without this hair; press Sample Motion")
     joints = pose(armature, sampled, scene, graph, moved)
-    prepared = prepare(hair, armature, sampled)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
     to_local = np.linalg.inv(core @ world(hair, graph))
     time = scene.frame_current_final / sampled.motion.rate
-    points = prepared.points(time, joints, to_local, material(settings), settings.motion, settings.resolve)
+    wanted = time, joints, to_local, material(settings), settings.motion, settings.resolve
+    prepared = prepare(hair, armature, sampled, wanted, wait)
+    if prepared is None:
+        show_rest(hair)
+        return
+    points = prepared.points(*wanted)
     curves.keep_rest(hair.data)
     mute_deformers(hair)
     curves.write(hair.data, points)
@@ -67,20 +79,59 @@ def _update(hair, scene, graph, moved: bool) -> None:
     session.messages.pop(hair.name_full, None)
 
 
-def prepare(hair, armature, sampled) -> LiveHair:
-    """The hair bound to its model, prepared once; again where an undo has changed what it was prepared from."""
-    name, data, path = hair.name_full, hair.data, hair.neuralocks_hair.model
+def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
+    """The hair bound to its model, prepared once; again where an undo has changed what it was prepared from.
+
+    Args:
+        hair, armature, sampled: the hair object, what carries it, and how that moves.
+        wanted: arguments of `LiveHair.points` for the frame that is shown.
+        wait: prepare it now.
+
+    Returns:
+        None while a thread prepares it; the frame is drawn again when that is done.
+    """
+    name = hair.name_full
+    if name in session.preparing and not wait:
+        return None
     prepared = session.hairs.get(name)
     if prepared is None or name in session.doubtful:
-        own, counts, place = curves.points(data), curves.counts(data), bind_place(hair, armature, sampled)
-        made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), model_path(path), armature.name_full
+        made_of, make = _recipe(hair, armature, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
-            groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, curves.radius(data))
-            prepared = session.hairs[name] = LiveHair(groom, sampled.character, load_model(path))
-            prepared.made_of = made_of
+            session.forget(name)
+            if not wait:
+                preparing.start(name, make, _arrived)
+                return None
+            prepared = session.hairs[name] = make(lambda done, total: None)
         session.doubtful.discard(name)
     prepared.follow(sampled.clip)
     return prepared
+
+
+def _recipe(hair, armature, sampled, wanted: tuple):
+    """What the prepared hair is made of, to be compared, and a function of a progress callback that makes it without
+    Blender, with all that its first frame needs.
+    """
+    name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
+    own, counts, place = curves.points(data), curves.counts(data), bind_place(hair, armature, sampled)
+    radius = curves.radius(data)
+    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, armature.name_full
+
+    def make(say) -> LiveHair:
+        groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
+        prepared = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
+        prepared.made_of = made_of
+        prepared.follow(sampled.clip)
+        prepared.points(*wanted)
+        return prepared
+
+    return made_of, make
+
+
+def _arrived(name: str) -> None:
+    """Show hair that has just been prepared."""
+    hair, scene = find(name), bpy.context.scene
+    if hair is not None and hair.neuralocks_hair.live and not session.paused:
+        update(hair, scene, bpy.context.evaluated_depsgraph_get(), False, False)
 
 
 def material(settings) -> np.ndarray:

@@ -12,9 +12,8 @@ from neuralocks_core.runtime import StrandModel
 from .session import session
 
 
-def load_model(path: str) -> StrandModel:
-    """The model of a path in the file, or the shipped one; read once while it does not change."""
-    found = model_path(path)
+def load_model(found: str) -> StrandModel:
+    """The model of an absolute path, read once while it does not change; calls nothing of Blender."""
     stamp = (os.path.getmtime(found), os.path.getsize(found)) if os.path.isfile(found) else None
     kept = session.models.get(found)
     if kept is None or kept[0] != stamp:

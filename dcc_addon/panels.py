@@ -93,6 +93,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         row.scale_y = 1.5
         row.use_property_split = False
         row.prop(own, "live", toggle=True, icon="PLAY")
+        if hair.name_full in session.preparing:
+            done = session.preparing[hair.name_full].done
+            progress(layout, done, f"Preparing the hair {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
@@ -120,10 +123,7 @@ def _training(layout, settings, kind: str) -> None:
     left = running.seconds_left
     box = layout.box()
     text = f"Training {100 * running.done:.0f} %" + ("" if left is None else f", {max(1, round(left / 60))} min left")
-    if hasattr(box, "progress"):
-        box.progress(factor=running.done, text=text)
-    else:
-        box.label(text=text, icon="TIME")
+    progress(box, running.done, text)
     words(box, running.message, "NONE")
     box.operator("neuralocks.cancel_training", icon="CANCEL")
 
@@ -208,6 +208,14 @@ def message(layout, name: str) -> None:
     """What went wrong with an object, if anything did."""
     if session.messages.get(name):
         words(layout, session.messages[name], "ERROR")
+
+
+def progress(layout, done: float, text: str) -> None:
+    """How far something is, from 0 to 1; older Blenders draw no bar."""
+    if hasattr(layout, "progress"):
+        layout.progress(factor=done, text=text)
+    else:
+        layout.label(text=text, icon="TIME")
 
 
 def words(layout, text: str, icon: str) -> None:

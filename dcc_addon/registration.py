@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import background, handlers, live_rig, live_strands, operators, panels, properties
+from . import background, handlers, live_rig, live_strands, operators, panels, preparing, properties
 from .session import session
 
 CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
@@ -22,6 +22,7 @@ def register() -> None:
 def unregister() -> None:
     """Disable it: hair at rest, no handler, timer, process or class left behind."""
     background.cancel()
+    preparing.stop()
     operators.training.stop()
     handlers.detach()
     for scene in bpy.data.scenes:

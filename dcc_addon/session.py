@@ -14,6 +14,7 @@ from neuralocks_core.motion import Clip
 
 from .services.motion import Motion
 from .services.rig import RigArrays
+from .services.threaded import Threaded
 
 
 @dataclass(eq=False)
@@ -48,6 +49,8 @@ class Session:
 
     rigs: dict[str, SampledRig] = field(default_factory=dict)
     hairs: dict[str, object] = field(default_factory=dict)
+    preparing: dict[str, Threaded] = field(default_factory=dict)
+    """Hair objects that a thread is preparing."""
     readers: dict[str, object] = field(default_factory=dict)
     chains: dict[str, object] = field(default_factory=dict)
     models: dict[str, tuple] = field(default_factory=dict)
@@ -70,11 +73,13 @@ class Session:
     def doubt(self) -> None:
         """Anything in the file may have changed: look before use."""
         self.doubtful.update(self.hairs)
+        self._stop_preparing_all()
         self.weights.clear()
         self.chains.clear()
 
     def forget(self, name: str) -> None:
         """Drop what was prepared for a hair object or for the hair bones of an armature."""
+        self.stop_preparing(name)
         self.hairs.pop(name, None)
         self.chains.pop(name, None)
         self.messages.pop(name, None)
@@ -85,12 +90,24 @@ class Session:
         self.failed.discard(name)
         self.readers.pop(name, None)
         self.chains.pop(name, None)
+        self._stop_preparing_all()
         self.hairs.clear()
         self.messages.pop(name, None)
 
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on goes."""
+        self._stop_preparing_all()
         self.__init__()
+
+    def stop_preparing(self, name: str) -> None:
+        """Cancel the thread that prepares a hair object, if there is one."""
+        job = self.preparing.pop(name, None)
+        if job is not None:
+            job.cancel()
+
+    def _stop_preparing_all(self) -> None:
+        for name in list(self.preparing):
+            self.stop_preparing(name)
 
 
 session = Session()

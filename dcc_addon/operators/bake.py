@@ -15,8 +15,9 @@ from ..scene import attach
 from ..scene.export import write_shot
 from ..scene.lookup import find
 from ..scene.sampling import hairs_of, sample, stepping
+from ..services.threaded import Threaded
 from ..session import session
-from .base import Stepwise, Threaded, shown_armature, shown_hair
+from .base import Stepwise, shown_armature, shown_hair
 
 
 def output_path(path: str) -> str:
@@ -93,7 +94,7 @@ def bake_steps(context, armature, hairs, path: str):
                 progress=say,
             )
         )
-        yield from job.steps(len(looks), number)
+        yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
         baked |= {h.name_full: (str(out), prims[h.name]) for h in group}
     return baked
 
@@ -189,7 +190,7 @@ def _card(path: str):
     from ..services.card import lines_of
 
     measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
-    return lines_of((yield from measuring.steps(1, 0)))
+    return lines_of((yield from measuring.steps()))
 
 
 CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all operators share: errors as reports, and long work with progress and cancel."""
 
-import threading
 import time
 import traceback
 
@@ -115,50 +114,6 @@ class Stepwise(Hardened):
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
         session.sampling = None
-
-
-class Threaded:
-    """Work in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender.
-
-    Args:
-        function: called with a progress callback that raises once the work is cancelled.
-        title: what is being done.
-        leave: do not wait for the thread after a cancel; for work that ends by itself and writes nothing.
-    """
-
-    def __init__(self, function, title: str = "Baking the hair", leave: bool = False):
-        self._function, self._title, self._leave = function, title, leave
-
-    def steps(self, parts: int, part: int):
-        """Yields (done, total, title) while it works, as part `part` of `parts` of the second half; returns its result."""
-        state = {"done": (0, 1, ""), "cancel": False}
-
-        def say(done, total, message):
-            if state["cancel"]:
-                raise NeuralocksError("cancelled")
-            state["done"] = done, total, message
-
-        def run():
-            try:
-                state["result"] = self._function(say)
-            except BaseException as error:
-                state["error"] = error
-
-        thread = threading.Thread(target=run, daemon=True)
-        thread.start()
-        try:
-            while thread.is_alive():
-                thread.join(0.02)
-                done, total, _ = state["done"]
-                share = (part + done / max(total, 1)) / parts
-                yield 0.5 + 0.5 * share, 1, self._title
-        finally:
-            state["cancel"] = True
-            if not self._leave:
-                thread.join()
-        if "error" in state:
-            raise state["error"]
-        return state["result"]
 
 
 def shown_armature(context):

@@ -72,7 +72,7 @@ class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
 
     def execute(self, context):
         result = super().execute(context)
-        refresh(context.scene)
+        refresh(context.scene, wait=True)
         return result
 
 

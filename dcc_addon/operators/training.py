@@ -13,9 +13,10 @@ from neuralocks_core.errors import NeuralocksError
 from ..scene.export import write_shot
 from ..scene.lookup import find
 from ..scene.sampling import sample, stepping
+from ..services.threaded import Threaded
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
-from .base import Hardened, Stepwise, Threaded, shown_armature, shown_hair
+from .base import Hardened, Stepwise, shown_armature, shown_hair
 
 _jobs: list = []
 _checked: dict[str, str] = {}
@@ -74,7 +75,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         target = shown_hair(context) if self.kind == "strands" else armature
         python, name, wanted = training_python(), armature.name_full, target.name_full
         asking = Threaded(lambda _: problem(python), "Looking for what training needs", leave=True)
-        _checked[python] = yield from asking.steps(1, 0)
+        _checked[python] = yield from asking.steps()
         if _checked[python]:
             raise NeuralocksError(_checked[python])
         with stepping(context.scene):

@@ -24,6 +24,7 @@ class LiveHair:
         groom: strands in bind world space [m].
         character: whose head carries them.
         model: the network.
+        say: told the share that is done; what it raises ends the work.
 
     Attributes:
         made_of: whatever tells its maker that it must be made again.
@@ -31,12 +32,15 @@ class LiveHair:
 
     made_of: object = None
 
-    def __init__(self, groom: Groom, character: Character, model: StrandModel):
+    def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model
         origin = character.skeleton.bind[character.head, :3, 3]
         self._strands = strand_set(groom, origin, character.head_centre, character.facing)
+        say(0.4)
         self._carrier = Carrier(groom, self._strands)
+        say(0.6)
         self._session = model.prepare(self._strands)
+        say(1.0)
         self._resolver: Resolver | None = None
         self._sampler: BoundarySampler | None = None
         self._clip: Clip | None = None

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The live view: posed by hand, rendered, saved, two characters at a time."""
 
+import time
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at
 
 
 def rest_is_safe(folder: Path) -> None:
@@ -138,3 +139,48 @@ def two_characters(_folder: Path) -> None:
     points_at(one, 13)
     assert "Two" in messages() and "armature" in messages()["Two"]
     assert apart(np.array([p.position for p in two.data.points]), groomed) == 0.0
+
+
+def prepared_beside(_folder: Path) -> None:
+    """In a window a thread prepares the hair: at rest until then, as ever afterwards; Live cancels; a render waits."""
+    from dcc_addon import live, live_strands, preparing, properties
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 1500)
+    own = strands.neuralocks_hair
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+    own.live = False
+    groomed = points_at(strands, 9)
+    live_strands.at_once = lambda graph: graph.mode == "RENDER"
+    properties._by_script = lambda context: False
+
+    def finish():
+        while preparing.look() is not None:
+            time.sleep(0.01)
+        assert not session.preparing
+
+    own.live = True
+    assert session.preparing and apart(scenes.points(strands), groomed) == 0.0
+    points_at(strands, 12)
+    assert apart(points_at(strands, 9), groomed) == 0.0
+    finish()
+    assert apart(scenes.points(strands), shown) == 0.0 and not messages(), messages()
+
+    own.live = False
+    own.live = True
+    assert session.preparing
+    own.live = False
+    finish()
+    assert not session.hairs and apart(scenes.points(strands), groomed) == 0.0
+
+    own.model = "/nowhere.neuralocks"
+    own.live = True
+    finish()
+    assert "no such" in messages()["Hair"], messages()
+    own.model = MODEL
+    assert session.preparing
+    live.refresh(bpy.context.scene, wait=True)
+    assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that is being prepared beside Blender: a large groom takes a second, which nobody should have to wait for."""
+
+import traceback
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+from .services.threaded import Threaded
+from .session import session
+
+LOOK = 0.05
+"""Time between two looks at what is being prepared [s]."""
+
+_then: dict = {}
+
+
+def start(name: str, make, then) -> None:
+    """Let a thread prepare a hair object.
+
+    Args:
+        name: of the hair object.
+        make: called with a progress callback, gives the prepared hair; calls nothing of Blender.
+        then: called with the name when the hair is in the session.
+    """
+    session.preparing[name] = Threaded(make, leave=True).start()
+    _then[name] = then
+    if not bpy.app.timers.is_registered(look):
+        bpy.app.timers.register(look, first_interval=LOOK)
+
+
+def stop() -> None:
+    """Cancel all; the session forgets what they make."""
+    for name in list(session.preparing):
+        session.stop_preparing(name)
+    _then.clear()
+    if bpy.app.timers.is_registered(look):
+        bpy.app.timers.unregister(look)
+
+
+def look() -> float | None:
+    """Take over what is ready; the time until the next look, None when nothing is being prepared any more."""
+    for name, job in list(session.preparing.items()):
+        if job.running:
+            continue
+        del session.preparing[name]
+        then = _then.pop(name)
+        try:
+            session.hairs[name] = job.result()
+        except NeuralocksError as error:
+            session.messages[name] = str(error)
+        except Exception as error:
+            traceback.print_exc()
+            session.messages[name] = f"{name}: unexpected {type(error).__name__}: {error}; see the console"
+        else:
+            then(name)
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+    return LOOK if session.preparing else None
