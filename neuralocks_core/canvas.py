@@ -50,6 +50,7 @@ class VtkCanvas:
         self.size, self._pyvista, self._width = (width, height), pyvista, detail.width
         pyvista.vtk_verbosity("off")
         self._plotter = pyvista.Plotter(off_screen=True, window_size=(round(width * scale), round(height * scale)))
+        self._plotter.render_window.SetMultiSamples(detail.samples)
         self._plotter.set_background("black")
         self._body = self._hair = None
         self._faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
@@ -59,8 +60,6 @@ class VtkCanvas:
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
         """An image (height, width, 3) uint8 of body points (V, 3) and hair points (P, 3) with colours in 0..1."""
-        from PIL import Image
-
         body_colours, hair_colours = ((255 * c).astype(np.uint8) for c in (body_colours, hair_colours))
         if self._hair is None:
             self._hair = self._pyvista.PolyData(hair, lines=self._lines)
@@ -80,11 +79,7 @@ class VtkCanvas:
         view.clipping_range = (0.2 * far, 4 * far)
         self._plotter.render()
         image = self._plotter.screenshot(return_img=True, transparent_background=True)
-        # Colours are multiplied by the coverage before they are reduced, or hair gets a dark fringe.
-        alpha = image[..., 3:].astype(np.float32) / 255
-        layers = np.concatenate([image[..., :3] * alpha, 255 * alpha], axis=2).astype(np.uint8)
-        small = np.asarray(Image.fromarray(layers, "RGBA").resize(self.size, Image.Resampling.BOX), np.float32)
-        return (small[..., :3] + self._backdrop * (1 - small[..., 3:] / 255)).clip(0, 255).astype(np.uint8)
+        return _over(image, self.size, self._backdrop)
 
     def close(self) -> None:
         """Free the window."""
@@ -104,8 +99,6 @@ class PlainCanvas:
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
         """As `VtkCanvas.draw`."""
-        from PIL import Image
-
         wide, high = (round(side * self._scale) for side in self.size)
         samples = [self._segments(camera, hair, hair_colours, high)]
         if body is not None:
@@ -118,8 +111,7 @@ class PlainCanvas:
         # Far samples first: the last one written to a pixel is the nearest.
         image[pixel_y[order], pixel_x[order], :3] = (255 * colour[order]).astype(np.uint8)
         image[pixel_y[order], pixel_x[order], 3] = 255
-        small = np.asarray(Image.fromarray(image, "RGBA").resize(self.size, Image.Resampling.BOX), np.float32)
-        return (small[..., :3] + self._backdrop * (1 - small[..., 3:] / 255)).clip(0, 255).astype(np.uint8)
+        return _over(image, self.size, self._backdrop)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -149,6 +141,16 @@ class PlainCanvas:
             parts.append(np.concatenate([weights @ seen[chosen], weights @ tint[chosen]], axis=2).reshape(-1, 6))
         both = np.concatenate(parts) if parts else np.zeros((0, 6))
         return both[:, 0], both[:, 1], both[:, 2], both[:, 3:]
+
+
+def _over(image: np.ndarray, size: tuple[int, int], backdrop: np.ndarray) -> np.ndarray:
+    """A drawing (H, W, 4) uint8 with coverage, reduced to a size and laid over the backdrop (height, width, 3)."""
+    from PIL import Image
+
+    # Colours multiplied by the coverage before they are reduced, and left so: the edge of hair gets no fringe.
+    small = Image.fromarray(image, "RGBA").convert("RGBa").resize(size, Image.Resampling.BOX)
+    small = np.frombuffer(small.tobytes(), np.uint8).reshape(*size[::-1], 4).astype(np.float32)
+    return (small[..., :3] + backdrop * (1 - small[..., 3:] / 255)).clip(0, 255).astype(np.uint8)
 
 
 def open_canvas(width, height, triangles, strands, detail) -> VtkCanvas | PlainCanvas:

@@ -45,31 +45,31 @@ def hair_colours(
     """
     strands, vertices = len(counts), int(counts[0])
     x = points.reshape(strands, vertices, 3)
-    tangent = np.gradient(x, axis=1)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-9)
-    outward = x - centre
-    outward -= (outward * tangent).sum(axis=2, keepdims=True) * tangent
-    outward /= np.maximum(np.linalg.norm(outward, axis=2, keepdims=True), 1e-9)
-    length = np.linalg.norm(np.diff(x, axis=1), axis=2).mean(axis=1)
+    tangent = _unit(np.gradient(x, axis=1).astype(np.float32))
+    outward = (x - centre).astype(np.float32)
+    outward -= np.einsum("snc,snc->sn", outward, tangent)[..., None] * tangent
+    outward = _unit(outward)
+    step = np.diff(x, axis=1)
+    length = np.sqrt(np.einsum("snc,snc->sn", step, step)).mean(axis=1)
     shadow = ShadowMap(points, np.repeat(length * COVER / strands, vertices))
 
     rng = np.random.default_rng(7)
     along = np.linspace(0, 1, vertices)[None, :, None] ** 1.3
-    base = (np.array(look.root) * (1 - along) + np.array(look.tip) * along)
-    shift = rng.normal(0, 0.05, (strands, 1, 1))
-    light = np.zeros_like(x)
+    base = (np.array(look.root) * (1 - along) + np.array(look.tip) * along).astype(np.float32)
+    shift = rng.normal(0, 0.05, (strands, 1, 1)).astype(np.float32)
+    gloss = 0.5 * np.array(look.gloss, np.float32)
+    light = np.zeros(x.shape, np.float32)
     for direction, power, dim in ((KEY, 2.6, 1.0), (FILL, 0.55, 0.6), (RIM, 2.2, 1.0)):
-        towards = axes @ direction
-        clear = np.exp(-dim * shadow.depth(points, towards)).reshape(strands, vertices, 1)
-        clear = _smoothed(clear)
+        towards = (axes @ direction).astype(np.float32)
+        clear = _smoothed(np.exp(-dim * shadow.depth(points, towards)).reshape(strands, vertices, 1))
         cosine = (tangent @ towards)[..., None]
         wrap = np.clip(0.55 + 0.45 * (outward @ towards)[..., None], 0, 1)
         diffuse = np.sqrt(np.clip(1 - cosine**2, 0, 1)) * wrap
         half = towards + to_eye
-        half /= np.linalg.norm(half)
+        half = (half / np.linalg.norm(half)).astype(np.float32)
         bright = 0.30 * _highlight(tangent, outward, half, shift - 0.10, 90)
         tinted = 0.9 * _highlight(tangent, outward, half, shift + 0.14, 22)
-        light += power * clear * (base * (diffuse + tinted) + wrap * bright * np.array(look.gloss) * 0.5)
+        light += power * clear * (base * (diffuse + tinted) + wrap * bright * gloss)
     sky = np.exp(-0.5 * shadow.depth(points, axes @ np.array([0, 0.8, 0.6]))).reshape(strands, vertices, 1)
     light += 0.30 * _smoothed(sky) * base
     return light.reshape(-1, 3), shadow
@@ -121,24 +121,24 @@ class ShadowMap:
     def depth(self, queries: np.ndarray, towards: np.ndarray) -> np.ndarray:
         """Optical depth (Q,) of the hair in front of each query (Q, 3) [m]; light comes from `towards`."""
         axes, low, cell, summed = self._seen_from(towards)
-        place = (queries @ axes - low) / cell
+        # One array a coordinate: several times as fast as rows of three.
+        place = (axes.T @ queries.T.astype(np.float32) - low[:, None]) / cell
         # Half a cell towards the light, or a vertex would lie in its own shadow.
-        place[:, 2] += 0.5
-        last = np.array(summed.shape) - 1
-        outside = ((place[:, :2] < 0) | (place[:, :2] > last[:2])).any(axis=1)
-        place = np.clip(place, 0, last - 1e-6)
+        place[2] += np.float32(0.5)
+        last = np.array(summed.shape, np.float32)[:, None] - 1
+        outside = ((place[:2] < 0) | (place[:2] > last[:2])).any(axis=0)
+        np.clip(place, 0, last - np.float32(1e-3), out=place)
         corner = place.astype(np.int32)
         part = place - corner
-        strides = np.array([summed.shape[1] * summed.shape[2], summed.shape[2], 1])
-        index, flat = corner @ strides, summed.ravel()
-        result = np.zeros(len(queries))
-        for i in (0, 1):
-            for j in (0, 1):
-                for k in (0, 1):
-                    share = np.ones(len(queries))
-                    for axis, bit in enumerate((i, j, k)):
-                        share *= part[:, axis] if bit else 1 - part[:, axis]
-                    result += share * flat[index + (i * strides[0] + j * strides[1] + k)]
+        sides, height = summed.shape[1] * summed.shape[2], summed.shape[2]
+        index, flat = corner[0] * sides + corner[1] * height + corner[2], summed.ravel()
+        (left, low_, near), (right, high, far) = 1 - part, part
+        result = np.zeros(len(queries), np.float32)
+        for aside, across in ((0, left), (sides, right)):
+            for above, up in ((0, low_), (height, high)):
+                column = flat.take(index + (aside + above)) * near
+                column += flat.take(index + (aside + above + 1)) * far
+                result += column * (across * up)
         result[outside] = 0
         return result
 
@@ -148,15 +148,16 @@ class ShadowMap:
         if key not in self._columns:
             side = np.cross(towards, [0.0, 1.0, 0.0] if abs(towards[1]) < 0.9 else [1.0, 0.0, 0.0])
             side /= np.linalg.norm(side)
-            axes = np.stack([side, np.cross(towards, side), towards], axis=1)
-            seen = self.points @ axes
-            low, high = seen.min(axis=0), seen.max(axis=0)
-            cell = max(CELL, float((high - low).max()) / MOST_CELLS)
+            axes = np.stack([side, np.cross(towards, side), towards], axis=1).astype(np.float32)
+            seen = axes.T @ self.points.T.astype(np.float32)
+            low, high = seen.min(axis=1), seen.max(axis=1)
+            cell = np.float32(max(CELL, float((high - low).max()) / MOST_CELLS))
             shape = ((high - low) / cell).astype(int) + 4
-            low = low - 1.5 * cell
-            index = np.ravel_multi_index(((seen - low) / cell + 0.5).astype(int).T, shape)
-            grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape)
-            self._columns[key] = axes, low, cell, np.cumsum(grid[:, :, ::-1], axis=2)[:, :, ::-1]
+            low = low - np.float32(1.5) * cell
+            index = np.ravel_multi_index(((seen - low[:, None]) / cell + np.float32(0.5)).astype(int), shape)
+            grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape).astype(np.float32)
+            summed = np.cumsum(grid[:, :, ::-1], axis=2)[:, :, ::-1]
+            self._columns[key] = axes, low, cell, np.ascontiguousarray(summed)
         return self._columns[key]
 
 
@@ -176,8 +177,14 @@ def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _highlight(tangent, outward, half, shift, sharpness):
     bent = tangent + shift * outward
-    bent /= np.maximum(np.linalg.norm(bent, axis=2, keepdims=True), 1e-9)
-    return np.clip(1 - (bent @ half)[..., None] ** 2, 0, 1) ** sharpness
+    along = bent @ half
+    along *= along / np.maximum(np.einsum("snc,snc->sn", bent, bent), 1e-18)
+    return np.clip(1 - along[..., None], 0, 1) ** sharpness
+
+
+def _unit(vectors):
+    """(S, N, 3) of length one."""
+    return vectors / np.maximum(np.sqrt(np.einsum("snc,snc->sn", vectors, vectors)), 1e-9)[..., None]
 
 
 def _smoothed(values):

@@ -9,7 +9,7 @@ from neuralocks_core import canvas, preview, shading
 from neuralocks_core.errors import NeuralocksError
 
 CENTRE = np.array([0.0, 1.5, 0.0])
-SMALL = preview.Detail(2000, 16, 1.0, 1.2)
+SMALL = preview.Detail(2000, 16, 1.0, 1.2, 0)
 
 
 def scene(frames=4, strands=300):
@@ -58,7 +58,7 @@ def test_both_canvases_draw_the_same_picture():
         canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, SMALL).close()
     except Exception as error:
         pytest.skip(f"VTK cannot draw here: {error}")
-    pictures, detail = [], preview.Detail(600, 24, 2.0, 1.2)
+    pictures, detail = [], preview.Detail(600, 24, 2.0, 1.2, 4)
     for kind in (canvas.VtkCanvas, canvas.PlainCanvas):
         film = preview._Film(scene(), 120, 160, detail, 0.02)
         film._canvas.close()
