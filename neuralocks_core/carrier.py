@@ -144,7 +144,8 @@ class _Block:
         self._fine = fine & valid
         if not self._fine.all():
             # Numbers within a block are small: two bytes for each of the groom's points instead of four.
-            self._first, self._weights = (first + strand * vertices).astype(np.uint16), weights
+            self._first = (first + strand * vertices).astype(np.uint16)
+            self._weights = np.ascontiguousarray(weights.T)
         self._own = np.flatnonzero(self._fine[strand]).astype(np.int32)
         own, strand, place = own[self._own], strand[self._own], place[self._own]
         segment = np.clip(place.astype(np.int32), 0, vertices - 2)
@@ -166,20 +167,25 @@ class _Block:
         coils = slice(*np.searchsorted(self._own, (own.start, own.stop))) if len(self._own) else slice(0, 0)
         if fine.all():
             return self._turned(displacement, self._rest[start : start + len(fine)], start, coils)
-        first, weights = self._first[own], self._weights[own]
+        first, weights = self._first[own].astype(np.intp), self._weights[:, own]
         if start:
-            first = first - np.uint16(start * vertices)
-        flat = displacement.reshape(-1, 3)
-        moved = flat.take(first, axis=0)
-        moved *= weights[:, :1]
-        for node in range(1, spans.NODES):
-            part = flat[node:].take(first, axis=0)
-            part *= weights[:, node : node + 1]
-            moved += part
+            first -= start * vertices
+        # One coordinate at a time: three to a row leave a processor's vectors mostly empty.
+        moved, part = (np.empty(len(first), np.float32) for _ in range(2))
+        flat, result = displacement.reshape(-1, 3), np.empty((len(first), 3), np.float32)
+        for axis in range(3):
+            along = np.ascontiguousarray(flat[:, axis])
+            along.take(first, out=moved, mode="clip")
+            moved *= weights[0]
+            for node in range(1, spans.NODES):
+                along[node:].take(first, out=part, mode="clip")
+                part *= weights[node]
+                moved += part
+            result[:, axis] = moved
         if coils.stop > coils.start:
             rest = self._rest[start : start + len(fine)][fine]
-            moved[self._own[coils] - own.start] = self._turned(displacement[fine], rest, start, coils)
-        return moved
+            result[self._own[coils] - own.start] = self._turned(displacement[fine], rest, start, coils)
+        return result
 
     def _turned(self, displacement: np.ndarray, rest: np.ndarray, start: int, coils: slice) -> np.ndarray:
         segment = self._segment[coils] - np.int32(self._fine[:start].sum() * displacement.shape[1])
