@@ -12,6 +12,8 @@ from neuralocks_core.resolve import Resolver
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands import strand_set
 
+from .history import SampledBoundary
+
 ROWS = 24_576
 """Points multiplied by a 3x3 matrix at a time: so few stay on their core instead of waking BLAS threads that wait for
 each other."""
@@ -43,9 +45,11 @@ class LiveHair:
         say(1.0)
         self._resolver: Resolver | None = None
         self._sampler: BoundarySampler | None = None
+        self._boundary: SampledBoundary | None = None
         self._clip: Clip | None = None
         self._points = np.empty((len(groom.points), 3), np.float32)
         self._shown: object = b""
+        self._held = b""
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
         # About the head's own place, so that coordinates far from the origin cost no digits.
         self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
@@ -55,7 +59,8 @@ class LiveHair:
         """Read the body's history from this clip from now on."""
         if clip is not self._clip:
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
-            self._resolver = None
+            self._boundary = SampledBoundary(self._sampler)
+            self._resolver, self._held = None, b""
 
     def points(
         self,
@@ -79,8 +84,10 @@ class LiveHair:
         Returns:
             (P, 3) float32, valid until the next call.
         """
-        vector = self._sampler.vectors([time], material, strength, joints[None])[0]
-        self._session.anchor(self._sampler.held_bind(material))
+        vector = self._boundary.vector(time, material, strength, joints)
+        if self._held != (held := np.asarray(material).tobytes()):
+            self._session.anchor(self._sampler.held_bind(material))
+            self._held = held
         matrix = to_local @ self.character.carrying(joints)
         wanted = vector.tobytes(), matrix.tobytes(), joints.tobytes() if resolve else b""
         if wanted == self._shown:

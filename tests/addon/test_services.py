@@ -11,10 +11,13 @@ import pytest
 
 from dcc_addon import build
 from dcc_addon.services import axes, card, names, rig, training_job
+from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.motion import Motion, frame_numbers, similar
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.report import Card
 from neuralocks_core.rotation import from_vector
+from tests.core.rigs import moved, person
 
 BONES = ("hips", "spine", "neck", "head", "upper_arm.L", "upper_arm.R")
 PARENTS = np.array([-1, 0, 1, 2, 1, 1])
@@ -72,6 +75,35 @@ def test_samples_are_found_by_frame():
     motion = Motion.from_world(np.arange(9) / 2 + 3, 25, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
     assert [motion.row(f) for f in (3, 3.5, 7, 2, 3.3, 7.5)] == [0, 1, 8, None, None, None]
     assert motion.times[-1] == 7 / 25
+
+
+def test_a_clips_own_samples_are_what_the_sampler_gives():
+    """Kept or not, in blocks or alone: the same bits, also after a change of look, between samples, for another pose."""
+    rng, times = np.random.default_rng(3), np.arange(21) / 24
+    clip = moved(times, lambda t: np.stack([np.sin(5 * t), 0 * t, t], -1))
+    sampler = BoundarySampler(BoundarySpec(), person(), clip)
+    kept = SampledBoundary(sampler)
+    for material, strength in (((0.0,) * 4, 1.0), ((0.3, 0, 0, 0.1), 0.7)):
+        for row in rng.permutation(21):
+            found = kept.vector(times[row], material, strength, clip.joints[row])
+            assert np.array_equal(found, sampler.vectors([times[row]], material, strength, clip.joints[row][None])[0])
+    other = clip.joints[4].copy()
+    other[:, 0, 3] += 0.1
+    other[:, :3, :3] = from_vector([0, 0.4, 0]) @ other[:, :3, :3]
+    for t, joints in ((times[4], other), (times[4] + 0.01, clip.joints[4]), (2.0, clip.joints[20])):
+        found = kept.vector(t, material, 0.7, joints)
+        assert np.array_equal(found, sampler.vectors([t], material, 0.7, joints[None])[0])
+
+
+@pytest.mark.parametrize("size", [1.0, 0.6, 1.7])
+def test_a_character_is_measured_at_the_size_shown(size):
+    """Bones that scale the head: it stands as it is drawn, and the bind pose is as large as its hair is."""
+    bind, world = _motion(np.random.default_rng(4))
+    world[:, 3, :3, :3] *= size
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    assert rig.size_shown(rig.RigArrays("Rig", BONES, PARENTS, _rest()), np.eye(4), motion) == pytest.approx(
+        size, rel=1e-3
+    )
 
 
 def test_frame_numbers():
