@@ -17,9 +17,9 @@ IR_VERSION = 8  # the oldest that goes with this opset, for the oldest onnxrunti
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction") -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
-    Normalisation is folded into the weights, so all inputs are SI. The deep maps, of a strand's shape and of the frame,
-    and the frame's linear one beside them, hold most weights and are stored in float16, which keeps the file small; all
-    is computed in float32.
+    Normalisation is folded into the weights, so all inputs are SI. Where the frame has a deep map, all that is computed
+    once a frame, or once a groom by a deep map, is stored in float16, which keeps the file small (0.006 mm in the mean on
+    the shipped shot); all is computed in float32.
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
@@ -156,7 +156,7 @@ def _frame_graph(net: StrandNet) -> bytes:
             graph.half(f"{name}.to_terms", _array(change.to_terms))
             graph.half(f"{name}.back", _array(change.back) * free)
             terms = graph.node("Mul", [f"{name}.to_terms", f"{name}.weights"], f"{name}.weighed")
-            graph.constant(f"{name}.plain", _array(plain) * free)
+            graph.half(f"{name}.plain", _array(plain) * free)
             whole = graph.node(
                 "Add",
                 [f"{name}.plain", graph.node("MatMul", [terms, f"{name}.back"], f"{name}.change")],
