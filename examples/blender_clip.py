@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A rendered clip of the shipped shot with live hair, without a display:
 
-    .venv-blender-4.5/bin/python examples/blender_clip.py OUT_FOLDER [--model FILE] [--frames 60:168:2] [--size 400]
+    .venv-blender-4.5/bin/python examples/blender_clip.py OUT_FOLDER [--model FILE] [--frames 60:146:2] [--size 400]
 
 Writes the single frames, and of them `clip.gif` where pillow is installed beside Blender.
 """
@@ -24,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("out", type=Path)
     parser.add_argument("--model", default="")
-    parser.add_argument("--frames", default="60:168:2")
+    parser.add_argument("--frames", default="60:146:2")
     parser.add_argument("--size", type=int, default=400)
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--engine", choices=["CYCLES", "EEVEE"], default="CYCLES")
@@ -116,7 +116,7 @@ def clip(folder: Path, pictures: list[str]) -> Path:
     except ImportError:
         return folder
     out = folder / "clip.gif"
-    first, *rest = (Image.open(p).convert("RGB").quantize(160, dither=Image.Dither.NONE) for p in pictures)
+    first, *rest = (Image.open(p).convert("RGB").quantize(256, dither=Image.Dither.NONE) for p in pictures)
     first.save(out, save_all=True, append_images=rest, duration=round(1000 / RATE), loop=0, optimize=True)
     return out
 
