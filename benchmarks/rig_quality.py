@@ -67,9 +67,8 @@ def main() -> None:
 
 def _held_row(name: str, report: dict, key: str) -> None:
     depth = report[f"penetration_{key}"]
-    energy = report["energy"]
-    over = 100 * (energy[key] - energy["optimised"]) / (energy["rigid"] - energy["optimised"])
-    values = [f"{energy[key]:.3f}", f"{over:.2f}", f"{report['energy_collision'][key]:.3f}", f"{depth['percent']:.3f}"]
+    values = [f"{report['energy'][key]:.3f}", f"{report['energy_excess_of_saved_percent'][key]:.2f}"]
+    values += [f"{report['energy_collision'][key]:.3f}", f"{depth['percent']:.3f}"]
     values += [f"{depth['percent_of_poses_deeper_than_5_mm']:.1f}", f"{depth['worst_mm']:.1f}"]
     print(f"| {name} ({depth['poses']} poses) | " + " | ".join(values) + " |")
 

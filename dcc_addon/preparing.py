@@ -32,8 +32,7 @@ def start(name: str, make, then) -> None:
 
 def stop() -> None:
     """Cancel all; the session forgets what they make."""
-    for name in list(session.preparing):
-        session.stop_preparing(name)
+    session.stop_preparing_all()
     _then.clear()
     if bpy.app.timers.is_registered(look):
         bpy.app.timers.unregister(look)

@@ -73,7 +73,7 @@ class Session:
     def doubt(self) -> None:
         """Anything in the file may have changed: look before use."""
         self.doubtful.update(self.hairs)
-        self._stop_preparing_all()
+        self.stop_preparing_all()
         self.weights.clear()
         self.chains.clear()
 
@@ -90,13 +90,13 @@ class Session:
         self.failed.discard(name)
         self.readers.pop(name, None)
         self.chains.pop(name, None)
-        self._stop_preparing_all()
+        self.stop_preparing_all()
         self.hairs.clear()
         self.messages.pop(name, None)
 
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on goes."""
-        self._stop_preparing_all()
+        self.stop_preparing_all()
         self.__init__()
 
     def stop_preparing(self, name: str) -> None:
@@ -105,7 +105,8 @@ class Session:
         if job is not None:
             job.cancel()
 
-    def _stop_preparing_all(self) -> None:
+    def stop_preparing_all(self) -> None:
+        """Cancel every thread that prepares hair."""
         for name in list(self.preparing):
             self.stop_preparing(name)
 

@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import sizes
 
 from .border import Border, first_line
 from .stage import Shot, StageGroom
@@ -154,7 +155,7 @@ def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
 
 def _unit(item: StageGroom) -> float:
     """Length of a unit of the prim's own space [m]."""
-    return float(np.cbrt(abs(np.linalg.det(item.attachment.to_bind[:3, :3]))))
+    return float(abs(sizes(item.attachment.to_bind)))
 
 
 class _named:

@@ -10,6 +10,7 @@ from neuralocks_core.carrier import Carrier
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.locks import lock_of_roots
+from neuralocks_core.rotation import sizes
 from neuralocks_core.strands import StrandSet, strand_set
 
 from .curves import rest_points
@@ -81,7 +82,7 @@ class GroomPlacer:
         """The authored rest points (P, 3) if the groom as a whole stands where it rests."""
         home = np.linalg.inv(self.item.attachment.to_bind)
         shift = self._corners @ (to_local - home)[:3, :3].T + (to_local - home)[:3, 3]
-        scale = np.cbrt(abs(np.linalg.det(home[:3, :3])))
+        scale = abs(sizes(home))
         return rest_points(self.item.prim) if np.abs(shift).max() < STILL * scale else None
 
 

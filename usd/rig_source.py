@@ -11,6 +11,7 @@ from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
 from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import sizes
 
 from .border import Border
 from .joints import JointSource
@@ -157,7 +158,7 @@ def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) ->
             f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
             "apply or remove the negative scale"
         )
-    wanted, own = np.median(shown), np.cbrt(np.linalg.det(placed))
+    wanted, own = np.median(shown), sizes(placed)
     ratio = wanted / own
     if abs(ratio - 1) < 1e-4:
         ratio = 1.0

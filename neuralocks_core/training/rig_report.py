@@ -24,9 +24,9 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
     Returns:
         plain numbers; energies in m^2/s^2 per unit of mass, zero in the bind pose, shares in percent, depths and
         distances in millimetres. `energy`: means over the optimised poses; `excess_percent` is the network's excess
-        over direct optimisation in percent of the magnitude of the latter, `excess_of_saved_percent` in percent of what
-        that saves against hair carried rigidly, which does not depend on where the zero lies. `penetration_*`: of the vertices that lie
-        outside at rest, exact distances.
+        over direct optimisation in percent of the magnitude of the latter. `energy_excess_of_saved_percent`: the excess in
+        percent of what direct optimisation saves against hair carried rigidly, which does not depend on where the
+        zero lies. `penetration_*`: of the vertices that lie outside at rest, exact distances.
     """
     say = progress or (lambda done, total, message: None)
     pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)
@@ -49,8 +49,8 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
         report["energy_collision"][name] = float(collision.mean())
     best = report["energy"]["optimised"]
     report["energy"]["excess_percent"] = 100 * (report["energy"]["network"] - best) / max(abs(best), 1e-9)
-    saved = max(report["energy"]["rigid"] - best, 1e-9)
-    report["energy"]["excess_of_saved_percent"] = 100 * (report["energy"]["network"] - best) / saved
+    share = 100 / max(report["energy"]["rigid"] - best, 1e-9)
+    report["energy_excess_of_saved_percent"] = {name: share * (report["energy"][name] - best) for name in states}
     tips = {name: _ends(rig, state[few])[:, rig.chains.bone_end < 0] for name, state in states.items()}
     for name in ("network", "rigid"):
         report[f"tip_error_mm_{name}"] = 1e3 * float(np.linalg.norm(tips[name] - tips["optimised"], axis=-1).mean())

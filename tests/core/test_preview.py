@@ -52,6 +52,13 @@ def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
         assert ((reddish[..., 0] - reddish[..., 2]) > 25).mean() > 0.02
 
 
+def test_a_pixel_a_quarter_covered_takes_a_quarter_of_the_colour():
+    drawn = np.zeros((2, 2, 4), np.uint8)
+    drawn[0, 0] = 200, 100, 40, 255
+    seen = canvas._over(drawn, (1, 1), np.full((1, 1, 3), 100, np.float32))
+    np.testing.assert_allclose(seen[0, 0], [125, 100, 85], atol=1)
+
+
 def test_both_canvases_draw_the_same_picture():
     """VTK and the plain rasteriser agree on where body and hair are."""
     try:

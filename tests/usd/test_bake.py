@@ -199,6 +199,13 @@ def test_order_chunks_and_jobs_give_the_same_bytes(tmp_path, model):
         assert [a.tobytes() for a in one] == [a.tobytes() for a in other]
 
 
+def test_large_grooms_are_written_in_blocks_that_leave_no_trace(tmp_path, model, monkeypatch):
+    shot = write_shot(tmp_path, Recipe(strands=60, vertices=9))
+    whole = bake(shot, tmp_path / "bake.usdc", model).path.read_bytes()
+    monkeypatch.setattr("usd.samples.BLOCK", 100)
+    assert bake(shot, tmp_path / "bake.usdc", model).path.read_bytes() == whole
+
+
 def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
     shot = write_shot(tmp_path, Recipe(frames=30, strands=2000, vertices=16))
     out = tmp_path / "bake.usdc"

@@ -7,7 +7,7 @@ import torch
 
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
-from neuralocks_core.training.networks import StrandNet, deform
+from neuralocks_core.training.networks import RANKS, StrandNet, deform
 
 HISTORY = slice(40, 100)
 
@@ -41,6 +41,26 @@ def _frame(graph, frame):
     session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
     values = session.run(None, {"frame": frame.numpy()})
     return {output.name: torch.from_numpy(value) for output, value in zip(session.get_outputs(), values)}
+
+
+@torch.no_grad()
+def _weights_in_frame(net, part):
+    """Second and output layer's (in, out) weights where the frame's part (1, P) is this."""
+    middle, out = net.middle.weight.T.clone(), net.out.weight.T.clone()
+    if net.motion != "modulated":
+        return middle, out
+    _, one, two, *terms = part[0].split([256, 256, 256, *RANKS])
+    for weights, change, term in zip((middle, out), (net.middle_change, net.out_change), terms):
+        weights += (change.to_terms.weight.T * term) @ change.back.weight.T
+    return middle * one[:, None], out * two[:, None]
+
+
+def test_the_weights_in_a_frame_are_what_the_network_computes_with():
+    net = _net("modulated")
+    strands, frame = net.strand_part(torch.randn(9, 70)), net.frame_part(torch.randn(1, 100))
+    middle, out = _weights_in_frame(net, frame)
+    second = torch.relu(torch.relu(strands + frame[:, :256]) @ middle + net.middle.bias)
+    torch.testing.assert_close(second @ out + net.out.bias, net.tail(strands, frame), atol=1e-5, rtol=1e-4)
 
 
 def test_the_split_first_layer_is_one_linear_layer():
@@ -85,14 +105,19 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
     part = net.frame_part(frame).detach()
     np.testing.assert_allclose(inputs["frame_part"], part[:, :256], atol=close)
     # Vertices 0 and 1 are clamped, the network's answer for them is not asked for.
-    part = torch.cat([inputs["frame_part"], part[:, 256:]], 1)
-    offsets = net.tail(net.strand_part(strands), part).reshape(9, 24, 3)
-    offsets[:, :2] = 0
-    close = 1e-2 if motion == "modulated" else 1e-5
+    middle, out = _weights_in_frame(net, part)
+    out[:, :6] = 0
+    if motion == "modulated":
+        for name, weights in (("middle", middle), ("out", out)):
+            np.testing.assert_allclose(inputs[name], weights, atol=close)
+        middle, out = inputs["middle"], inputs["out"]
     anchor[:, :2] = 0
-    found = _run(graphs["tail.onnx"], **inputs)
-    np.testing.assert_allclose(found, offsets.detach().reshape(9, 72), atol=close)
-    offsets = torch.from_numpy(found).reshape(9, 24, 3)  # from here on exact in any case
+    # From here on exact: what is computed per strand and frame is stored as it is.
+    with torch.no_grad():
+        second = torch.relu(torch.relu(net.strand_part(strands) + inputs["frame_part"]) @ middle + net.middle.bias)
+        offsets = second @ out + net.out.bias * (torch.arange(72) >= 6)
+    np.testing.assert_allclose(_run(graphs["tail.onnx"], **inputs), offsets, atol=1e-5)
+    offsets = offsets.reshape(9, 24, 3)
     moved = _run(graphs["tail.onnx"], "displacement", **inputs)
     np.testing.assert_allclose(moved, deform(offsets, rest, anchor, output).detach().reshape(9, 72), atol=2e-6)
     assert strand_graphs(autoencoder, net, output) == graphs, "the same weights give the same bytes"
