@@ -9,6 +9,7 @@ import numpy as np
 
 from . import spans
 from .arclength import arc_lengths
+from .lengths import keep_lengths
 from .turning import turned
 
 if TYPE_CHECKING:
@@ -27,9 +28,9 @@ class Carrier:
 
     Where the groom's strands are the network's (24 vertices, even in arc length), the displacement is added as it is.
     Any other smooth strand's vertices are weighted means of the network's (`spans`). What is finer than the network's
-    vertices, coils say, takes the displacement of the network polyline and is turned with it (`turning`). Zero
-    displacement gives the groom's own points bit for bit, and strands that the network does not move
-    (`StrandSet.valid` false) always stay.
+    vertices, coils say, takes the displacement of the network polyline and is turned with it (`turning`). The groom's own
+    edges then get their lengths back (`lengths`). Zero displacement gives the groom's own points bit for bit, and
+    strands that the network does not move (`StrandSet.valid` false) always stay.
 
     Args:
         groom: the groom that `strands` was made of.
@@ -108,6 +109,9 @@ class Carrier:
             stop = min(start - start % self._chunk + self._chunk, last)
             moved = self._moved(np.asarray(displacement[start - first : stop - first], np.float32), start, stop)
             here = slice(self._ends[start], self._ends[stop])
+            if not self._direct:
+                smooth = ~self._blocks[start // BLOCK].fine(start % BLOCK, stop - start)
+                keep_lengths(self._groom.points[here], moved, self._groom.counts[start:stop], smooth)
             part = out[here.start - begin : here.stop - begin]
             np.add(onto[here], moved, out=part)
             if self._negative_zero:  # -0 + 0 is +0: the one value that adding nothing changes
@@ -163,7 +167,7 @@ class _Block:
             own: their own vertices.
         """
         vertices = displacement.shape[1]
-        fine = self._fine[start : start + len(displacement)]
+        fine = self.fine(start, len(displacement))
         coils = slice(*np.searchsorted(self._own, (own.start, own.stop))) if len(self._own) else slice(0, 0)
         if fine.all():
             return self._turned(displacement, self._rest[start : start + len(fine)], start, coils)
@@ -186,6 +190,10 @@ class _Block:
             rest = self._rest[start : start + len(fine)][fine]
             result[self._own[coils] - own.start] = self._turned(displacement[fine], rest, start, coils)
         return result
+
+    def fine(self, start: int, count: int) -> np.ndarray:
+        """(count,) bool, strands from `start` on that are finer than the network's vertices."""
+        return self._fine[start : start + count]
 
     def _turned(self, displacement: np.ndarray, rest: np.ndarray, start: int, coils: slice) -> np.ndarray:
         segment = self._segment[coils] - np.int32(self._fine[:start].sum() * displacement.shape[1])

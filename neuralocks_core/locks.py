@@ -46,22 +46,27 @@ def lock_of_roots(roots: np.ndarray, locks: int | None = None, seed: int = 0) ->
 
 
 def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
-    """Mean code of each strand's lock (z_lock of the paper, section 4.1).
+    """Mean code of each strand's lock (z_lock of the paper, section 4.1): `lock_means`, (S, D)."""
+    return lock_means(codes, lock, valid)[lock]
+
+
+def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
+    """Means over the strands of each lock.
 
     Args:
-        codes: (S, D) strand codes.
+        values: (S, D) of each strand.
         lock: (S,) int lock of each strand.
         valid: (S,) bool, strands that count; a lock without any takes the mean over its placeholders.
 
     Returns:
-        (S, D) float32.
+        (L, D) float32.
     """
     weight = np.ones(len(lock)) if valid is None else np.where(valid, 1.0, 1e-6)
     share = np.bincount(lock, weight)
     mean = np.stack(
-        [np.bincount(lock, weight * column) for column in np.asarray(codes, np.float64).T], axis=1
+        [np.bincount(lock, weight * column) for column in np.asarray(values, np.float64).T], axis=1
     )
-    return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)[lock]
+    return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)
 
 
 def neighbours(

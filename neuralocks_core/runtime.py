@@ -10,13 +10,14 @@ cores each at one of its own.
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
+from neuralocks_core.clumping import COLUMN, Locks, spread
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.locks import lock_codes
 from neuralocks_core.motion import Clip
@@ -128,13 +129,14 @@ class StrandSession:
 
         Costs one inference, and nothing when the vector is the one already in use.
         """
+        vector, _ = self._without_clumping(vector)
         if not self.model.anchored or (
             self._anchored_at is not None and np.array_equal(vector, self._anchored_at)
         ):
             return
         self._anchor[:] = 0
-        self._anchor[:] = self._tail("offsets", vector)
-        self._anchored_at = np.array(vector)
+        self._anchor[:] = self._tail("offsets", self.model.frame(vector))
+        self._anchored_at = vector
 
     def displacement(
         self, vector: np.ndarray, strands: slice = slice(None), out: np.ndarray | None = None
@@ -143,14 +145,36 @@ class StrandSession:
 
         Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
         """
-        result = self._tail("displacement", vector, strands, out)
+        frame, gather = self._frame(vector)
+        result = self._tail("displacement", frame, strands, out, gather)
         still = ~self.strands.valid[strands]
         if still.any():
             result[still] = 0
         return result.reshape(len(result), K, 3)
 
-    def _tail(self, output, vector, strands: slice = slice(None), out=None) -> np.ndarray:
-        frame = self.model.frame(vector)
+    def _frame(self, vector: np.ndarray):
+        """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
+        plain, clumping = self._without_clumping(vector)
+        if not clumping:
+            return self.model.frame(plain), None
+        locks, session = self._locks
+        if self._anchored_at is not None:
+            session.anchor(self._anchored_at)
+        gather = partial(locks.gather, led=session.displacement(plain), factor=spread(clumping))
+        return self.model.frame(plain), gather
+
+    def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
+        """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
+        plain, column = np.array(vector, np.float32), self.model.spec.slices["material"].start + COLUMN
+        clumping, plain[column] = float(plain[column]), 0.0
+        return plain, clumping
+
+    @cached_property
+    def _locks(self) -> tuple[Locks, "StrandSession"]:
+        locks = Locks.of(self.strands)
+        return locks, self.model.prepare(locks.strands)
+
+    def _tail(self, output, frame, strands: slice = slice(None), out=None, gather=None) -> np.ndarray:
         start, stop, _ = strands.indices(len(self.strands.rest))
         result = (
             np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
@@ -161,6 +185,8 @@ class StrandSession:
         # end: the sums in a matrix product may depend on its height, and a bake must not depend on its split.
         def work(chunk: slice) -> None:
             values = self._chunk(output, chunk, frame)
+            if gather is not None:
+                gather(values, chunk)
             a, b = max(chunk.start, start), min(chunk.stop, stop)
             result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
 
@@ -171,10 +197,12 @@ class StrandSession:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
         computed it and still has it in its cache.
         """
-        frame, valid = self.model.frame(vector), self.strands.valid
+        (frame, gather), valid = self._frame(vector), self.strands.valid
 
         def work(chunk: slice) -> None:
             values = self._chunk("displacement", chunk, frame)
+            if gather is not None:
+                gather(values, chunk)
             if not valid[chunk].all():
                 values[~valid[chunk]] = 0
             function(chunk, values.reshape(-1, K, 3))

@@ -25,6 +25,8 @@ MARGIN = 0.004
 """[m] Distance to the body that the solver keeps, and below which the collision term acts."""
 STILL = 0.01
 """Motion, in strand lengths, below which a strand counts as standing."""
+TOGETHER = 0.003
+"""Distance, in strand lengths, below which the hairs of a lock count as one."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,10 @@ class RegressionOptions:
         strands: strands from each.
         rate: first step size, falling along a cosine.
         optimiser: "muon" for the weight matrices (AdamW for the rest), or "adamw" for all.
-        velocity: weight of the frame difference against the position, both in strand lengths.
+        position: weight of the position error, in strand lengths.
+        velocity: weight of the error of frame differences, in strand lengths.
         swing: weight of the error about its mean over a strand's moments, relative to the strand's own motion.
+        parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
         collision: weight of the depth under the target's body plane, in strand lengths.
         output: "direction" or "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
@@ -56,9 +60,11 @@ class RegressionOptions:
     strands: int = 8
     rate: float = 2e-3
     optimiser: str = "muon"
+    position: float = 3.0
     velocity: float = 6.0
     swing: float = 0.4
-    collision: float = 30.0
+    parting: float = 0.3
+    collision: float = 45.0
     output: str = "direction"
     motion: str = "modulated"
     static: bool = False
@@ -166,10 +172,11 @@ def regress(
 
 
 def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
-    """Weighted losses of a batch, each a mean in units of strand length, `swing` a ratio.
+    """Weighted losses of a batch, each a mean in units of strand length, `swing` and `parting` ratios.
 
     `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
-    that motion, so that small motion counts as much as large, `collision` how far x lies under the plane of the body
+    that motion, so that small motion counts as much as large, `parting` how wrong it is which way the strands of a lock
+    part, relative to how far they do, `collision` how far x lies under the plane of the body
     next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
@@ -181,16 +188,20 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     position = _norm(error) / length
     pairs = error.unflatten(1, (-1, 2))
     velocity = _norm(pairs[:, :, 1] - pairs[:, :, 0]) / length
-    true_swing = _spread(batch["moved"]) + STILL**2 * batch["length"].square()
-    swing = (_spread(error) / true_swing + 1e-6).sqrt()  # smooth at zero
+    squared = batch["length"].square()
+    true_swing = _spread(batch["moved"], 1).mean((1, 3)) + STILL**2 * squared
+    swing = (_spread(error, 1).mean((1, 3)) / true_swing + 1e-6).sqrt()  # smooth at zero
+    true_parting = _spread(batch["moved"], 2).mean((1, 2, 3)) + TOGETHER**2 * squared.mean(1)
+    parting = (_spread(error, 2).mean((1, 2, 3)) / true_parting + 1e-6).sqrt()
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
     target = (normals * batch["moved"]).sum(-1) - offset
     depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
     depth = torch.where(offset > -100, depth, torch.zeros_like(depth))
     return {
-        "position": position.mean(),
+        "position": options.position * position.mean(),
         "velocity": options.velocity * velocity.mean(),
         "swing": options.swing * swing.mean(),
+        "parting": options.parting * parting.mean(),
         "collision": options.collision * (depth / length).mean(),
     }
 
@@ -217,9 +228,9 @@ def predicted(
     return result
 
 
-def _spread(vectors: Tensor) -> Tensor:
-    """(M, n) mean square of (M, moments, n, 24, 3) about the mean over moments."""
-    return (vectors - vectors.mean(1, keepdim=True)).square().sum(-1).mean((1, 3))
+def _spread(vectors: Tensor, axis: int) -> Tensor:
+    """Squared distance (M, moments, n, 24) of (M, moments, n, 24, 3) from its mean over an axis."""
+    return (vectors - vectors.mean(axis, keepdim=True)).square().sum(-1)
 
 
 def _norm(vectors: Tensor) -> Tensor:

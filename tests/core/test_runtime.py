@@ -10,6 +10,7 @@ import pytest
 
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.clumping import COLUMN, spread
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.runtime import StrandModel, strand_inputs
@@ -21,6 +22,7 @@ from neuralocks_core.training.export import strand_graphs  # noqa: E402
 from neuralocks_core.training.networks import StrandNet, deform  # noqa: E402
 
 SPEC = BoundarySpec()
+CLUMPING = SPEC.slices["material"].start + COLUMN
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +55,7 @@ def strands():
 
 def test_split_inference_equals_the_whole_network(path, net, strands):
     vector, bind = np.random.default_rng(1).normal(size=(2, SPEC.size)).astype(np.float32)
+    vector[CLUMPING] = bind[CLUMPING] = 0
     session = StrandModel.load(path).prepare(strands)
     session.anchor(bind)
     with torch.no_grad():
@@ -76,6 +79,37 @@ def test_the_held_bind_pose_is_exactly_the_groom(path, strands):
     session = StrandModel.load(path).prepare(strands)
     session.anchor(bind)
     assert not session.displacement(bind).any()
+
+
+def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
+    """How far they stray follows the law that is stated; the lock's own way does not change, the held bind pose is the
+    groom whatever the clumping, and lengths are kept."""
+    if path.stem == "displacement":
+        pytest.skip("hair that stretches has no lengths to keep")
+    rng = np.random.default_rng(5)
+    vector, bind = (0.3 * rng.normal(size=(2, SPEC.size))).astype(np.float32)
+    session = StrandModel.load(path).prepare(strands)
+    ways, strays = [], []
+    counts = np.bincount(strands.lock)[strands.lock][:, None, None]
+    for ratio in (-1.0, 0.0, 1.0):
+        vector[CLUMPING] = bind[CLUMPING] = ratio
+        session.anchor(bind)
+        assert not session.displacement(bind).any()
+        moved = session.displacement(vector)
+        chunks = np.empty_like(moved)
+        session.each(vector, chunks.__setitem__)
+        assert chunks.tobytes() == moved.tobytes()
+        if ratio:
+            lengths = [np.linalg.norm(np.diff(x, axis=1), axis=2) for x in (strands.rest, strands.rest + moved)]
+            np.testing.assert_allclose(*lengths, atol=1e-6)
+        way = np.zeros((strands.lock.max() + 1, *moved.shape[1:]))
+        np.add.at(way, strands.lock, moved / counts)
+        ways.append(way)
+        strays.append(np.sqrt(np.square(moved - way[strands.lock]).mean()))
+    assert spread(-1.0) > strays[0] / strays[1] > 1.1
+    assert spread(1.0) < strays[2] / strays[1] < 0.9
+    apart = [np.sqrt(np.square(way - ways[1]).mean()) for way in ways]
+    assert max(apart) < 0.5 * np.sqrt(np.square(ways[1]).mean())
 
 
 def test_lengths_are_kept(path, strands):

@@ -9,6 +9,7 @@ from neuralocks_core.arclength import arc_lengths
 from neuralocks_core.carrier import Carrier
 from neuralocks_core.centreline import centre_lines
 from neuralocks_core.groom import Groom
+from neuralocks_core.lengths import keep_lengths
 from neuralocks_core.spans import LEFT_OVER
 from neuralocks_core.strands import K, root_frames, root_uv, scalp_local, strand_set
 
@@ -98,13 +99,15 @@ def test_rigid_motion_is_carried_exactly(make):
     moves = strands.valid[groom.strand_of_point]
     expected = np.where(moves[:, None], (groom.points - ORIGIN) @ turn.T + shift + ORIGIN, groom.points)
     # The smallest rotation of a segment may differ from the turn by a twist about it: own vertices off the
-    # polyline may end on the other side of it, but as far from it. Means of the network's vertices follow exactly but
-    # for what they leave over, and but for the first segment, which the network never moves.
+    # polyline may end on the other side of it, but as far from it, and a little further for keeping their distance to
+    # each other. Means of the network's vertices follow exactly but for what they leave over, and but for the first
+    # segment, which the network never moves.
     off = np.linalg.norm(carried - expected, axis=1)
     fine = np.concatenate([block._fine for block in carrier._blocks])[groom.strand_of_point]
     residual = np.concatenate([block._residual for block in carrier._blocks])
-    assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(residual, axis=1)).all()
     arc, length = arc_lengths(groom)
+    further = 0.02 * length[groom.strand_of_point][fine]
+    assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(residual, axis=1) + further).all()
     beyond = ~fine & (arc * (K - 1) >= length[groom.strand_of_point])
     assert (off[beyond] <= 2e-6 + 1.2 * LEFT_OVER).all()
     assert beyond.any() or make is coil_groom
@@ -131,7 +134,7 @@ def test_corners_of_a_smooth_groom_turn_with_it():
     carried = carrier.carry((moved - strands.rest).astype(np.float32)).reshape(20, 16, 3)
     before = np.linalg.norm(np.diff(groom.points.reshape(20, 16, 3), axis=1), axis=2)
     after = np.linalg.norm(np.diff(carried, axis=1), axis=2)
-    assert np.abs(after / before - 1.0).max() < 0.01
+    assert np.abs(after / before - 1.0).max() < 1e-4
 
 
 def test_a_bent_coil_stays_a_coil():
@@ -156,10 +159,31 @@ def test_a_bent_coil_stays_a_coil():
     carried = Carrier(groom, strands).carry(moved - strands.rest).reshape(20, -1, 3)
     before = np.linalg.norm(np.diff(groom.points.reshape(20, -1, 3), axis=1), axis=2)
     after = np.linalg.norm(np.diff(carried, axis=1), axis=2)
-    assert np.abs(after / before - 1.0).max() < 0.15  # nowhere torn
-    assert np.abs(after / before - 1.0).mean() < 0.02
-    # Displacement alone, without turning what lies off the polyline, would not keep them.
-    assert np.abs(after.sum(axis=1) / before.sum(axis=1) - 1.0).max() < 0.01
+    assert np.abs(after / before - 1.0).max() < 1e-3  # nowhere torn
+    # It still winds around the line that the network's vertices draw.
+    ends = moved[:, -1] + ORIGIN
+    assert np.linalg.norm(carried[:, -1] - ends, axis=1).max() < 0.02 * length.sum(axis=1).max()
+
+
+def test_any_strand_keeps_its_lengths_and_its_root():
+    """Strands of 1 to 300 vertices, some of them doubled, in one call."""
+    rng = np.random.default_rng(0)
+    counts = rng.integers(1, 300, 40)
+    rest = (rng.normal(size=(counts.sum(), 3)) * 0.01).astype(np.float32)
+    rest[5] = rest[4]
+    moved = (rng.normal(size=rest.shape) * 0.02).astype(np.float32)
+    together, alone = moved.copy(), moved.copy()
+    smooth = rng.random(len(counts)) < 0.5
+    keep_lengths(rest, together, counts, smooth)
+    starts = np.cumsum(counts) - counts
+    for i, (start, count) in enumerate(zip(starts, counts)):
+        here = slice(start, start + count)
+        keep_lengths(rest[here], alone[here], counts[i : i + 1], smooth[i : i + 1])
+    assert together.tobytes() == alone.tobytes()
+    assert np.array_equal(together[starts], moved[starts])
+    inner = np.setdiff1d(np.arange(len(rest) - 1), starts[1:] - 1)
+    lengths = [np.linalg.norm(np.diff(points.astype(float), axis=0), axis=1)[inner] for points in (rest, rest + together)]
+    np.testing.assert_allclose(*lengths, atol=1e-6)
 
 
 def test_chunks_and_slices_give_the_whole():
