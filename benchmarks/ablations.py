@@ -42,6 +42,7 @@ ROWS = {
     "head's velocity instead of effective gravity": {"spec": replace(SPEC, linear="velocity")},
     "no head translation (paper)": {"spec": replace(SPEC, linear="none")},
     "no loss relative to the strand's motion": {"options": {"swing": 0.0}},
+    "no loss relative to how the hairs of a lock part": {"options": {"parting": 0.0}},
     "no velocity loss": {"options": {"velocity": 0.0}},
     "no collision loss": {"options": {"collision": 0.0}},
 }

@@ -28,8 +28,8 @@ class Carrier:
 
     Where the groom's strands are the network's (24 vertices, even in arc length), the displacement is added as it is.
     Any other smooth strand's vertices are weighted means of the network's (`spans`). What is finer than the network's
-    vertices, coils say, takes the displacement of the network polyline and is turned with it (`turning`). The groom's own
-    edges then get their lengths back (`lengths`). Zero displacement gives the groom's own points bit for bit, and
+    vertices, coils say, takes the displacement of the network polyline and is turned with it (`turning`). The groom's
+    own edges then get their lengths back (`lengths`). Zero displacement gives the groom's own points bit for bit, and
     strands that the network does not move (`StrandSet.valid` false) always stay.
 
     Args:

@@ -12,8 +12,8 @@ TINY = np.float32(1e-24)
 def keep_lengths(rest: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth: np.ndarray) -> None:
     """Change displacements so that no edge is longer or shorter than at rest.
 
-    From the root on, each edge keeps about the direction it was moved to, and the hair its way. Where nothing is moved nothing changes, bit for
-    bit, and a strand depends on itself alone.
+    From the root on, each edge keeps about the direction it was moved to, and the hair its way. Where nothing is moved
+    nothing changes, bit for bit, and a strand depends on itself alone.
 
     Args:
         rest: (P, 3) float32 [m] vertices of consecutive strands.

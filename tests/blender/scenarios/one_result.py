@@ -20,7 +20,7 @@ def one_result(folder: Path) -> None:
     scenes.constrain(rig)
     strands = scenes.hair(rig, 80)
     strands.scale = (1.2, 1.0, 0.8)  # unapplied
-    make_live(rig, strands, bend=2.0, weight=1.3, motion=0.8)
+    make_live(rig, strands, bend=2.0, weight=1.3, clumping=2.0, motion=0.8)
     scene = bpy.context.scene
     rng = np.random.default_rng(0)
     frames = [int(f) for f in rng.permutation(np.arange(1, 25))]
@@ -36,7 +36,7 @@ def one_result(folder: Path) -> None:
 
     from usd.bake import bake
 
-    words = ["bend=2x", "weight=1.3x", "damping=1x", "clumping=1x"]
+    words = ["bend=2x", "weight=1.3x", "damping=1x", "clumping=2x"]
     bake(folder / "bake_shot.usdc", folder / "again.usdc", MODEL, material=words, strength=0.8)
     for f in frames[:6]:
         a, b = (baked_points(folder / name, "/Character/Hair_Hair", f) for name in ("bake.usdc", "again.usdc"))
