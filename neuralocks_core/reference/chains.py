@@ -181,8 +181,7 @@ def _plane_distance(spheres, points, normals):
 
 
 def _between(a, b, share):
-    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations the nearest to the blend of the matrices.
-    """
+    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations the nearest to the blend of the matrices."""
     if share >= 1:
         return b
     result = (1 - share) * a + share * b

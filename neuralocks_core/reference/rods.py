@@ -154,9 +154,7 @@ def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
             value = getattr(material, name, default)
         value = np.asarray(value, np.float64)
         if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
-            raise NeuralocksError(
-                f"material {name}: give a number of at least 0, or one for each of {strands} strands"
-            )
+            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
         found[name] = np.broadcast_to(value, (strands,)).copy()
     return found
 

@@ -33,7 +33,7 @@ class Stepper:
         device: str,
     ):
         self.wp = wp = start_warp(device)
-        from neuralocks_core.reference import banded_kernels, rod_kernels, step_kernels
+        from neuralocks_core.reference import banded_kernels, energy_kernels, rod_kernels, step_kernels
 
         self.rod_kernels, self.kernels = rod_kernels, step_kernels
         self.device = wp.get_device(device)
@@ -42,7 +42,7 @@ class Stepper:
         self.gravity = wp.vec3d(0.0, -gravity, 0.0)
         self.rest = self._vectors(rods.points)
         self.support = self._vectors(rods.support * (gravity / 9.81))
-        self.constants = rod_kernels.Rods()
+        self.constants = energy_kernels.Rods()
         self.constants.length = self._reals(rods.length)
         self.constants.mass = self._reals(rods.mass)
         self.constants.curl = self._vectors(rods.curl)
@@ -87,9 +87,7 @@ class Stepper:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
         wp = self.wp
         self.body = wp.array(self._body_points(bind), dtype=wp.vec3, device=self.device)
-        faces = wp.array(
-            np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device
-        )
+        faces = wp.array(np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device)
         self.mesh = wp.Mesh(points=self.body, indices=faces)
         self._pose(np.array([0, 0, 0, 1]), np.zeros(3))
         self._body_in_head, self.drift = np.asarray(bind, float), 0.0
@@ -221,9 +219,7 @@ class Stepper:
     def _body_points(self, points: np.ndarray) -> np.ndarray:
         points = np.ascontiguousarray(points, np.float32)
         if self.mesh is not None and points.shape != self.body.shape + (3,):
-            raise NeuralocksError(
-                f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}"
-            )
+            raise NeuralocksError(f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}")
         if not np.isfinite(points).all():
             raise NeuralocksError("body: holds values that are not finite; check its skinning")
         return points
@@ -232,9 +228,7 @@ class Stepper:
         return self.wp.zeros(shape, dtype=dtype, device=self.device)
 
     def _vectors(self, values: np.ndarray) -> object:
-        return self.wp.array(
-            np.ascontiguousarray(np.swapaxes(values, 0, 1)), dtype=self.wp.vec3d, device=self.device
-        )
+        return self.wp.array(np.ascontiguousarray(np.swapaxes(values, 0, 1)), dtype=self.wp.vec3d, device=self.device)
 
     def _reals(self, values: np.ndarray) -> object:
         return self.wp.array(np.ascontiguousarray(values.T), dtype=self.wp.float64, device=self.device)

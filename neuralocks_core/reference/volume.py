@@ -86,9 +86,7 @@ def rounded(x: array_vec, points: wp.array2d(dtype=wp.vec3)):
 
 
 @wp.kernel(enable_backward=False)
-def densities(
-    grid: wp.uint64, points: wp.array(dtype=wp.vec3), mass: array_real, x: array_vec, density: array_real
-):
+def densities(grid: wp.uint64, points: wp.array(dtype=wp.vec3), mass: array_real, x: array_vec, density: array_real):
     """rho_i = sum_j m_j W(|x_i - x_j|), itself included."""
     k, s = wp.tid()
     p = x[k, s]

@@ -58,9 +58,7 @@ def simulate_xpbd(
     from neuralocks_core.reference import xpbd_kernels as kernels
 
     def vectors(values):
-        return wp.array(
-            np.ascontiguousarray(np.swapaxes(values, 0, 1), np.float32), dtype=wp.vec3, device=device
-        )
+        return wp.array(np.ascontiguousarray(np.swapaxes(values, 0, 1), np.float32), dtype=wp.vec3, device=device)
 
     def reals(values):
         return wp.array(np.ascontiguousarray(values.T, np.float32), dtype=wp.float32, device=device)
@@ -95,9 +93,7 @@ def simulate_xpbd(
         start, faces = check_body(body, triangles, frames)
         bind = (start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body)
         surface = wp.array(bind.astype(np.float32), dtype=wp.vec3, device=device)
-        mesh = wp.Mesh(
-            points=surface, indices=wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device=device)
-        )
+        mesh = wp.Mesh(points=surface, indices=wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device=device))
         still = (wp.quat_identity(), wp.vec3(), wp.quat_identity(), wp.vec3())
         run(kernels.look, shape, mesh.id, REACH, *still, home, plane)
         near = np.swapaxes(plane.numpy(), 0, 1)
