@@ -25,8 +25,7 @@ from neuralocks_core.strands import K, StrandSet, scalp_local
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
-so that
-results do not depend on the machine."""
+so that results do not depend on the machine."""
 
 
 class StrandModel:
@@ -180,9 +179,8 @@ class StrandSession:
             np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
         )
 
-        # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the
-        # groom's
-        # end: the sums in a matrix product may depend on its height, and a bake must not depend on its split.
+        # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the groom's end: the
+        # sums in a matrix product may depend on its height, and a bake must not depend on its split.
         def work(chunk: slice) -> None:
             values = self._chunk(output, chunk, frame)
             if gather is not None:

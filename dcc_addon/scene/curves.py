@@ -109,8 +109,7 @@ def _make_poly(data) -> None:
         data.set_types(type="POLY")
         return
     # Blender 4.2 keeps count of the types and is not told when the attribute `curve_type` is written: it then writes
-    # beyond its arrays. One
-    # evaluated point a segment draws the same.
+    # beyond its arrays. One evaluated point a segment draws the same.
     data.attributes.new("resolution", "INT", "CURVE").data.foreach_set("value", np.ones(len(data.curves), np.int32))
 
 
