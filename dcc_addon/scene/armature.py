@@ -9,7 +9,8 @@ from ..services.rig import RigArrays
 
 def matrix(value) -> np.ndarray:
     """A Blender matrix as (4, 4) float64."""
-    return np.array(value, float)
+    # Row by row: numpy asks a whole one for its shape value by value.
+    return np.array([row[:] for row in value])
 
 
 def read(armature, head_bone: str = "") -> RigArrays:

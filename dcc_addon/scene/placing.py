@@ -5,6 +5,8 @@ import json
 
 import numpy as np
 
+from .armature import matrix
+
 
 def bind_place(hair, armature, sampled) -> np.ndarray:
     """World transform (4, 4) of the hair object in the bind pose.
@@ -25,8 +27,8 @@ def world(thing, graph) -> np.ndarray:
     """
     evaluated = thing.evaluated_get(graph)
     if evaluated.is_evaluated:
-        return np.array(evaluated.matrix_world, float)
-    own, parent = np.array(thing.matrix_basis, float), thing.parent
+        return matrix(evaluated.matrix_world)
+    own, parent = matrix(thing.matrix_basis), thing.parent
     if parent is None:
         return own
     place = world(parent, graph)
@@ -35,8 +37,8 @@ def world(thing, graph) -> np.ndarray:
     if bone is not None:  # bone parents count from the tail
         tail = np.eye(4)
         tail[1, 3] = bone.bone.length
-        place = place @ np.array(bone.matrix, float) @ tail
-    return place @ np.array(thing.matrix_parent_inverse, float) @ own
+        place = place @ matrix(bone.matrix) @ tail
+    return place @ matrix(thing.matrix_parent_inverse) @ own
 
 
 def mute_deformers(hair) -> None:

@@ -77,7 +77,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
             )
         reader = reader or armature_reader.PoseReader(armature, rig.bones)
         joints[row] = reader.world(evaluated)
-        places[""][row] = evaluated.matrix_world
+        places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in tracked:
             places[other][row] = world(_found(other), graph)
         values = [body_reader.shape_values(find(body)) for body in bodies]

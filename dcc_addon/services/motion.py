@@ -59,6 +59,18 @@ def _matrices(translation, rotation, scale) -> np.ndarray:
     return result
 
 
+def _undone(similar: np.ndarray) -> np.ndarray:
+    """Inverses of transforms (T, 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS
+    threads for each 4x4, in Blender's Python a quarter of the time that playing the frames takes.
+    """
+    linear = similar[:, :3, :3]
+    result = np.zeros_like(similar)
+    result[:, :3, :3] = linear.swapaxes(1, 2) / np.square(linear[:, :, :1]).sum(axis=1, keepdims=True)
+    result[:, :3, 3:] = -result[:, :3, :3] @ similar[:, :3, 3:]
+    result[:, 3, 3] = 1
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """What was sampled of one armature, in Blender's world space and unit.
@@ -98,7 +110,7 @@ class Motion:
         translation, scale = (np.empty((*joints.shape[:2], 3), np.float32) for _ in range(2))
         rotation = np.empty((*joints.shape[:2], 4), np.float32)
         for joint, parent in enumerate(parents):
-            local = joints[:, joint] if parent < 0 else np.linalg.inv(stored[:, parent]) @ joints[:, joint]
+            local = joints[:, joint] if parent < 0 else _undone(stored[:, parent]) @ joints[:, joint]
             size = np.cbrt(np.linalg.det(local[:, :3, :3]))
             translation[:, joint] = local[:, :3, 3]
             rotation[:, joint] = to_quaternion(local[:, :3, :3] / size[:, None, None])
