@@ -7,7 +7,7 @@ import numpy as np
 
 from ..services import names
 from ..services.axes import to_core
-from ..services.rig import joint_weights, shape_names
+from ..services.rig import joint_weights, shape_names, skin
 from . import body as body_reader
 from . import curves
 from .placing import bind_place
@@ -54,12 +54,9 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     labels_of_shapes = iter(shape_names(bodies))
     skins = []
     for arrays, label in zip(bodies, names.unique([f"Body_{b.name}" for b in bodies]), strict=True):
-        place = motion.places[arrays.name][0]
-        shapes = {next(labels_of_shapes): offsets @ place[:3, :3].T for offsets in arrays.shapes.values()}
-        indices, weights = joint_weights(arrays, rig.bones)
-        triangles = arrays.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else arrays.triangles
-        points = arrays.points @ place[:3, :3].T + place[:3, 3]
-        skins.append(SkinArrays(label, points, triangles, indices, weights, shapes))
+        points, triangles, shapes = skin(arrays, motion.places[arrays.name][0])
+        shapes = {next(labels_of_shapes): offsets for offsets in shapes.values()}
+        skins.append(SkinArrays(label, points, triangles, *joint_weights(arrays, rig.bones), shapes))
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:

@@ -121,7 +121,7 @@ def character(
     core = to_core(metres)
     humanoid = rig.humanoid()
     skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
-    parts = [_body(body, core @ body_place, rig.bones) for body, body_place in bodies]
+    parts = [_body(body, body_place, core, rig.bones) for body, body_place in bodies]
     return Character(skeleton, _merged(parts), humanoid)
 
 
@@ -138,12 +138,21 @@ def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:
     return bind @ trim_of(bind, rig.name)
 
 
-def _body(body: BodyArrays, matrix: np.ndarray, bones: tuple[str, ...]) -> Body:
-    # The float32 of a stage's points, so that a body measured here and in the exported stage is the same one.
-    points = transformed(body.points, matrix)
-    shapes = {name: offsets @ matrix[:3, :3].T for name, offsets in body.shapes.items()}
-    triangles = body.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else body.triangles
-    return Body(points, triangles, *joint_weights(body, bones), shapes)
+def skin(body: BodyArrays, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Points (V, 3) float32, triangles (F, 3) and shape key offsets (V, 3) float32 of a body that stands at `place`, in
+    Blender's world: what an exported stage stores.
+
+    Pushing hair out of a body is not continuous: one that differs in its seventh digit moves a strand by centimetres.
+    """
+    points = transformed(body.points, place).astype(np.float32)
+    shapes = {name: (offsets @ place[:3, :3].T).astype(np.float32) for name, offsets in body.shapes.items()}
+    return points, body.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else body.triangles, shapes
+
+
+def _body(body: BodyArrays, place: np.ndarray, core: np.ndarray, bones: tuple[str, ...]) -> Body:
+    points, triangles, shapes = skin(body, place)
+    shapes = {name: offsets @ core[:3, :3].T for name, offsets in shapes.items()}
+    return Body(transformed(points, core), triangles, *joint_weights(body, bones), shapes)
 
 
 def shape_names(bodies: Sequence[BodyArrays]) -> list[str]:

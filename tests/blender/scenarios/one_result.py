@@ -60,6 +60,12 @@ def out_of_the_body(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
     for f, points in shown.items():
         assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", f), points) < SAME
+    # A body that differs in its seventh digit pushes some strand elsewhere.
+    from dcc_addon.session import session
+    from usd.stage import read_shot
+
+    read = read_shot(folder / "out_shot.usdc").grooms[0].attachment.character
+    assert np.array_equal(read.body.points, session.rigs["Rig"].character.body.points)
 
     strands.neuralocks_hair.resolve = False
     assert apart(points_at(strands, 2), free[2]) == 0.0
