@@ -47,7 +47,7 @@ def at_once(graph) -> bool:
 
 def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     armature = hair.neuralocks_hair.armature
-    if armature is None or armature.name_full not in scene.objects:
+    if armature is None or armature.name not in scene.objects:
         raise NeuralocksError(
             f"{hair.name_full}: it has no armature in this scene; choose the armature of the character"
         )

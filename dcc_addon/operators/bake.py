@@ -95,7 +95,7 @@ def bake_steps(context, armature, hairs, path: str):
             )
         )
         yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
-        baked |= {h.name_full: (str(out), prims[h.name]) for h in group}
+        baked |= {h.name_full: (str(out), prims[h.name_full]) for h in group}
     return baked
 
 

@@ -93,6 +93,7 @@ def linked(folder: Path) -> None:
     message = next(text for name, text in messages().items() if "Hair" in name)
     assert "linked" in message and "Make Local" in message, messages()
     strands.neuralocks_hair.live = False
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "linked.usdc")) == {"FINISHED"}
     for refused in (bpy.ops.neuralocks.bake_attach, bpy.ops.neuralocks.assign):
         try:
             refused()
