@@ -108,7 +108,9 @@ class RolloutBank:
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Random strands of one material: they share the frame's part of the first layer."""
+        """Random strands of one material, which each lock has its own of: they share the frame's part of the first layer,
+        and how they part from each other can be compared.
+        """
         same = rollout.materials == rollout.materials[rng.integers(len(rollout.strands))]
         strands = np.flatnonzero(same.all(axis=1))
         return rng.choice(strands, count, replace=len(strands) < count)

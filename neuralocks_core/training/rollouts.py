@@ -194,7 +194,7 @@ class RolloutMaker:
         return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
-        """Indices of whole locks, cut to the scene's number of strands; locks beyond 16 strands give a neighbourhood.
+        """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood.
         """
         groom, usable = self.scene.grooms[which], self._usable[which]
         chosen: list[int] = []

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
@@ -77,16 +78,17 @@ def train_strands(
     saved = work / "checkpoint.npz"
     if resume and not saved.exists():
         raise NeuralocksError(f"{work}: there is no checkpoint to resume; train without --resume")
-    if not resume and work.exists():
-        shutil.rmtree(work)
+    if not resume:
+        _discard(work)
     if not any(groom.valid.any() for groom in scene.grooms):
         raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
-    torch.set_num_threads(max(1, torch.get_num_threads() - processes))
     report = _Reporter(progress)
     scene_out = replace(scene, held_out=True)
     count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
+    processes = processes if count else 0
     with (
-        RolloutFarm(scene, work / "rollouts", count, processes if count else 0) as farm,
+        _threads_beside(processes),
+        RolloutFarm(scene, work / "rollouts", count, processes) as farm,
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
         coder = _coder(scene, work, options, report)
@@ -135,10 +137,7 @@ def train_strands(
         "minutes": round(meta["seconds"] / 60, 1),
         "steps": meta["step"],
         **teacher.card(),
-        "strands": [int(groom.valid.sum()) for groom in scene.grooms],
-        "strand code error [mm]": round(
-            float(np.mean([1e3 * coder.errors(scalp_local(g)[g.valid]).mean() for g in scene.grooms])), 2
-        ),
+        **_inputs_of(scene, coder),
         "options": asdict(options, dict_factory=_plain),
         "curve": meta["curve"],
     }
@@ -154,7 +153,7 @@ def train_strands(
     }
     path = model.write(out, description, strand_graphs(coder, net, options.output))
     if not keep_work:
-        shutil.rmtree(work, ignore_errors=True)
+        _discard(work)
     return path
 
 
@@ -167,6 +166,37 @@ class _Reporter:
     def __call__(self, done: float, message: str) -> None:
         if self._progress:
             self._progress(int(1000 * done), 1000, message)
+
+
+def _discard(work: Path) -> None:
+    """Remove what trainings leave in a folder, and the folder where nothing else is in it."""
+    for name in ("rollouts", "held_out"):
+        shutil.rmtree(work / name, ignore_errors=True)
+    for name in ("checkpoint", "codes"):
+        for suffix in (".npz", ".tmp"):
+            (work / name).with_suffix(suffix).unlink(missing_ok=True)
+    if work.is_dir() and not any(work.iterdir()):
+        work.rmdir()
+
+
+@contextmanager
+def _threads_beside(processes: int) -> Iterator[None]:
+    """Leave a core to each process that makes rollouts."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(max(1, before - processes))
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder) -> dict:
+    """For the card: strands of each groom, and how well their codes tell them."""
+    errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]
+    return {
+        "strands": [int(groom.valid.sum()) for groom in scene.grooms],
+        "strand code error [mm]": round(float(np.mean(errors)), 2),
+    }
 
 
 def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
