@@ -45,7 +45,6 @@ def simulated(
     *,
     substeps: int = 1,
     volume: float = 0.0,
-    resolver: Resolver | None = None,
     progress=None,
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
@@ -60,7 +59,6 @@ def simulated(
         material: of the hair.
         substeps: of each step; more mean less numerical damping than models are trained with.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
-        resolver: of the same character, for the part of its body that the hair can reach.
         progress: called with (done, total, message).
 
     Raises:
@@ -70,7 +68,7 @@ def simulated(
 
     clock = times[0] + STEP * np.arange(int(np.ceil((times[-1] - times[0]) / STEP - 1e-9)) + 1)
     joints, shapes = clip.at(clock), clip.shape_at(clock)
-    resolver = resolver or Resolver(character, strands)
+    resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
         part = resolver.body

@@ -38,13 +38,13 @@ class Resolver:
         character: whose body the hair must stay out of; without a body nothing is done.
         strands: the groom at rest.
         clip: the motion to come. What hardly moves against the head in it is looked up in a grid made once, and blend
-            shapes that do not change in it are part of the pose at rest. Without one, the joint weights must tell.
+            shapes that do not change in it are part of the pose at rest.
 
     Attributes:
         body: the part of the body that the hair can reach, or None.
     """
 
-    def __init__(self, character: Character, strands: StrandSet, clip: Clip | None = None):
+    def __init__(self, character: Character, strands: StrandSet, clip: Clip):
         self.character, self.strands, self._clip = character, strands, clip
         self.body = None if character.body is None else _within_reach(character, strands)
 
@@ -91,8 +91,7 @@ class Resolver:
             pass
 
     def _posed(self, joints, shape, low, high) -> PosedBody:
-        constant = self._constant
-        changed = None if shape is None or constant is None else np.asarray(shape, float) - constant
+        changed = None if shape is None else np.asarray(shape, float) - self._constant
         return self._near.posed(self._skinning(joints), changed, low, high)
 
     @cached_property
@@ -107,7 +106,7 @@ class Resolver:
     def _near(self) -> NearBody:
         body, character, strands = self.body, self.character, self.strands
         still = _stands_still(character, body, self._clip)
-        if self._clip is not None and body.shapes:
+        if body.shapes:
             varies = np.ptp(self._clip.shape, axis=0) > 1e-6
             for offsets, moves in zip(body.shapes.values(), varies):
                 if moves:
@@ -119,8 +118,8 @@ class Resolver:
         return NearBody(body, np.linalg.inv(character.canonical_to_bind), still, low, high)
 
     @property
-    def _constant(self) -> np.ndarray | None:
-        return None if self._clip is None else self._clip.shape[0]
+    def _constant(self) -> np.ndarray:
+        return self._clip.shape[0]
 
     def _skinning(self, joints: np.ndarray) -> np.ndarray:
         to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
@@ -220,19 +219,15 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _stands_still(character: Character, body: Body, clip: Clip | None) -> np.ndarray:
+def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion."""
     to_canonical = np.linalg.inv(character.canonical_to_bind)
-    if clip is None:
-        turn = np.where(np.arange(len(character.skeleton.names)) == character.head, 0.0, 2.0)
-        shift = 0.2 * turn
-    else:
-        shift = turn = np.zeros(len(character.skeleton.names))
-        for joints in clip.joints:
-            against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
-            off = against @ character.canonical_to_bind - np.eye(4)
-            turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
-            shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
+    shift = turn = np.zeros(len(character.skeleton.names))
+    for joints in clip.joints:
+        against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
+        off = against @ character.canonical_to_bind - np.eye(4)
+        turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
+        shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
     far = np.linalg.norm(body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3], axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
     return np.sum(body.joint_weights * each, axis=1) < STILL
