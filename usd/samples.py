@@ -18,7 +18,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .behind import Behind
 from .override import OverrideWriter, reload_open, to_text, used_files
-from .spool import Spool, fingerprint
+from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
 from .stencils import Stencils
 
@@ -50,7 +50,7 @@ def write_samples(
         out: `.usdc`, `.usd` or `.usda`.
         codes: ascending time codes.
         poser: makes the poser of a groom; called only if something is left to compute.
-        inputs: plain values that, with the shot's files, determine every sample.
+        inputs: plain values that, with the shot's files and this program's, determine every sample.
         velocities: write velocities.
         progress: called with (done, total, message).
 
@@ -64,7 +64,7 @@ def write_samples(
     _check_not_input(out, shot)
     _check_space(out, shot, len(codes), velocities)
     facts = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
-    spool = Spool(out, fingerprint(used_files(shot.stage), facts))
+    spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], facts))
     try:
         return _write(shot, codes, poser, spool, velocities, progress or (lambda done, total, message: None))
     except KeyboardInterrupt:

@@ -56,7 +56,7 @@ def simulate(
         raise NeuralocksError(f"--volume {volume}: must be 0 or above")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
     codes = time_codes(frames, shot.first, shot.last, subframes)
-    inputs = {"solver": 1, "strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
+    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
         return _SimulatedPoser(item, codes, look, count, volume, progress)

@@ -122,6 +122,14 @@ def fingerprint(files, values: dict) -> str:
     return hashlib.sha256(json.dumps([facts, values], sort_keys=True).encode()).hexdigest()
 
 
+def program_files() -> list[Path]:
+    """The program's own files: frames of another version of it are not gone on from."""
+    import neuralocks_core
+
+    folders = Path(__file__).parent, Path(neuralocks_core.__file__).parent
+    return [file for folder in folders for file in folder.rglob("*.py")]
+
+
 def cannot_write(path: Path, error: OSError) -> NeuralocksError:
     """The one line for a file system that refuses."""
     import errno

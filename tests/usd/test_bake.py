@@ -240,6 +240,21 @@ def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model)
         out.unlink()
 
 
+def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, model, monkeypatch):
+    shot, out, own = write_shot(tmp_path), tmp_path / "bake.usdc", tmp_path / "posing.py"
+
+    def stop(done, total, message):
+        if done == 4:
+            raise KeyboardInterrupt
+
+    own.write_text("one")
+    monkeypatch.setattr("usd.samples.program_files", lambda: [own])
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    own.write_text("another")
+    assert bake(shot, out, model).resumed == 0
+
+
 def test_material_and_strength_reach_the_network(tmp_path, model):
     shot = write_shot(tmp_path)
     plain = world_points(bake(shot, tmp_path / "a.usdc", model, frames=[6]).path, 6.0)
