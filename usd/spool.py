@@ -39,24 +39,30 @@ class Spool:
             out.parent.mkdir(parents=True, exist_ok=True)
             self.folder.mkdir(exist_ok=True)
             self._lock = open(self.folder / "lock", "a+")
-            if fcntl is not None:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            raise NeuralocksError(
-                f"{out}: another bake is writing it; wait for that one or choose another name"
-            ) from None
         except OSError as error:
             raise cannot_write(out, error) from None
-        mark = self.folder / "inputs"
-        if not mark.is_file() or mark.read_text() != fingerprint:
-            for old in self.folder.glob("*.frame"):
-                old.unlink()
-            mark.write_text(fingerprint)
-        for stray in self.folder.glob("*.part*"):
-            stray.unlink()
+        try:
+            if fcntl is not None:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._forget_others(fingerprint.encode())
+        except OSError as error:
+            self._lock.close()
+            if isinstance(error, BlockingIOError):
+                raise NeuralocksError(
+                    f"{out}: another bake is writing it; wait for that one or choose another name"
+                ) from None
+            raise cannot_write(out, error) from None
         # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
+
+    def _forget_others(self, fingerprint: bytes) -> None:
+        mark = self.folder / "inputs"
+        if not mark.is_file() or mark.read_bytes() != fingerprint:
+            for old in self.folder.glob("*.frame"):
+                old.unlink()
+            mark.write_bytes(fingerprint)
+        for stray in self.folder.glob("*.part*"):
+            stray.unlink()
 
     def holds(self, groom: int, time_code: float, points: int) -> bool:
         """Whether the points (points, 3) of a frame are there, all of them."""
@@ -103,8 +109,11 @@ class Spool:
 
     def discard(self) -> None:
         """Remove the folder."""
-        self._lock.close()
+        if fcntl is None:
+            self._lock.close()  # Windows removes no open file
+        # Before the lock is given up: another bake that takes it would lose its own frames.
         shutil.rmtree(self.folder, ignore_errors=True)
+        self._lock.close()
 
     def _path(self, groom: int, time_code: float) -> Path:
         return self.folder / f"{groom}_{float(time_code).hex()}.frame"
