@@ -95,9 +95,9 @@ class Session:
         self.messages.pop(name, None)
 
     def clear(self) -> None:
-        """Forget everything, at file load and when the add-on goes."""
+        """Forget everything, at file load and when the add-on goes; who steps frames meanwhile still has to end it."""
         self.stop_preparing_all()
-        self.__init__()
+        self.__init__(paused=self.paused)
 
     def stop_preparing(self, name: str) -> None:
         """Cancel the thread that prepares a hair object, if there is one."""

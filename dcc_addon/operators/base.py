@@ -97,6 +97,14 @@ class Stepwise(Hardened):
             return result
         return {"RUNNING_MODAL"}
 
+    def cancel(self, context):
+        """Blender ends the work itself, when another file is opened or the window closes."""
+        try:
+            self._steps.close()
+        except ReferenceError:  # the scene whose frame would come back is gone
+            pass
+        Stepwise._finish(self, context)
+
     def _slice(self, context):
         end = time.perf_counter() + SLICE
         try:
@@ -112,7 +120,8 @@ class Stepwise(Hardened):
     def _finish(self, context):
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
         session.sampling = None
 
 

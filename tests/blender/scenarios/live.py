@@ -184,3 +184,40 @@ def prepared_beside(_folder: Path) -> None:
     assert session.preparing
     live.refresh(bpy.context.scene, wait=True)
     assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
+
+
+def loaded_meanwhile(folder: Path) -> None:
+    """Another file is opened while frames are stepped, or Blender ends a bake that the panel shows: live goes on."""
+    from types import SimpleNamespace
+
+    from dcc_addon.operators.bake import bake_steps
+    from dcc_addon.operators.base import Stepwise
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    steps = bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
+    next(steps)
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    try:
+        steps.close()
+    except ReferenceError:
+        pass
+    assert session.paused == 0, session.paused
+    rig, strands = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert apart(points_at(strands, 9), shown) == 0.0
+
+    ended = []
+    manager = SimpleNamespace(event_timer_remove=ended.append, progress_end=lambda: ended.append("progress"))
+    running = Stepwise()
+    running._timer, running._steps = "timer", bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
+    next(running._steps)
+    assert session.paused == 1
+    running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
+    assert session.paused == 0 and ended == ["timer", "progress"]
+    assert apart(points_at(strands, 9), shown) == 0.0
