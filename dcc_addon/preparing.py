@@ -13,8 +13,6 @@ from .session import session
 LOOK = 0.05
 """Time between two looks at what is being prepared [s]."""
 
-_then: dict = {}
-
 
 def start(name: str, make, then) -> None:
     """Let a thread prepare a hair object.
@@ -24,8 +22,8 @@ def start(name: str, make, then) -> None:
         make: called with a progress callback, gives the prepared hair; calls nothing of Blender.
         then: called with the name when the hair is in the session.
     """
-    session.preparing[name] = Threaded(make, leave=True).start()
-    _then[name] = then
+    job = session.preparing[name] = Threaded(make, leave=True).start()
+    job.then = then
     if not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=LOOK)
 
@@ -33,7 +31,6 @@ def start(name: str, make, then) -> None:
 def stop() -> None:
     """Cancel all; the session forgets what they make."""
     session.stop_preparing_all()
-    _then.clear()
     if bpy.app.timers.is_registered(look):
         bpy.app.timers.unregister(look)
 
@@ -41,19 +38,17 @@ def stop() -> None:
 def look() -> float | None:
     """Take over what is ready; the time until the next look, None when nothing is being prepared any more."""
     for name, job in list(session.preparing.items()):
-        if job.running:
+        if job.running or session.preparing.get(name) is not job:  # showing one may have stopped or begun others
             continue
         del session.preparing[name]
-        then = _then.pop(name)
         try:
             session.hairs[name] = job.result()
+            job.then(name)
         except NeuralocksError as error:
             session.messages[name] = str(error)
         except Exception as error:
             traceback.print_exc()
             session.messages[name] = f"{name}: unexpected {type(error).__name__}: {error}; see the console"
-        else:
-            then(name)
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

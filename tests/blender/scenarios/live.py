@@ -221,3 +221,32 @@ def loaded_meanwhile(folder: Path) -> None:
     running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
     assert session.paused == 0 and ended == ["timer", "progress"]
     assert apart(points_at(strands, 9), shown) == 0.0
+
+
+def prepared_together(_folder: Path) -> None:
+    """Showing one hair may stop what others are prepared from, or fail: the rest arrives all the same."""
+    import dcc_addon.preparing as preparing
+    from dcc_addon.session import session
+
+    arrived = []
+
+    def wait():
+        while preparing.look() is not None:
+            time.sleep(0.01)
+
+    def stop_the_second(name):
+        arrived.append(name)
+        session.stop_preparing("Two")
+
+    def fail(name):
+        arrived.append(name)
+        raise KeyError(name)
+
+    for name, then in (("One", stop_the_second), ("Two", arrived.append), ("Three", fail), ("Four", arrived.append)):
+        preparing.start(name, lambda say, name=name: name.lower(), then)
+    while any(job.running for job in session.preparing.values()):
+        time.sleep(0.01)
+    wait()
+    assert arrived == ["One", "Three", "Four"], arrived
+    assert session.hairs == {"One": "one", "Three": "three", "Four": "four"}, session.hairs
+    assert "KeyError" in messages()["Three"] and not session.preparing
