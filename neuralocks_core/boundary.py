@@ -9,6 +9,7 @@ be seen. `docs/deviations.md` says why.
 """
 
 from dataclasses import asdict, dataclass, fields
+from operator import index
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from neuralocks_core.motion import GRAVITY, Clip
 
 POSE_JOINTS = ("neck", "upper_chest", "left_shoulder", "right_shoulder", "left_upper_arm", "right_upper_arm")
 MATERIALS = 4
+LONGEST = 2000
+"""Steps that a history may cover: a minute. Each vector costs memory for all of them."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +49,14 @@ class BoundarySpec:
     taper: float = 0.3
 
     def __post_init__(self):
-        object.__setattr__(self, "bins", tuple(int(b) for b in self.bins))
+        object.__setattr__(self, "bins", tuple(index(b) for b in self.bins))
         object.__setattr__(self, "pose_joints", tuple(self.pose_joints))
-        if not 1e-4 < self.dt < 1 or any(not 1 <= b <= 1000 for b in self.bins) or len(self.bins) > 1000:
+        if not 1e-4 < self.dt < 1 or min(self.bins, default=1) < 1 or self.steps > LONGEST:
             raise NeuralocksError(
                 "model: its history has an impossible time step or bin; get an undamaged copy of the model"
             )
+        if not 0 <= self.taper <= 1 or not isinstance(self.chest, bool):
+            raise NeuralocksError("model: its history has an impossible taper or chest; get an undamaged copy of the model")
         if self.linear not in ("gravity", "velocity", "none") or not set(self.pose_joints) <= set(SEMANTIC):
             raise NeuralocksError(
                 "model: it reads something of the body that this version does not know; update neuralocks"
@@ -60,14 +65,18 @@ class BoundarySpec:
     @classmethod
     def from_json(cls, values: dict) -> "BoundarySpec":
         """From what `to_json` gave; unknown keys mean a later version."""
-        unknown = set(values) - {f.name for f in fields(cls)}
-        if unknown:
+        known = {f.name for f in fields(cls)}
+        if not isinstance(values, dict):
+            raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")
+        if unknown := set(values) - known:
             raise NeuralocksError(
-                f"model: its boundary history has '{sorted(unknown)[0]}', unknown here; update neuralocks"
+                f"model: its boundary history has '{min(unknown)}', unknown here; update neuralocks"
             )
         try:
             return cls(**values)
-        except TypeError as error:
+        except NeuralocksError:
+            raise
+        except (TypeError, ValueError, OverflowError) as error:
             raise NeuralocksError(
                 f"model: unreadable boundary history ({error}); get an undamaged copy"
             ) from None

@@ -99,7 +99,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
                 raise NeuralocksError(
                     f"{path}: it is no neuralocks model (no model.json inside); choose a .neuralocks file"
                 )
-            meta = json.loads(_entry(archive, entries["model.json"], path))
+            meta = _parsed(_entry(archive, entries["model.json"], path))
             _check(meta, path, kind)
             missing = [name for name in KINDS[meta["kind"]] if name not in entries]
             if missing:
@@ -115,14 +115,19 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         EOFError,
         NotImplementedError,
         RuntimeError,
-        UnicodeDecodeError,
-        json.JSONDecodeError,
         RecursionError,
     ) as error:
         raise NeuralocksError(
             f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy"
         ) from None
     return ModelFile(path, meta, graphs)
+
+
+def _parsed(text: bytes):
+    try:
+        return json.loads(text)
+    except ValueError as error:  # no UTF-8, no JSON, or a number of thousands of digits
+        raise zipfile.BadZipFile(_first_line(error)) from None
 
 
 def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes:
@@ -151,7 +156,7 @@ def _check(meta, path: Path, kind: str | None) -> None:
         raise NeuralocksError(
             f"{path}: it has format {meta['format']}, this version reads up to {FORMAT}; update neuralocks"
         )
-    if meta.get("kind") not in KINDS:
+    if not isinstance(meta.get("kind"), str) or meta["kind"] not in KINDS:
         raise NeuralocksError(f"{path}: it holds a '{meta.get('kind')}', unknown here; update neuralocks")
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}

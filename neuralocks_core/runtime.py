@@ -43,11 +43,11 @@ class StrandModel:
         self.anchored = bool(file.meta.get("anchored", False))
         self.threads = threads or min(os.cpu_count() or 1, 8)
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")
-        self._sessions = {name: self._session(name) for name in model_file.KINDS["strands"]}
-        frame = self._sessions["frame.onnx"].get_inputs()[0].shape
-        if frame[-1] != self.spec.size:
+        self._sessions = {name: graph_session(file, name) for name in model_file.KINDS["strands"]}
+        read = [values.shape[-1] if values.shape else 1 for values in self._sessions["frame.onnx"].get_inputs()]
+        if read != [self.spec.size]:
             raise NeuralocksError(
-                f"{file.path}: its network reads {frame[-1]} values, its description gives {self.spec.size}; "
+                f"{file.path}: its network reads {read[0] if len(read) == 1 else read} values, its description gives {self.spec.size}; "
                 "get another copy"
             )
 
@@ -84,22 +84,6 @@ class StrandModel:
     def map(self, function: Callable, items) -> Iterable:
         """Results of calls on this model's threads, in order; a single one is made where it stands."""
         return map(function, items) if len(items) < 2 else self._pool.map(function, items)
-
-    def _session(self, name: str):
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
-        options.log_severity_level = 3
-        try:
-            return onnxruntime.InferenceSession(
-                self.file.graphs[name], options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
-            fact = str(error).splitlines()[0][:120]
-            raise NeuralocksError(
-                f"{self.file.path}: {name} cannot be loaded ({fact}); get an undamaged copy"
-            ) from None
 
 
 class StrandSession:
@@ -231,6 +215,24 @@ class StrandSession:
     def nbytes(self) -> int:
         """Memory held for this groom [bytes]."""
         return self._strand_part.nbytes + self._anchor.nbytes + self.codes.nbytes
+
+
+def graph_session(file: model_file.ModelFile, name: str):
+    """The onnxruntime session of one graph of a model.
+
+    Raises:
+        NeuralocksError: it is no graph that onnxruntime can load.
+    """
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
+    options.log_severity_level = 3
+    try:
+        return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
+        fact = str(error).splitlines()[0][:120]
+        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({fact}); get an undamaged copy") from None
 
 
 def _edges(rest: np.ndarray) -> np.ndarray:

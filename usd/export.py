@@ -70,11 +70,11 @@ def export_model(model, folder) -> list[Path]:
 
 
 def _graphs(file: model_file.ModelFile) -> dict:
-    import onnxruntime
+    from neuralocks_core.runtime import graph_session
 
     result = {}
-    for name, data in file.graphs.items():
-        session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
+    for name in file.graphs:
+        session = graph_session(file, name)
         result[name] = {
             "what": STRANDS.get(name, ""),
             "inputs": {i.name: i.shape for i in session.get_inputs()},

@@ -109,3 +109,29 @@ def test_unknown_description_asks_for_an_update():
     with pytest.raises(NeuralocksError, match="update"):
         BoundarySpec.from_json({**SPEC.to_json(), "wind": True})
     assert BoundarySpec.from_json(SPEC.to_json()) == SPEC
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"bins": ["x"]},
+        {"bins": [float("inf")]},
+        {"bins": [1.5]},
+        {"bins": 3},
+        {"bins": [0]},
+        {"bins": [2] * 1001},
+        {"dt": "a"},
+        {"dt": float("nan")},
+        {"taper": "a"},
+        {"taper": -0.1},
+        {"chest": 5},
+        {"linear": []},
+        {"pose_joints": [[]]},
+        {"pose_joints": 1},
+        [],
+    ],
+    ids=str,
+)
+def test_an_impossible_description_is_refused_in_one_line(values):
+    with pytest.raises(NeuralocksError, match="^model: "):
+        BoundarySpec.from_json(values)

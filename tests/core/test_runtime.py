@@ -139,6 +139,10 @@ def rewritten(path, target, **changes):
         ({"model_json": json.dumps({"format": 99, "kind": "strands"})}, "update neuralocks"),
         ({"model_json": json.dumps({"format": 1, "kind": "cloth"})}, "unknown here"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [1]}})}, "reads 305 values"),
+        ({"model_json": b'{"format": 1, "kind": []}'}, "unknown here"),
+        ({"model_json": b'{"format": ' + b"1" * 5000 + b"}"}, "damaged"),
+        ({"model_json": b"\xff"}, "damaged"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": 5})}, "boundary history"),
         ({"tail_onnx": b"nonsense"}, "cannot be loaded"),
     ],
 )

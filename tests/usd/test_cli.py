@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from neuralocks_core import model as model_file
 from usd.bake import bake
 from usd.cli import main
 from usd.groom import import_groom, write_groom
@@ -81,6 +82,15 @@ def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
         assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
     assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
     capsys.readouterr()
+
+
+def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
+    file = model_file.read(model)
+    bad = model_file.write(tmp_path / "bad.neuralocks", file.meta, file.graphs | {"tail.onnx": b"nonsense"})
+    for words in (("export", bad, "-o", tmp_path / "onnx"), ("inspect", bad)):
+        assert status(*words) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "bad.neuralocks: tail.onnx cannot be loaded" in error
 
 
 def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
