@@ -14,7 +14,7 @@ from .models import load_model, model_path
 from .pose import pose
 from .scene import curves
 from .scene.lookup import find
-from .scene.placing import bind_place, mute_deformers, unmute_deformers, world
+from .scene.placing import mute_deformers, unmute_deformers, world
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
@@ -112,7 +112,7 @@ def _recipe(hair, armature, sampled, wanted: tuple):
     Blender, with all that its first frame needs.
     """
     name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
-    own, counts, place = curves.points(data), curves.counts(data), bind_place(hair, armature, sampled)
+    own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius = curves.radius(data)
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, armature.name_full
 

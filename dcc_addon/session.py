@@ -29,6 +29,8 @@ class SampledRig:
     """See `services.motion.trim_of`."""
     key: tuple
     """What the sampling depended on: frame range, sub-frames, rate, unit, body, head bone, hair."""
+    bind_places: dict[str, np.ndarray]
+    """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
     stale: bool = False
     """Whether the animation has changed since."""
 

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..services.rig import BodyArrays
 from ..session import session
+from .binding import carrying_bone
 
 PROBES = 500
 """Vertices whose weights are compared with what is known."""
@@ -12,18 +13,14 @@ PROBES = 500
 
 def find(armature, objects) -> list:
     """The visible meshes that this armature deforms, by name."""
-    deformed = [
-        o
-        for o in objects
-        if o.type == "MESH"
-        and not o.hide_render
-        and any(m.type == "ARMATURE" and m.object == armature for m in o.modifiers)
-    ]
+    deformed = [o for o in objects if o.type == "MESH" and not o.hide_render and _deformed(o, armature)]
     return sorted(deformed, key=lambda o: o.name_full)
 
 
-def read(mesh_object) -> BodyArrays:
-    """Vertices of the basis shape, triangles, weights and shape keys."""
+def read(mesh_object, armature) -> BodyArrays:
+    """Vertices of the basis shape, triangles, weights and shape keys; a body that rides on one bone of the armature, as
+    a whole, is weighted to it.
+    """
     mesh = mesh_object.data
     points = _coordinates(mesh.vertices)
     mesh.calc_loop_triangles()
@@ -37,14 +34,16 @@ def read(mesh_object) -> BodyArrays:
         for block in keys.key_blocks:
             if block != keys.reference_key:
                 shapes[block.name] = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
-    return BodyArrays(
-        mesh_object.name_full,
-        points,
-        triangles,
-        tuple(group.name for group in mesh_object.vertex_groups),
-        _weights(mesh, tuple(group.name for group in mesh_object.vertex_groups)),
-        shapes,
-    )
+    groups = tuple(group.name for group in mesh_object.vertex_groups)
+    weights = _weights(mesh, groups)
+    bone = None if _deformed(mesh_object, armature) else carrying_bone(mesh_object, armature)
+    if bone is not None:
+        groups, weights = (bone,), np.array([[i, 0, 1] for i in range(len(points))], float)
+    return BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
+
+
+def _deformed(mesh_object, armature) -> bool:
+    return any(m.type == "ARMATURE" and m.object == armature for m in mesh_object.modifiers)
 
 
 def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:

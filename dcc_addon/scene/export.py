@@ -10,7 +10,6 @@ from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from . import body as body_reader
 from . import curves
-from .placing import bind_place
 from .sampling import bodies_of, hairs_of
 
 
@@ -45,16 +44,18 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
                 curves.points(data),
                 curves.counts(data),
                 None if radius is None or not len(radius) else 2 * radius,
-                bind_place(hair, armature, sampled),
+                sampled.bind_places[hair.name_full],
                 motion.places[hair.name_full],
                 sampled.character.head,
             )
         )
-    bodies = [body_reader.read(body) for body in bodies_of(armature, scene) if body.name_full in motion.places]
+    bodies = [
+        body_reader.read(body, armature) for body in bodies_of(armature, scene) if body.name_full in motion.places
+    ]
     labels_of_shapes = iter(shape_names(bodies))
     skins = []
     for arrays, label in zip(bodies, names.unique([f"Body_{b.name}" for b in bodies]), strict=True):
-        points, triangles, shapes = skin(arrays, motion.places[arrays.name][0])
+        points, triangles, shapes = skin(arrays, sampled.bind_places[arrays.name])
         shapes = {next(labels_of_shapes): offsets for offsets in shapes.values()}
         skins.append(SkinArrays(label, points, triangles, *joint_weights(arrays, rig.bones), shapes))
     rest = bind.copy()

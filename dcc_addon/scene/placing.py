@@ -1,24 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a hair object lies in the bind pose, and modifiers that would move its hair a second time."""
+"""Where an object stands, and modifiers that would move its hair a second time."""
 
 import json
 
 import numpy as np
 
 from .armature import matrix
-
-
-def bind_place(hair, armature, sampled) -> np.ndarray:
-    """World transform (4, 4) of the hair object in the bind pose.
-
-    Hair that is parented to a bone has moved with the pose already at the first frame: this is taken out again.
-    """
-    place = sampled.motion.places[hair.name_full][0]
-    if hair.parent == armature and hair.parent_type == "BONE" and hair.parent_bone in sampled.rig.bones:
-        joint = sampled.rig.bones.index(hair.parent_bone)
-        bind = sampled.motion.places[""][0] @ sampled.rig.rest[joint] @ sampled.trim[joint]
-        return bind @ np.linalg.inv(sampled.world[0, joint]) @ place
-    return place
 
 
 def world(thing, graph) -> np.ndarray:

@@ -13,6 +13,7 @@ from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
+from .binding import bind_places
 from .lookup import find
 from .placing import world
 
@@ -64,7 +65,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     joints = np.empty((len(frames), len(rig.bones), 4, 4))
     places = {name: np.empty((len(frames), 4, 4)) for name in ["", *tracked]}
     shapes = []
-    name, reader = armature.name_full, None
+    name = armature.name_full
     for row, frame in enumerate(frames):
         whole = int(np.floor(frame + 1e-6))
         scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
@@ -75,7 +76,10 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
             raise NeuralocksError(
                 f"{name}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
             )
-        reader = reader or armature_reader.PoseReader(armature, rig.bones)
+        if not row:
+            reader, binds = armature_reader.PoseReader(armature, rig.bones), bind_places(context, armature, tracked)
+            graph = context.evaluated_depsgraph_get()
+            evaluated = armature.evaluated_get(graph)
         joints[row] = reader.world(evaluated)
         places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in tracked:
@@ -86,14 +90,14 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
     untrimmed = places[""][0] @ rig.rest
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
-    arrays = [(body_reader.read(find(body)), places[body][0]) for body in bodies]
+    arrays = [(body_reader.read(find(body), armature), binds[body]) for body in bodies]
     metres = unit * rig_service.size_shown(rig, places[""][0], motion)
     character = rig_service.character(rig, places[""][0], arrays, metres)
     clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
     session.forget_motion(name)
     trim = trim_of(untrimmed, name)
     drawn = (joints @ trim).astype(np.float32)
-    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, bind_metres=metres, drawn=drawn)
+    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, binds, bind_metres=metres, drawn=drawn)
     session.readers[name] = reader
 
 

@@ -27,10 +27,12 @@ def particles(_folder: Path) -> None:
 
 
 def ways_of_parenting(folder: Path) -> None:
-    """Hair parented to the armature, to its head bone, or grown on a deformed surface moves in the same way."""
+    """Hair parented to the armature, to its head bone or to what is parented to that, constrained to the bone, or grown
+    on a deformed surface moves in the same way, also where the first frame is no rest pose.
+    """
     rig = scenes.armature()
     skin = scenes.body(rig)
-    scenes.dance(rig)
+    scenes.dance(rig, (-8, 24))
     scene = bpy.context.scene
     by_object = scenes.hair(rig, 30, name="ByObject")
     by_bone = scenes.hair(rig, 30, name="ByBone")
@@ -39,25 +41,43 @@ def ways_of_parenting(folder: Path) -> None:
     # Bone parents count from the bone's tail.
     tail = rest.matrix_local @ scenes.translation((0, rest.length, 0))
     by_bone.matrix_parent_inverse = tail.inverted()
+    skull = bpy.data.objects.new("Skull", bpy.data.meshes.new("Skull"))
+    skull.data.from_pydata([(0.1, 0, 1.6), (-0.1, 0, 1.6), (0, 0.1, 1.7)], [], [(0, 1, 2)])
+    scene.collection.objects.link(skull)
+    skull.parent, skull.parent_type, skull.parent_bone = rig, "BONE", "head"
+    skull.matrix_parent_inverse = tail.inverted()
+    on_skull = scenes.hair(rig, 30, name="OnSkull")
+    on_skull.parent = skull
+    constrained = scenes.hair(rig, 30, name="Constrained", parent=False)
+    child_of = constrained.constraints.new("CHILD_OF")
+    child_of.target, child_of.subtarget = rig, "head"
+    child_of.inverse_matrix = rest.matrix_local.inverted()
     on_surface = scenes.hair(rig, 30, name="OnSurface")
     on_surface.parent = skin
     on_surface.data.surface = skin
     deform = scenes.surface_deform(on_surface)
     scene.neuralocks.armature = rig
-    for hair in (by_object, by_bone, on_surface):
+    every = (by_object, by_bone, on_skull, constrained, on_surface)
+    for hair in every:
         hair.neuralocks_hair.model = MODEL
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    for hair in (by_object, by_bone, on_surface):
+    for hair in every:
         hair.neuralocks_hair.live = True
     assert not deform.show_viewport and not deform.show_render
     for frame in (1, 9, 22):
         scene.frame_set(frame)
         assert not messages(), messages()
-        points = {h.name: scenes.points(h) for h in (by_object, by_bone, on_surface)}
-        assert apart(points["ByBone"], points["ByObject"]) < SAME
-        assert apart(points["OnSurface"], points["ByObject"]) < SAME
-    assert bpy.ops.neuralocks.bake(filepath=str(folder / "three.usdc")) == {"FINISHED"}
+        points = {h.name: scenes.points(h) for h in every}
+        for name, shown in points.items():
+            assert apart(shown, points["ByObject"]) < SAME, name
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "all.usdc")) == {"FINISHED"}
     for name, shown in points.items():
-        assert apart(baked_points(folder / "three.usdc", f"/Character/Hair_{name}", 22), shown) < SAME
+        assert apart(baked_points(folder / "all.usdc", f"/Character/Hair_{name}", 22), shown) < SAME
+    rig.neuralocks_character.body = skull
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    from dcc_addon.session import session
+
+    character = session.rigs[rig.name].character
+    assert set(character.body.joint_indices[character.body.joint_weights > 0]) == {character.head}
     on_surface.neuralocks_hair.live = False
     assert deform.show_viewport and deform.show_render

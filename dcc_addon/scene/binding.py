@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where hair and body stand in the bind pose, and which bone carries a rigid one."""
+
+from contextlib import contextmanager
+
+import numpy as np
+
+from .lookup import find
+from .placing import world
+
+
+def bind_places(context, armature, names) -> dict[str, np.ndarray]:
+    """World transforms (4, 4) of objects, by full name, as they are when the rig that carries them is in its rest pose
+    and the armature object stands where it does now.
+
+    Blender itself is asked, for hair may hang on a bone in many ways: as its child or its child's, by constraints, by
+    another armature that moves this one.
+    """
+    view, things = context.view_layer, [find(name) for name in names]
+    graph = context.evaluated_depsgraph_get()
+    here = world(armature, graph)
+    with _at_rest({armature, *(a for thing in things for a in _reached(thing, set()))}):
+        view.update()
+        graph = context.evaluated_depsgraph_get()
+        # An armature that hangs on a bone of another one has moved too.
+        back = here @ np.linalg.inv(world(armature, graph))
+        places = {thing.name_full: back @ world(thing, graph) for thing in things}
+    view.update()
+    return places
+
+
+def carrying_bone(thing, armature) -> str | None:
+    """The bone of an armature that an object rides on as a whole, if there is one."""
+    if thing.parent == armature and thing.parent_type == "BONE":
+        return thing.parent_bone
+    for constraint in thing.constraints:
+        target = None if constraint.mute else getattr(constraint, "target", None)
+        if target == armature and getattr(constraint, "subtarget", ""):
+            return constraint.subtarget
+    return carrying_bone(thing.parent, armature) if thing.parent is not None else None
+
+
+def _reached(thing, seen: set) -> set:
+    """Armatures on whose pose an object's place depends."""
+    if thing is None or thing in seen:
+        return set()
+    seen.add(thing)
+    found = {thing} if thing.type == "ARMATURE" else set()
+    for constraint in thing.constraints:
+        several = [target.target for target in getattr(constraint, "targets", ())]
+        for target in (getattr(constraint, "target", None), *several):
+            found |= _reached(target, seen)
+    return found | _reached(thing.parent, seen)
+
+
+@contextmanager
+def _at_rest(armatures):
+    kept = [(a.data, a.data.pose_position) for a in armatures]
+    try:
+        for data, _ in kept:
+            data.pose_position = "REST"
+        yield
+    finally:
+        for data, position in reversed(kept):
+            data.pose_position = position
