@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
 
-import json
-
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
@@ -10,6 +8,7 @@ from neuralocks_core.rig import RigModel
 
 from .models import model_path
 from .pose import pose
+from .scene import rotations
 from .services.bones import LiveBones
 from .session import session
 
@@ -40,7 +39,8 @@ def _update(armature, scene, graph, moved) -> None:
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
     turns = bones.turns([scene.frame_current_final / sampled.motion.rate], settings.rig_motion, joints[None])[0]
-    _keep(armature, bones.bones)
+    if not settings.rig_kept:
+        settings.rig_kept = rotations.kept(armature, bones.bones)
     changed = False
     for name, turn in zip(bones.bones, turns.tolist(), strict=True):
         bone = armature.pose.bones[name]
@@ -70,34 +70,8 @@ def rest(armature) -> None:
     show_rest(armature)
 
 
-def _keep(armature, bones) -> None:
-    settings = armature.neuralocks_character
-    if settings.rig_kept:
-        return
-    kept = {}
-    for name in bones:
-        bone = armature.pose.bones[name]
-        kept[name] = [
-            bone.rotation_mode,
-            list(bone.rotation_quaternion),
-            list(bone.rotation_euler),
-            list(bone.rotation_axis_angle),
-        ]
-    settings.rig_kept = json.dumps(kept)
-
-
 def show_rest(armature) -> None:
     """The rotations from before; the model stays bound."""
     settings = armature.neuralocks_character
-    try:
-        kept = json.loads(settings.rig_kept or "{}")
-    except json.JSONDecodeError:
-        kept = {}
-    for name, (mode, quaternion, euler, axis_angle) in kept.items():
-        bone = armature.pose.bones.get(name) if armature.pose else None
-        if bone is not None:
-            bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
-            bone.rotation_mode = mode
-    if kept:
+    if rotations.give_back(armature, settings.rig_kept):
         settings.rig_kept = ""
-        armature.update_tag()

@@ -4,7 +4,11 @@
 import bpy
 import numpy as np
 
+from . import rotations
+
 TRACK = "Neuralocks Hair"
+KEPT = "neuralocks_rotations"
+"""Property of the action with how the hair bones were turned before."""
 
 
 def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray):
@@ -22,6 +26,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray):
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
     action = bpy.data.actions.new(f"{armature.name} Hair")
+    action[KEPT] = rotations.kept(armature, bones)
     curves = _curves(action, armature)
     smooth = _continuous(turns)
     for column, name in enumerate(bones):
@@ -44,7 +49,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray):
 
 
 def remove(armature) -> bool:
-    """Take an earlier bake off; whether there was one."""
+    """Take an earlier bake off and turn the bones as they were before it; whether there was one."""
     data = armature.animation_data
     track = data.nla_tracks.get(TRACK) if data else None
     if track is None:
@@ -52,6 +57,7 @@ def remove(armature) -> bool:
     actions = [s.action for s in track.strips if s.action]
     data.nla_tracks.remove(track)
     for action in actions:
+        rotations.give_back(armature, action.get(KEPT, ""))
         if not action.users:
             bpy.data.actions.remove(action)
     return True
