@@ -50,7 +50,7 @@ $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
 
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
 # wheel is missing, the tests that need it say so and are skipped.
-BLENDER_NEEDS = onnxruntime usd-core scipy trimesh
+BLENDER_NEEDS = onnxruntime usd-core scipy
 # The first of that version that really runs: a version manager's stand-in may only say that it does not.
 find-python = $(shell for p in python$(1) $(HOME)/.pyenv/versions/$(1)*/bin/python$(1); do \
     if "$$p" -c 0 2>/dev/null; then echo "$$p"; break; fi; done)

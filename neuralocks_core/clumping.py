@@ -15,7 +15,8 @@ COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
 SPREAD = 0.5
 """Hairs that ties hold against what drives them apart stray by the inverse root of the ties' stiffness (counted
-from 20 /s^2, see `Material.log_ratios`), as any spring does in a random drive of given energy; the solver's locks do so too (`benchmarks/materials.py`)."""
+from 20 /s^2, see `Material.log_ratios`), as any spring does in a random drive of given energy; the solver's locks do so
+too (`benchmarks/materials.py`)."""
 
 
 def spread(log_ratio: float) -> float:
