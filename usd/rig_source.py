@@ -10,15 +10,12 @@ from pxr import Usd
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
-from neuralocks_core.motion import Clip
+from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import sizes
 
 from .border import Border
 from .joints import JointSource
 from .surface import SkinnedMesh, bound_meshes, merged_body
-
-LARGEST_CLIP = 4_000_000
-"""Joint samples held of one animation: 512 MB. More than that is a stray key frame, not a shot."""
 
 
 @dataclass(frozen=True)

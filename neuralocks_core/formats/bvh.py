@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ..character import Skeleton
 from ..errors import NeuralocksError
-from ..motion import Clip
+from ..motion import LARGEST_CLIP, Clip
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; an hour of motion at 120 frames a second is about that."""
@@ -184,6 +184,8 @@ def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
     step = words.number()
     if not frames:
         raise words.error("holds no frame", "export the animated range")
+    if frames * len(joints) > LARGEST_CLIP:
+        raise words.error(f"{frames} frames of {len(joints)} joints are too many to hold", "cut the take")
     if not 1e-5 < step < 100:
         raise words.error(f"has a frame time of {step:g} s", "export it with the right rate")
     return frames, step
