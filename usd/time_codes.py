@@ -45,9 +45,10 @@ def time_codes(frames, first: float, last: float, subframes: int = 1) -> list[fl
         frames = parse_frames(frames)
     if isinstance(frames, tuple) and len(frames) == 3:
         begin, end, step = frames
-        count = math.floor((end - begin) / step + 1e-9) + 1
-        if count * subframes > MOST:
-            raise NeuralocksError(f"frames: {count * subframes} samples; give fewer with --frames A:B:STEP")
+        count = (end - begin) / step + 1e-9  # may overflow to infinity
+        if not count * subframes < MOST:
+            raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
+        count = math.floor(count) + 1
         whole = [begin + i * step for i in range(count)]
     else:
         whole = [float(frame) for frame in frames]

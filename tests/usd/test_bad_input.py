@@ -143,6 +143,7 @@ WRONG = {
     "frames": ({"frames": "5:1"}, "5:1"),
     "words as frames": ({"frames": "a:b"}, "a:b"),
     "endless frames": ({"frames": "0:1e12"}, "samples"),
+    "more frames than numbers": ({"frames": "0:1e300:1e-300"}, "samples"),
     "jobs": ({"jobs": 0}, "--jobs 0"),
     "subframes": ({"subframes": 0}, "--subframes 0"),
     "material": ({"material": ["colour=3"]}, "colour"),
@@ -199,6 +200,18 @@ def test_missing_blend_shapes_and_references_are_noted(tmp_path, model):
     result = bake(edited(tmp_path, edit), tmp_path / "out.usdc", model)
     assert any("blend shape" in note for note in result.notes)
     assert any("missing.usd" in note for note in result.notes)
+
+
+def test_a_body_that_is_inside_out_is_turned_round(tmp_path, model):
+    def turned_round(stage):
+        faces = UsdGeom.Mesh.Get(stage, SKIN).GetFaceVertexIndicesAttr()
+        faces.Set(np.array(faces.Get()).reshape(-1, 4)[:, ::-1].ravel().tolist())
+
+    right = bake(write_shot(tmp_path, name="as_made"), tmp_path / "right.usdc", model, frames=[5])
+    wrong = bake(edited(tmp_path, turned_round), tmp_path / "wrong.usdc", model, frames=[5])
+    assert not any("inside out" in note for note in right.notes) and any("inside out" in note for note in wrong.notes)
+    points = [np.asarray(Sdf.Layer.FindOrOpen(str(r.path)).QueryTimeSample(f"{HAIR}.points", 5.0)) for r in (right, wrong)]
+    assert np.abs(points[0] - points[1]).max() < 2e-3
 
 
 def test_strands_without_length_follow_the_head(tmp_path, model):
