@@ -7,8 +7,6 @@ import time
 
 import bpy
 
-from neuralocks_core.errors import NeuralocksError
-
 from .live import needs_sampling, refresh
 from .scene.sampling import sample, stepping
 from .session import session
@@ -62,11 +60,12 @@ def _tick():
                     break
             else:
                 _work.clear()
-    except (NeuralocksError, ReferenceError) as error:
-        session.messages[name] = str(error)
+    except Exception as error:
+        session.tell(name, error)
         session.failed.add(name)
         _work.clear()
     if not _work:
+        session.sampling = None
         refresh(scene)
     _redraw(context)
     return 0.01

@@ -33,6 +33,9 @@ def on_update(scene, graph):
         return
     if any(isinstance(thing, bpy.types.Action) for thing in changed):
         _mark_stale()
+    if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
+        session.wanting = session.wanting or bool(session.failed)
+        session.failed.clear()
     if any(isinstance(o, bpy.types.Object) and (o.name_full in names or _mode_changed(o)) for o in changed):
         live.update(scene, graph)
     _catch_up()

@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair that is being prepared beside Blender: a large groom takes a second, which nobody should have to wait for."""
 
-import traceback
-
 import bpy
-
-from neuralocks_core.errors import NeuralocksError
 
 from .services.threaded import Threaded
 from .session import session
@@ -44,11 +40,8 @@ def look() -> float | None:
         try:
             session.hairs[name] = job.result()
             job.then(name)
-        except NeuralocksError as error:
-            session.messages[name] = str(error)
         except Exception as error:
-            traceback.print_exc()
-            session.messages[name] = f"{name}: unexpected {type(error).__name__}: {error}; see the console"
+            session.tell(name, error)
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

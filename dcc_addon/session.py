@@ -4,12 +4,14 @@
 Blender objects are looked up by name each time: a pointer kept over an undo or a file load is invalid.
 """
 
+import traceback
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 
 from .services.motion import Motion
@@ -65,7 +67,7 @@ class Session:
     sampling: float | None = None
     """Share of a sampling in the background that is done."""
     failed: set[str] = field(default_factory=set)
-    """Armatures that could not be sampled in the background; tried again when something about them changes."""
+    """Armatures that could not be sampled in the background; tried again when they, a rest pose or an action change."""
 
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since somebody last saw to it."""
@@ -100,6 +102,14 @@ class Session:
         """Forget everything, at file load and when the add-on goes; who steps frames meanwhile still has to end it."""
         self.stop_preparing_all()
         self.__init__(paused=self.paused)
+
+    def tell(self, name: str, error: Exception) -> None:
+        """Say in the panel what went wrong with an object; what its user cannot mend is on the console as well."""
+        if isinstance(error, (NeuralocksError, ReferenceError)):
+            self.messages[name] = str(error)
+        else:
+            traceback.print_exception(error)
+            self.messages[name] = f"{name}: unexpected {type(error).__name__}: {error}; see the console"
 
     def stop_preparing(self, name: str) -> None:
         """Cancel the thread that prepares a hair object, if there is one."""

@@ -250,3 +250,43 @@ def prepared_together(_folder: Path) -> None:
     assert arrived == ["One", "Three", "Four"], arrived
     assert session.hairs == {"One": "one", "Three": "three", "Four": "four"}, session.hairs
     assert "KeyError" in messages()["Three"] and not session.preparing
+
+
+def sampled_beside(_folder: Path) -> None:
+    """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is mended."""
+    from dcc_addon import background
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+
+    def sample():
+        session.rigs["Rig"].stale = True
+        while background._tick() is not None:
+            pass
+        assert session.sampling is None and not background._work
+
+    def broken(_context, _armature):
+        yield 1, 2
+        raise KeyError("a bone")
+
+    working, background.sample = background.sample, broken
+    sample()
+    assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
+    background.sample = working
+    sample()
+    assert session.rigs["Rig"].stale, "what has failed is not tried again and again"
+
+    rig.scale = (-1, 1, 1)
+    bpy.context.view_layer.update()
+    assert not session.failed
+    sample()
+    assert "mirrored" in messages()["Rig"] and session.failed == {"Rig"}
+    rig.scale = (1, 1, 1)
+    bpy.context.view_layer.update()
+    sample()
+    assert not messages() and not session.rigs["Rig"].stale, messages()
+    assert apart(points_at(strands, 9), shown) == 0.0
