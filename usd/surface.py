@@ -8,6 +8,7 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.character import Body
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.winding import inside_out
 
 from .border import column_matrix, transformed
 from .joints import JointSource
@@ -167,6 +168,9 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh 
     if not np.isfinite(points).all():
         raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     triangles = _triangles(mesh, path, len(points))
+    if inside_out(points, triangles):
+        notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to be rid of this")
+        triangles = triangles[:, ::-1]
     indices, weights = joint_influences(prim, len(points), source)
     shapes = _shapes(prim, len(points), notes)
     return SkinnedMesh(prim, geom_bind(prim), points, triangles, indices, weights, shapes, Placement(prim))

@@ -10,6 +10,7 @@ from neuralocks_core.character import Body, Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.humanoid import find_humanoid
+from neuralocks_core.winding import inside_out
 
 from . import names
 from .axes import to_core, transformed
@@ -146,7 +147,8 @@ def skin(body: BodyArrays, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, d
     """
     points = transformed(body.points, place).astype(np.float32)
     shapes = {name: (offsets @ place[:3, :3].T).astype(np.float32) for name, offsets in body.shapes.items()}
-    return points, body.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else body.triangles, shapes
+    triangles = body.triangles[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else body.triangles
+    return points, triangles[:, ::-1] if inside_out(points, triangles) else triangles, shapes
 
 
 def _body(body: BodyArrays, place: np.ndarray, core: np.ndarray, bones: tuple[str, ...]) -> Body:
