@@ -9,7 +9,7 @@ import numpy as np
 
 from neuralocks_core.locks import lock_means
 from neuralocks_core.materials import RANGES
-from neuralocks_core.strands import StrandSet, root_frames
+from neuralocks_core.strands import K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
@@ -46,12 +46,12 @@ class Locks:
         count = len(strands.rest)
         flat = np.concatenate([strands.rest.reshape(count, -1), strands.uv, strands.root_normal], axis=1)
         means = lock_means(flat, strands.lock, strands.valid)
-        rest, normal = means[:, :72].reshape(-1, 24, 3), means[:, 74:]
+        rest, uv, normal = means[:, : 3 * K].reshape(-1, K, 3), means[:, 3 * K : -3], means[:, -3:]
         normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         lock = StrandSet(
             rest=rest,
             valid=np.ones(len(means), bool),
-            uv=means[:, 72:74],
+            uv=uv,
             root_frame=root_frames(normal).astype(np.float32),
             lock=np.arange(len(means), dtype=np.int32),
             length=np.linalg.norm(np.diff(rest, axis=1), axis=2).sum(axis=1),

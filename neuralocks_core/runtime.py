@@ -138,13 +138,14 @@ class StrandSession:
     def _frame(self, vector: np.ndarray):
         """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
         plain, clumping = self._without_clumping(vector)
+        frame = self.model.frame(plain)
         if not clumping:
-            return self.model.frame(plain), None
+            return frame, None
         locks, session = self._locks
         if self._anchored_at is not None:
             session.anchor(self._anchored_at)
-        gather = partial(locks.gather, led=session.displacement(plain), factor=spread(clumping))
-        return self.model.frame(plain), gather
+        led = session._tail("displacement", frame).reshape(-1, K, 3)
+        return frame, partial(locks.gather, led=led, factor=spread(clumping))
 
     def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
         """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
@@ -210,11 +211,6 @@ class StrandSession:
 
         self.model.by_chunk(work, len(result))
         return result
-
-    @cached_property
-    def nbytes(self) -> int:
-        """Memory held for this groom [bytes]."""
-        return self._strand_part.nbytes + self._anchor.nbytes + self.codes.nbytes
 
 
 def graph_session(file: model_file.ModelFile, name: str):

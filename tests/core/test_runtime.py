@@ -112,6 +112,18 @@ def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
     assert max(apart) < 0.5 * np.sqrt(np.square(ways[1]).mean())
 
 
+def test_what_strands_share_is_computed_once_a_frame(path, strands, monkeypatch):
+    session = StrandModel.load(path).prepare(strands)
+    vector = np.zeros(SPEC.size, np.float32)
+    vector[CLUMPING] = 1.0
+    session.anchor(vector)
+    session.displacement(vector)  # the locks are anchored in the first
+    asked, frame = [], session.model.frame
+    monkeypatch.setattr(session.model, "frame", lambda vector: asked.append(vector) or frame(vector))
+    session.displacement(vector)
+    assert len(asked) == 1
+
+
 def test_lengths_are_kept(path, strands):
     if path.stem == "displacement":
         pytest.skip("only the direction output keeps lengths by construction")
