@@ -121,8 +121,8 @@ def _time_codes(source: JointSource) -> np.ndarray:
     stage = source.prim.GetStage()
     if stage.HasAuthoredTimeCodeRange():
         # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
-        start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
-        if start <= first <= last <= end and (end - start + len(samples)) * len(source.names) <= LARGEST_CLIP:
+        start, end = min(stage.GetStartTimeCode(), first), max(stage.GetEndTimeCode(), last)
+        if (end - start + len(samples)) * len(source.names) <= LARGEST_CLIP:
             samples = [start, *samples, end]
             first, last = start, end
     count = last - first + len(samples)

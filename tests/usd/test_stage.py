@@ -120,6 +120,18 @@ def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
     assert np.isclose(shot.rigs[0].clip.end - shot.rigs[0].clip.start, 1.0)
 
 
+def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before_it(tmp_path):
+    """Animation with a run-up, whose exporter left out the samples after the character stopped."""
+    path = write_shot(tmp_path, Recipe(frames=9))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(4)
+    stage.SetEndTimeCode(30)
+    stage.GetRootLayer().Save()
+    rig = read_shot(path).rigs[0]
+    assert (rig.time_codes[0], rig.time_codes[-1]) == (1, 30)
+    np.testing.assert_array_equal(rig.clip.joints[-1], rig.joints_at(9))
+
+
 def test_rigs_are_read_without_grooms_or_animation(tmp_path):
     path = write_shot(tmp_path, Recipe(frames=0))
     assert len(read_rigs(path)[0].clip.times) == 1
