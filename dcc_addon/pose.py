@@ -5,6 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from .scene.sampling import timing_of
 from .services.axes import to_core
 from .services.motion import TOLERANCE, similar
 from .session import session
@@ -23,6 +24,8 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     if reader is None or len(armature.pose.bones) != len(sampled.rig.bones):
         session.forget_motion(armature.name_full)
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
+    if sampled.key[0] != timing_of(scene) and not sampled.stale:
+        sampled.stale = session.wanting = True
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(scene.frame_current_final)
     if row is not None:

@@ -63,6 +63,11 @@ def _character_changed(settings, context) -> None:
     session.forget_motion(settings.id_data.name_full)
 
 
+def _range_changed(_settings, context) -> None:
+    live.refresh(context.scene)
+    background.request()
+
+
 def _loop_changed(character, context) -> None:
     live.loop_changed(character.id_data, context.scene)
 
@@ -192,11 +197,22 @@ class SceneSettings(bpy.types.PropertyGroup):
     hair: PointerProperty(
         name="Hair", description="The hair Curves object shown in this panel", type=bpy.types.Object, poll=_is_hair
     )
-    use_scene_range: BoolProperty(name="Scene Range", description="Bake the frames of the scene", default=True)
-    frame_start: IntProperty(name="Start", description="First frame of the bake", default=1)
-    frame_end: IntProperty(name="End", description="Last frame of the bake", default=250)
+    use_scene_range: BoolProperty(
+        name="Scene Range", description="Bake the frames of the scene", default=True, update=_range_changed
+    )
+    frame_start: IntProperty(
+        name="Start", description="First frame of the bake", default=1, update=_range_changed
+    )
+    frame_end: IntProperty(
+        name="End", description="Last frame of the bake", default=250, update=_range_changed
+    )
     subframes: IntProperty(
-        name="Sub-frames", description="Samples between two frames, for motion blur", default=0, min=0, max=15
+        name="Sub-frames",
+        description="Samples between two frames, for motion blur",
+        default=0,
+        min=0,
+        max=15,
+        update=_range_changed,
     )
     output: StringProperty(
         name="Output",

@@ -30,7 +30,7 @@ class SampledRig:
     trim: np.ndarray
     """See `services.motion.trim_of`."""
     key: tuple
-    """What the sampling depended on: frame range, sub-frames, rate, unit, body, head bone, hair."""
+    """What the sampling depended on besides the animation; see `scene.sampling.key_of`."""
     bind_places: dict[str, np.ndarray]
     """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
     stale: bool = False

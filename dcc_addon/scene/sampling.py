@@ -31,15 +31,31 @@ def bodies_of(armature, scene) -> list:
     return body_reader.find(armature, scene.objects)
 
 
-def key_of(armature, scene) -> tuple:
-    """What a sampling of this armature depends on besides its animation."""
-    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
+def frames_of(scene) -> tuple[int, int]:
+    """First and last frame to sample: those of the scene, and where the panel names others to bake, these too. What is
+    shown and what is baked then remember the same past.
+    """
+    settings, first, last = scene.neuralocks, scene.frame_start, scene.frame_end
+    if settings.use_scene_range:
+        return first, last
+    return min(first, settings.frame_start), max(last, settings.frame_end)
+
+
+def timing_of(scene) -> tuple:
+    """What a sampling depends on of the scene: frames, sub-frames, rate, unit."""
     return (
-        scene.frame_start,
-        scene.frame_end,
+        *frames_of(scene),
         scene.neuralocks.subframes,
         round(scene.render.fps / scene.render.fps_base, 6),
         round(scene.unit_settings.scale_length, 9),
+    )
+
+
+def key_of(armature, scene) -> tuple:
+    """What a sampling of this armature depends on besides its animation; first `timing_of`."""
+    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
+    return (
+        timing_of(scene),
         tuple(body.name_full for body in bodies),
         settings.head_bone,
         len(armature.data.bones),
@@ -48,7 +64,7 @@ def key_of(armature, scene) -> tuple:
 
 
 def sample(context, armature) -> Iterator[tuple[int, int]]:
-    """Step through the scene's frames; yields (done, total) and puts the result into the session at the end.
+    """Step through the frames; yields (done, total) and puts the result into the session at the end.
 
     The current frame is put back between the yields only by the caller (see `stepping`), and always at the end.
 
@@ -60,7 +76,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     rig.humanoid()
     bodies = [body.name_full for body in bodies_of(armature, scene)]
     tracked = [*(hair.name_full for hair in hairs_of(armature, scene)), *bodies]
-    frames = frame_numbers(scene.frame_start, scene.frame_end, scene.neuralocks.subframes)
+    frames = frame_numbers(*frames_of(scene), scene.neuralocks.subframes)
     key = key_of(armature, scene)
     joints = np.empty((len(frames), len(rig.bones), 4, 4))
     places = {name: np.empty((len(frames), 4, 4)) for name in ["", *tracked]}

@@ -79,6 +79,48 @@ def out_of_the_body(folder: Path) -> None:
     assert apart(points_at(strands, 2), free[2]) == 0.0
 
 
+def other_frames(folder: Path) -> None:
+    """A bake of more frames than the scene has, or fewer, is what is shown live: both remember the same past."""
+    from dcc_addon.session import session
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    scene = bpy.context.scene
+    scene.frame_end = 12
+    make_live(rig, strands)
+    clamped = points_at(strands, 18)
+    settings = scene.neuralocks
+    settings.use_scene_range, settings.frame_start, settings.frame_end = False, 1, 24
+    assert session.rigs["Rig"].stale, "what is to be baked has changed"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "more.usdc")) == {"FINISHED"}
+    shown = {f: points_at(strands, f) for f in (24, 5, 18)}
+    assert not session.rigs["Rig"].stale and apart(shown[18], clamped) > 1e-3
+    for f, points in shown.items():
+        assert apart(baked_points(folder / "more.usdc", "/Character/Hair_Hair", f), points) < SAME
+
+    settings.frame_start, settings.frame_end = 4, 9
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "fewer.usdc")) == {"FINISHED"}
+    for f in (4, 9):
+        assert apart(baked_points(folder / "fewer.usdc", "/Character/Hair_Hair", f), points_at(strands, f)) < SAME
+    scene.render.fps = 30
+    points_at(strands, 7)
+    assert session.rigs["Rig"].stale, "frames last longer"
+
+    settings.frame_start, settings.frame_end = 1, 24
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    keyed = bpy.data.objects["Rig"].pose.bones["hair.02"]
+    scene.frame_set(18)
+    turn = np.array(keyed.rotation_quaternion)
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    rig.neuralocks_character.rig_live = True
+    scene.frame_set(18)
+    live = np.array(keyed.rotation_quaternion)
+    assert min(apart(turn, live), apart(turn, -live)) < SAME
+    assert not messages(), messages()
+
+
 def blender_export(folder: Path) -> None:
     """A bake of the scene as Blender itself exports it equals the live view."""
     if not hasattr(bpy.ops.wm, "usd_export") or not getattr(bpy.app.build_options, "usd", False):
@@ -108,7 +150,7 @@ def blender_export(folder: Path) -> None:
 
 
 def attached(folder: Path) -> None:
-    """Bake and Attach: the cache on the hair object shows what was live, without the add-on."""
+    """Bake and Attach: the cache on each hair object shows what was live, without the add-on."""
     import dcc_addon
 
     if not getattr(bpy.app.build_options, "usd", False):
@@ -117,12 +159,25 @@ def attached(folder: Path) -> None:
         return
     rig = scenes.armature()
     scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    strands, fringe = scenes.hair(rig, 40), scenes.hair(rig, 20, name="Fringe.L")
+    make_live(rig, fringe)
     make_live(rig, strands)
+    bpy.context.scene.neuralocks.output = str(folder / "cache.usdc")
     shown = {f: points_at(strands, f) for f in (1, 8, 17, 24)}
-    assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+    beside = points_at(fringe, 17)
+    for hair in (strands, fringe):
+        bpy.context.scene.neuralocks.hair = hair
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
     for f, points in shown.items():
         assert apart(points_at(strands, f), points) < SAME
+    assert apart(points_at(fringe, 17), beside) < SAME, "both play the file of the panel"
+    fringe.neuralocks_hair.armature = None
+    try:
+        bpy.ops.neuralocks.bake(filepath=str(folder / "cache_Fringe_L.usdc"))
+    except RuntimeError as error:
+        assert "Fringe.L plays this file" in str(error), error
+    else:
+        raise AssertionError("a cache in use was overwritten")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "farm.blend"))
     dcc_addon.unregister()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "farm.blend"))
