@@ -15,6 +15,7 @@ from ..scene import attach
 from ..scene.export import write_shot
 from ..scene.lookup import find
 from ..scene.sampling import hairs_of, sample, stepping
+from ..services.names import identifier
 from ..services.threaded import Threaded
 from ..session import session
 from .base import Stepwise, shown_armature, shown_hair
@@ -77,6 +78,9 @@ def bake_steps(context, armature, hairs, path: str):
         group = [h for h in hairs if _look(h) == look]
         stem = Path(full)
         out = stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{number + 1}{stem.suffix}")
+        others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
+        if others:
+            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
         shot = out.with_name(f"{out.stem}_shot.usdc")
         prims = write_shot(shot, armature, scene, sampled, group)
         settings = group[0].neuralocks_hair
@@ -137,7 +141,10 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
     def steps(self, context):
         armature, hair = shown_armature(context), shown_hair(context)
         attach.check_possible(hair)
-        name, path = hair.name_full, self.filepath or context.scene.neuralocks.output
+        name, path = hair.name_full, output_path(self.filepath or context.scene.neuralocks.output)
+        if any(other != hair for other in attach.players(path)):  # the panel's output is the same for all hair
+            stem, ending = os.path.splitext(path)
+            path = f"{stem}_{identifier(hair.name)}{ending}"
         baked = yield from bake_steps(context, armature, [hair], path)
         hair = find(name)
         hair.neuralocks_hair.live = False

@@ -32,6 +32,15 @@ def check_possible(hair) -> None:
         )
 
 
+def players(path: str) -> list:
+    """Hair objects that play the USD file `path`."""
+    return [
+        thing
+        for thing in bpy.data.objects
+        if (modifier := thing.modifiers.get(MODIFIER)) and modifier.cache_file and _is(modifier.cache_file, path)
+    ]
+
+
 def attach(hair, path: str, prim: str) -> None:
     """Let the hair play the groom `prim` of the USD file `path`."""
     from .placing import mute_deformers
@@ -66,10 +75,15 @@ def _cache_file(path: str):
     """The data block of a cache file; only the open operator makes one."""
     known = {c.name for c in bpy.data.cache_files}
     for cache in bpy.data.cache_files:
-        if os.path.abspath(bpy.path.abspath(cache.filepath)) == os.path.abspath(path):
+        if _is(cache, path):
             return cache
     bpy.ops.cachefile.open(filepath=path)
     cache = next(c for c in bpy.data.cache_files if c.name not in known)
     if bpy.data.filepath and os.path.splitdrive(path)[0] == os.path.splitdrive(bpy.data.filepath)[0]:
         cache.filepath = bpy.path.relpath(path)
     return cache
+
+
+def _is(cache, path: str) -> bool:
+    named = bpy.path.abspath(cache.filepath, library=cache.library)
+    return os.path.normcase(os.path.abspath(named)) == os.path.normcase(os.path.abspath(path))
