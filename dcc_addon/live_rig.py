@@ -8,6 +8,7 @@ from neuralocks_core.rig import RigModel
 
 from .models import model_path
 from .pose import pose
+from .scene.sampling import shown_frame
 from .scene import rotations
 from .services.bones import LiveBones
 from .session import session
@@ -38,7 +39,7 @@ def _update(armature, scene, graph, moved) -> None:
     bones = bind(armature, sampled)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
-    turns = bones.turns([scene.frame_current_final / sampled.motion.rate], settings.rig_motion, joints[None])[0]
+    turns = bones.turns([shown_frame(scene) / sampled.motion.rate], settings.rig_motion, joints[None])[0]
     if not settings.rig_kept:
         settings.rig_kept = rotations.kept(armature, bones.bones)
     changed = False

@@ -15,9 +15,11 @@ from .pose import pose
 from .scene import curves
 from .scene.lookup import find
 from .scene.placing import mute_deformers, unmute_deformers, world
+from .scene.sampling import shown_frame
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
+from .services.motion import TOLERANCE
 from .session import session
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
@@ -64,8 +66,12 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         raise NeuralocksError(f"{armature.name_full}: its motion was sampled without this hair; press Sample Motion")
     joints = pose(armature, sampled, scene, graph, moved)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
-    to_local = np.linalg.inv(core @ world(hair, graph))
-    time = scene.frame_current_final / sampled.motion.rate
+    frame, place = shown_frame(scene), world(hair, graph)
+    row = sampled.motion.row(frame)
+    if moved and row is not None and np.abs(place - sampled.motion.places[hair.name_full][row]).max() > TOLERANCE:
+        sampled.stale = session.wanting = True  # the hair object has been moved since
+    to_local = np.linalg.inv(core @ place)
+    time = frame / sampled.motion.rate
     wanted = time, joints, to_local, material(settings), settings.motion, settings.resolve
     prepared = prepare(hair, armature, sampled, wanted, wait)
     if prepared is None:

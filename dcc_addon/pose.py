@@ -5,7 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene.sampling import timing_of
+from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
 from .services.motion import TOLERANCE, similar
 from .session import session
@@ -27,7 +27,7 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     if sampled.key[0] != timing_of(scene) and not sampled.stale:
         sampled.stale = session.wanting = True
     world = reader.world(evaluated) @ sampled.trim
-    row = sampled.motion.row(scene.frame_current_final)
+    row = sampled.motion.row(shown_frame(scene))
     if row is not None:
         # Only the joints that hair is moved by: hair bones of their own, say, may be live themselves.
         read = sorted(set(sampled.character.humanoid.values()))

@@ -49,12 +49,17 @@ def keep_rest(data) -> None:
     """Put the points aside as rest shape, unless they already are.
 
     Raises:
-        NeuralocksError: the data belongs to another file.
+        NeuralocksError: the data belongs to another file, or to several objects.
     """
     if data.library is not None or data.override_library is not None:
         raise NeuralocksError(
             f"{data.name}: its curves are linked from another file and cannot be moved here; make them local (Object > "
             "Relations > Make Local > Selected Objects and Data), or use Bake and Attach"
+        )
+    if data.users - data.use_fake_user > 1:
+        raise NeuralocksError(
+            f"{data.name}: several objects share these curves, and none can move alone; make them single user (Object > "
+            "Relations > Make Single User > Object & Data)"
         )
     if has_rest(data):
         return

@@ -31,6 +31,13 @@ def bodies_of(armature, scene) -> list:
     return body_reader.find(armature, scene.objects)
 
 
+def shown_frame(scene) -> float:
+    """The frame that is shown, with its fraction, as the timeline counts; Blender's `frame_current_final` counts
+    stretched time.
+    """
+    return scene.frame_current + scene.frame_subframe
+
+
 def frames_of(scene) -> tuple[int, int]:
     """First and last frame to sample: those of the scene, and where the panel names others to bake, these too. What is
     shown and what is baked then remember the same past.

@@ -77,6 +77,38 @@ def posing(folder: Path) -> None:
     assert apart(baked_points(folder / "b.usdc", "/Character/Hair_Hair", 9), after) < SAME
 
 
+def moved_hair(folder: Path) -> None:
+    """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
+    objects that share their curves are refused, and neither is moved.
+    """
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands, scene = scenes.hair(rig, 30), bpy.context.scene
+    make_live(rig, strands)
+    points_at(strands, 9)
+    strands.location.x += 0.1
+    assert not session.rigs["Rig"].stale
+    points_at(strands, 10)
+    assert session.rigs["Rig"].stale
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    shown = {f: points_at(strands, f) for f in (4, 19)}
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "moved.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert apart(baked_points(folder / "moved.usdc", "/Character/Hair_Hair", f), points) < SAME
+
+    twin = bpy.data.objects.new("Twin", strands.data)
+    scene.collection.objects.link(twin)
+    points_at(strands, 5)
+    assert "share" in messages()["Hair"], messages()
+    assert "neuralocks_rest" not in strands.data.attributes
+    twin.data = twin.data.copy()
+    points_at(strands, 5)
+    assert not messages(), messages()
+
+
 def rendering(folder: Path) -> None:
     """A final render sees the hair of the viewport, frame by frame, and samples what is out of date."""
     rig = scenes.armature()
