@@ -86,7 +86,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
 
 
 def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
-    """The hair bound to its model, prepared once; again where an undo has changed what it was prepared from.
+    """The hair bound to its model, prepared once; again where an undo or an edit has changed what it was prepared
+    from.
 
     Args:
         hair, armature, sampled: the hair object, what carries it, and how that moves.
@@ -100,7 +101,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     if name in session.preparing and not wait:
         return None
     prepared = session.hairs.get(name)
-    if prepared is None or name in session.doubtful:
+    if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
         made_of, make = _recipe(hair, armature, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
             session.forget(name)
@@ -120,7 +121,8 @@ def _recipe(hair, armature, sampled, wanted: tuple):
     name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius = curves.radius(data)
-    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, armature.name_full
+    # The hair keeps its character, so no other one gets its id.
+    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, id(sampled.character)
 
     def make(say) -> LiveHair:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)

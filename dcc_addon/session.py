@@ -90,13 +90,23 @@ class Session:
 
     def forget_motion(self, name: str) -> None:
         """Drop what was sampled of an armature, and the hair that it carries."""
-        self.rigs.pop(name, None)
+        sampled = self.rigs.pop(name, None)
+        for hair in sampled.motion.places if sampled is not None else ():
+            self.stop_preparing(hair)
+            self.hairs.pop(hair, None)
         self.failed.discard(name)
         self.readers.pop(name, None)
         self.chains.pop(name, None)
-        self.stop_preparing_all()
-        self.hairs.clear()
         self.messages.pop(name, None)
+
+    def renew_motion(self, name: str, sampled: SampledRig, reader) -> None:
+        """Put in what was sampled of an armature; hair prepared for the very same character stays, to be looked at."""
+        before = self.rigs.get(name)
+        if before is not None and before.character is sampled.character:
+            self.doubtful.update(before.motion.places)
+            del self.rigs[name]
+        self.forget_motion(name)
+        self.rigs[name], self.readers[name] = sampled, reader
 
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on goes; who steps frames meanwhile still has to end it."""

@@ -117,11 +117,13 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     metres = unit * rig_service.size_shown(rig, places[""][0], motion)
     character = rig_service.character(rig, places[""][0], arrays, metres)
     clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
-    session.forget_motion(name)
+    before = session.rigs.get(name)
+    if before is not None and rig_service.same(before.character, character):
+        character = before.character
     trim = trim_of(untrimmed, name)
     drawn = (joints @ trim).astype(np.float32)
-    session.rigs[name] = SampledRig(rig, motion, character, clip, trim, key, binds, bind_metres=metres, drawn=drawn)
-    session.readers[name] = reader
+    sampled = SampledRig(rig, motion, character, clip, trim, key, binds, bind_metres=metres, drawn=drawn)
+    session.renew_motion(name, sampled, reader)
 
 
 def _found(name: str):

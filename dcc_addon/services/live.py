@@ -60,7 +60,7 @@ class LiveHair:
         if clip is not self._clip:
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
             self._boundary = SampledBoundary(self._sampler)
-            self._resolver, self._held = None, b""
+            self._resolver, self._held, self._shown = None, b"", b""
 
     def points(
         self,

@@ -126,6 +126,20 @@ def character(
     return Character(skeleton, _merged(parts), humanoid)
 
 
+def same(a: Character, b: Character) -> bool:
+    """Whether two characters are equal in all that hair reads of them."""
+    if (a.skeleton.names, a.humanoid.joints, a.body is None) != (b.skeleton.names, b.humanoid.joints, b.body is None):
+        return False
+    pairs = [(a.skeleton.parents, b.skeleton.parents), (a.skeleton.bind, b.skeleton.bind)]
+    if a.body is not None:
+        if list(a.body.shapes) != list(b.body.shapes):
+            return False
+        parts = ("points", "triangles", "joint_indices", "joint_weights")
+        pairs += [(getattr(a.body, part), getattr(b.body, part)) for part in parts]
+        pairs += zip(a.body.shapes.values(), b.body.shapes.values())
+    return all(np.array_equal(one, other) for one, other in pairs)
+
+
 def size_shown(rig: RigArrays, place: np.ndarray, motion: Motion) -> float:
     """How much larger than in the bind pose the motion shows the head, as `usd` measures the same in a stage."""
     head = rig.humanoid()["head"]

@@ -173,6 +173,62 @@ def two_characters(_folder: Path) -> None:
     assert apart(np.array([p.position for p in two.data.points]), groomed) == 0.0
 
 
+def prepared_once(_folder: Path) -> None:
+    """An edit of one character's animation prepares no hair again, neither its own nor that of others; an edit of its
+    body, and another armature for the hair, do.
+    """
+    from dcc_addon.session import session
+
+    first, second = scenes.armature("Anna"), scenes.armature("Ben")
+    scenes.dance(first)
+    scenes.dance(second)
+    skin = scenes.body(first)
+    one, two = scenes.hair(first, 20, name="One"), scenes.hair(second, 30, name="Two")
+    make_live(first, one)
+    make_live(second, two)
+    before = points_at(one, 12)
+    prepared = dict(session.hairs)
+    assert set(prepared) == {"One", "Two"}
+
+    def sample():
+        bpy.context.scene.neuralocks.armature = first
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+    def fresh(hair):
+        """Points of hair that is prepared anew."""
+        session.hairs.clear()
+        return points_at(hair, 12)
+
+    first.pose.bones["head"].rotation_euler[1] += 0.5
+    first.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
+    sample()
+    edited = points_at(one, 12)
+    assert session.hairs == prepared and apart(edited, before) > 0.01
+    assert apart(fresh(one), edited) == 0.0
+    points_at(two, 12)
+    prepared = dict(session.hairs)
+
+    for vertex in skin.data.vertices:
+        vertex.co.x *= 1.3
+    sample()
+    wide = points_at(one, 12)
+    assert session.hairs["Two"] is prepared["Two"] and session.hairs["One"] is not prepared["One"]
+    assert apart(fresh(one), wide) == 0.0
+
+    prepared = session.hairs["One"]
+    one.location.y += 0.05  # the same character, yet other hair on it
+    sample()
+    there = points_at(one, 12)
+    assert session.hairs["One"] is not prepared and apart(fresh(one), there) == 0.0
+
+    one.neuralocks_hair.armature = one.parent = second
+    bpy.context.scene.neuralocks.armature = second
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    moved = points_at(one, 12)
+    assert apart(moved, there) > 0.001 and apart(fresh(one), moved) == 0.0
+    assert not messages(), messages()
+
+
 def prepared_beside(_folder: Path) -> None:
     """In a window a thread prepares the hair: at rest until then, as ever afterwards; Live cancels; a render waits."""
     from dcc_addon import live, live_strands, preparing, properties
