@@ -8,8 +8,8 @@ from neuralocks_core.rig import RigModel
 
 from .models import model_path
 from .pose import pose
-from .scene.sampling import shown_frame
 from .scene import rotations
+from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
 
