@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rig model as one self-contained C99 header for engines, and a worked example beside it."""
 
-import os
 import re
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
 from neuralocks_core.rig.network import RigModel
 
 _TEXTS = Path(__file__).parent / "rig"
@@ -30,8 +29,10 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
         raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
-    _write(path, header_text(model, prefix))
-    _write(path.with_name(f"{path.stem}_example.c"), _example(model, path.name, prefix))
+    example = path.with_name(f"{path.stem}_example.c")
+    for target, text in ((path, header_text(model, prefix)), (example, _example(model, path.name, prefix))):
+        with atomic_write(target) as part:
+            part.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
@@ -67,7 +68,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "FEATURES": model.inputs,
         "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
         "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
-        "CHAINS": ", ".join(chains.chain_name(c) for c in range(len(chains.roots)))[:300].replace("*/", ""),
+        "CHAINS": re.sub(r"[^\w ,.:-]", "_", ", ".join(chains.chain_name(c) for c in range(len(chains.roots)))[:300]),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
         "TABLES": "\n".join(tables),
         "BUFFERS": "\n".join(buffers),
@@ -122,19 +123,6 @@ def _float(value) -> str:
 
 
 def _c_text(name: str) -> str:
-    return "".join(c if c.isascii() and c.isprintable() and c not in '"\\?' else "_" for c in name)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
-    except OSError as error:
-        raise NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose another folder") from None
+    """A name as UTF-8 inside a C string literal, in plain ASCII: three octal digits end by themselves."""
+    plain = [chr(byte).isalnum() or chr(byte) in " _-.:" for byte in range(128)] + [False] * 128
+    return "".join(chr(byte) if plain[byte] else f"\\{byte:03o}" for byte in name.encode("utf-8", "replace"))

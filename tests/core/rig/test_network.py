@@ -3,6 +3,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -209,3 +210,34 @@ def test_the_headers_history_is_that_of_the_bake(tmp_path, rate):
     late = t > 2
     error = np.sqrt(np.square(ours - wanted)[late].mean() / np.square(wanted[late]).mean())
     assert error < 0.1, error
+
+
+def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path):
+    """A position beyond any world, or none at all, is felt as a jump and forgotten when the history has passed."""
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    program = compiled(tmp_path, HISTORY_HARNESS)
+    for damaged in (1e30, -3.4e38, np.inf, np.nan):
+        rows = np.zeros((240, 8), np.float32)
+        rows[:, 0], rows[:, 4] = np.arange(240) / 60, 1
+        rows[60, 1:4] = damaged
+        felt = run_c(program, rows, 6 * len(rig_spec(True).bins))
+        assert np.isfinite(felt).all() and 0.1 < np.abs(felt[61:70]).max() < 7, damaged
+        assert np.abs(felt[200:]).max() < 1e-5, damaged
+
+
+def test_names_of_any_alphabet_stay_apart_in_the_header(tmp_path):
+    """Joint names are UTF-8 in C; nothing in a name, whoever made the model, gets out of its literal or comment."""
+    names = ["左髪", "右髪", 'a"b\\', "*/ int x; /*", "**//", "t??/", "n\nl"]
+    model = random_model((1,) * len(names))
+    model = replace(model, chains=replace(model.chains, names=tuple(names)))
+    export_c(model, tmp_path / "hair.h")
+    source = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  int i;
+  for (i = 0; i < NL_HAIR_JOINTS; ++i) printf("%s|", nl_hair_joint_name(i));
+  return 0;
+}
+"""
+    printed = subprocess.run([compiled(tmp_path, source)], capture_output=True, check=True).stdout.decode()
+    assert printed.split("|")[:-1] == names
