@@ -20,6 +20,8 @@ FACE_WORDS = (
     "eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead|pupil|iris"
     "|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
 )
+_HAIR_PARTS = ("hair", "pigtail", "twintail", "sidetail", "髪", "アホ毛", "おさげ", "ツインテ", "ポニテ", "もみあげ")
+"""Hair wherever in a name they stand; the last ones are those of MikuMikuDance rigs, in files with UTF-8 names."""
 _NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 _FEW = 1e-3
@@ -151,8 +153,8 @@ def _by_itself(character, children, below, meshes) -> list[int]:
         if meshes and not used[tree].any():
             continue
         hair = _named(names[joint], HAIR_WORDS)
-        # A holder that drives nothing and fans out is no bone of hair: its children are.
-        if len(children[joint]) > 1 and not (meshes and used[joint]):
+        # A holder that drives nothing is no bone of hair: its children are. Without meshes only a fan tells.
+        if (not used[joint] and children[joint]) if meshes else len(children[joint]) > 1:
             todo += children[joint]
             continue
         strange = len(tree) > 1 and meshes and not body[tree].any() and not _any_named(names, tree, FACE_WORDS)
@@ -255,13 +257,13 @@ def _leaf(name: str) -> str:
 
 
 def _named(name: str, words: str) -> bool:
-    """Whether a part of the name begins with one of the words; `earring` is no hair, `Hair_L.001` and `frontHair2`
-    are.
+    """Whether a part of the name begins with one of the words; `earring` is no hair, `Hair_L.001`, `frontHair2` and
+    `PigTail_L` are.
     """
     name = _leaf(name).rsplit(":", 1)[-1]
     parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
     return any(re.match(f"(?:{words})", part.lower()) for part in parts) or (
-        words is HAIR_WORDS and "hair" in name.lower()
+        words is HAIR_WORDS and any(part in name.lower().replace("_", "") for part in _HAIR_PARTS)
     )
 
 

@@ -29,6 +29,23 @@ def test_strange_names_are_found_by_what_they_drive():
     assert find_chains(who, [lock, body, jaw]).names == ("J_opt_C_01_1",)
 
 
+@pytest.mark.parametrize("name", ["hair_group", "head_twist"])
+def test_a_holder_that_drives_nothing_is_no_bone(name):
+    """Whatever its name, with one child as with several: turning it would swing the hair's roots through the skull."""
+    holder = (name, "head", (0, 1.6, -0.1))
+    who = character([holder, *tail("hair", 3, parent=name)])
+    meshes = [skin(who, {"hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})]
+    assert find_chains(who, meshes).names == ("hair_1", "hair_2")
+
+
+def test_hair_in_compound_and_japanese_names():
+    """Where the hair is part of the body's mesh, only names tell."""
+    who = character([*tail("PigTailL", 2), *tail("左髪", 2, at=(0.1, 1.6, 0)), *tail("cable", 2, at=(-0.1, 1.6, 0))])
+    points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
+    body = skin(who, {"hips": np.eye(3), "PigTailL_1": points, "左髪_1": points, "cable_1": points})
+    assert find_chains(who, [body]).names == ("PigTailL_1", "左髪_1")
+
+
 def test_a_branching_chain_is_one_chain():
     """Both branches hang from the joint that forks, and its bones go to both."""
     fork = tail("hair_a", 3, at=(0.02, 1.5, -0.1), parent="hair_2") + tail(
