@@ -46,6 +46,22 @@ _NOISE = {
     "sk",
     "valvebiped",
 }
+_JAPANESE = {
+    "左": "Left",
+    "右": "Right",
+    "頭": "Head",
+    "手首": "Wrist",
+    "足首": "Ankle",
+    "首": "Neck",
+    "肩": "Clavicle",
+    "腕": "UpperArm",
+    "ひじ": "Elbow",
+    "足": "UpLeg",
+    "ひざ": "Knee",
+    "両目": "Eyes",
+    "目": "Eye",
+}
+"""MikuMikuDance's standard bones, in files with UTF-8 names; of words within words the longer comes first."""
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
@@ -160,6 +176,9 @@ def _leaf(name: str) -> str:
 def _side_and_key(name: str) -> tuple[str, str]:
     """('left' | 'right' | '', part name in lower case without digits, sides and rig prefixes)."""
     leaf = _leaf(name).rsplit(":", 1)[-1]
+    if not leaf.isascii():
+        for word, part in _JAPANESE.items():
+            leaf = leaf.replace(word, part)
     tokens = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", leaf)
     tokens = [token.lower() for token in tokens if not token.isdigit()]
     if len(tokens) == 1 and tokens[0][:4] == "left" and len(tokens[0]) > 4:
@@ -217,6 +236,12 @@ def _find_head(names, sides, keys, parents, positions):
         key = keys[i]
         return (key != "head", not key.endswith("head"), _depth(i, parents), i)
 
+    def beside_head(i):
+        """Tails of hair hang from necks too: the head is in the middle, and farthest along the neck."""
+        at = None if positions is None else np.asarray(positions, float)
+        along = 0.0 if at is None or parents[neck] < 0 else (at[i] - at[neck]) @ (at[neck] - at[parents[neck]])
+        return (bool(sides[i]), any(bad in keys[i] for bad in _NOT_HEAD), -along, i)
+
     hits = [
         i
         for i in range(len(keys))
@@ -232,7 +257,7 @@ def _find_head(names, sides, keys, parents, positions):
         neck = max(necks, key=lambda i: _depth(i, parents))
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
-            return children[0], f"child of the neck '{_leaf(names[neck])}'"
+            return min(children, key=beside_head), f"child of the neck '{_leaf(names[neck])}'"
     # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the
     # head.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]

@@ -1,5 +1,6 @@
 """Semantic joints are found on the rigs that people have."""
 
+import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
@@ -52,6 +53,12 @@ RIGS = {
         "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",
         {"head": "DEF-spine.006", "neck": "DEF-spine.004", "upper_chest": "DEF-spine.003"},
     ),
+    "MikuMikuDance": (
+        "センター\n 上半身\n  上半身2\n   首\n    頭\n     左目\n     左髪1\n   左肩\n    左腕\n     左ひじ\n      左手首\n"
+        "   右肩\n    右腕\n     右ひじ\n 下半身\n  左足\n   左ひざ\n    左足首\n  右足",
+        {"head": "頭", "neck": "首", "upper_chest": "上半身2", "left_shoulder": "左肩", "right_upper_arm": "右腕",
+         "left_hand": "左手首", "left_upper_leg": "左足", "left_foot": "左足首", "left_eye": "左目"},
+    ),
 }
 
 
@@ -61,6 +68,15 @@ def test_finds_the_joints_of_common_rigs(name):
     paths, parents = rig(text)
     humanoid = find_humanoid(paths, parents)
     assert {key: paths[humanoid[key]].rpartition("/")[2] for key in expected} == expected
+
+
+def test_tails_that_hang_from_the_neck_are_no_head():
+    """Whatever the order, where the head itself is named in another language."""
+    for outline in ("hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf", "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL"):
+        paths, parents = rig(outline)
+        heights = {"hips": 1.0, "neck": 1.45, "Kopf": 1.55}
+        places = np.array([(0, heights.get(p.rpartition("/")[2], 1.4), 0) for p in paths])
+        assert paths[find_humanoid(paths, parents, places)["head"]].endswith("Kopf")
 
 
 def test_joints_by_hand_win_and_are_checked():
