@@ -36,6 +36,9 @@ def output_path(path: str) -> str:
     full = os.path.abspath(bpy.path.abspath(path))
     if not full.lower().endswith((".usd", ".usda", ".usdc")):
         full += ".usdc"
+    folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # the others are made
+    if folder is None or not os.access(folder, os.W_OK):
+        raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
     return full
 
 
@@ -67,8 +70,6 @@ def bake_steps(context, armature, hairs, path: str):
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
     looks = {_look(h) for h in hairs}
-    if not os.access(os.path.dirname(full) if os.path.isdir(os.path.dirname(full)) else "/", os.W_OK):
-        raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
     with stepping(scene):
         for done, total in sample(context, armature):
             yield done, 2 * total, f"Sampling the motion of {armature.name_full}"

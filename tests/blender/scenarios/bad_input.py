@@ -41,7 +41,7 @@ def bad_input(folder: Path) -> None:
     refused(lambda: operators.bake(filepath="/proc/nowhere/x.usdc"), "/proc/nowhere")
 
     assert operators.sample_motion() == {"FINISHED"}
-    groomed = scenes.points(strands)
+    groomed = np.array([p.position for p in strands.data.points])
     (folder / "torn.neuralocks").write_bytes(Path(MODEL).read_bytes()[:5000])
     for path, word in (
         ("/nowhere.neuralocks", "no such"),
@@ -52,10 +52,8 @@ def bad_input(folder: Path) -> None:
         own.live = True
         scene.frame_set(7)
         assert word in messages()["Hair"], messages()
-        assert apart(scenes.points(strands), scenes.points(strands)) == 0.0
+        assert apart(np.array([p.position for p in strands.data.points]), groomed) == 0.0
         own.live = False
-    scene.frame_set(1)
-    assert apart(scenes.points(strands), groomed) < 1e-6
     own.model = MODEL
 
     for name, counts in (("Empty", []), ("Dots", [1, 1, 1])):
@@ -163,3 +161,22 @@ def bad_hair(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     points_at(strands, 5)
     assert not messages(), messages()
+
+
+def new_folder(folder: Path) -> None:
+    """A bake makes the folders that are missing below one that its user may write to, and no others."""
+    import os
+
+    rig = scenes.armature()
+    strands = scenes.hair(rig, 10)
+    bpy.context.scene.neuralocks.armature, strands.neuralocks_hair.model = rig, MODEL
+    os.access = lambda path, mode: Path(path).is_relative_to(folder)  # as for anybody but root
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "new" / "deeper" / "bake.usdc")) == {"FINISHED"}
+    assert (folder / "new" / "deeper" / "bake.usdc").exists()
+    for refused in (bpy.ops.neuralocks.bake, bpy.ops.neuralocks.export_skel):
+        try:
+            refused(filepath=str(folder.parent / "other" / "bake.usdc"))
+        except RuntimeError as error:
+            assert "cannot be written" in str(error), error
+        else:
+            raise AssertionError("written where nobody may")
