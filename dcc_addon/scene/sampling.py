@@ -16,6 +16,7 @@ from . import body as body_reader
 from .binding import bind_places
 from .lookup import find
 from .placing import world
+from .unkeyed import Unkeyed
 
 
 def hairs_of(armature, scene) -> list:
@@ -135,18 +136,22 @@ def _found(name: str):
 
 
 class stepping:
-    """While frames are stepped: the live view is off, and the current frame comes back at the end."""
+    """While frames are stepped: the live view is off, and the current frame comes back at the end, with poses that are
+    not keyed.
+    """
 
     def __init__(self, scene):
         self._scene = scene
 
     def __enter__(self):
         self._frame = self._scene.frame_current, self._scene.frame_subframe
+        self._unkeyed = Unkeyed(self._scene)
         session.paused += 1
 
     def __exit__(self, *_):
         try:
             self._scene.frame_set(self._frame[0], subframe=self._frame[1])
+            self._unkeyed.put_back()
         finally:
             session.paused -= 1
 

@@ -69,7 +69,17 @@ def posing(folder: Path) -> None:
     rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
     points_at(strands, 8)
     assert session.rigs["Rig"].stale
+    rig.pose.bones["spine"].rotation_euler[0] += 0.3  # not keyed yet
+    rig.location.x += 0.1
+    rig["switch"] = 1.0
+    rig.keyframe_insert('["switch"]', frame=8)
+    rig["switch"] = 0.0
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
+    unkeyed, turn, place = scenes.points(strands), rig.pose.bones["spine"].rotation_euler[0], rig.location.x
     bpy.ops.neuralocks.sample_motion()
+    assert (rig.pose.bones["spine"].rotation_euler[0], rig.location.x, rig["switch"]) == (turn, place, 0.0)
+    assert apart(scenes.points(strands), unkeyed) < 0.02, "sampling took a pose away that was not keyed"
     assert not session.rigs["Rig"].stale
     after = points_at(strands, 9)
     assert apart(after, before) > 0.02

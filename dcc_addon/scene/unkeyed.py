@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses that are not keyed yet: animators move several bones before they set a key, and stepping through frames, which
+happens by itself in the background, evaluates the animation over them.
+"""
+
+import numpy as np
+
+from .lookup import find
+
+PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
+"""Channels of objects and of bones, and their sizes."""
+
+
+class Unkeyed:
+    """Channels of all animated objects of a scene as they are now."""
+
+    def __init__(self, scene):
+        self._kept = {o.name_full: _channels(o) for o in scene.objects if o.library is None and _animated(o)}
+
+    def put_back(self) -> None:
+        """Give what has changed since its value again."""
+        for name, kept in self._kept.items():
+            thing = find(name)
+            if thing is None:
+                continue
+            now = _channels(thing)
+            changed = [key for key in kept if key in now and not np.array_equal(kept[key], now[key])]
+            for key in changed:
+                _set(thing, key, kept[key])
+            if changed:
+                thing.update_tag()
+                if _keys(thing) is not None:
+                    _keys(thing).update_tag()
+
+
+def _animated(thing) -> bool:
+    keys = _keys(thing)
+    sources = (thing.animation_data, keys.animation_data if keys is not None else None)
+    return any(data is not None and (data.action is not None or len(data.nla_tracks)) for data in sources)
+
+
+def _keys(thing):
+    return getattr(thing.data, "shape_keys", None)
+
+
+def _channels(thing) -> dict[tuple, np.ndarray]:
+    """Values by (owner, channel): the owner is "" for the object, "bones" or "shapes" for all of them at once, or the
+    name of a bone with properties of its own.
+    """
+    found = {("", name): np.array(getattr(thing, name)[:]) for name in PLACE}
+    found |= {("", key): value for key, value in _own(thing)}
+    if thing.pose is not None:
+        bones = thing.pose.bones
+        for name, size in PLACE.items():
+            values = np.empty(len(bones) * size, np.float32)
+            bones.foreach_get(name, values)
+            found["bones", name] = values
+        found |= {(bone.name, key): value for bone in bones for key, value in _own(bone)}
+    if _keys(thing) is not None:
+        values = np.empty(len(_keys(thing).key_blocks), np.float32)
+        _keys(thing).key_blocks.foreach_get("value", values)
+        found["shapes", "value"] = values
+    return found
+
+
+def _own(owner) -> list:
+    """Numbers among the custom properties: switches between IK and FK, say."""
+    return [(f'["{key}"]', value) for key, value in owner.items() if isinstance(value, (int, float))]
+
+
+def _set(thing, key: tuple, values) -> None:
+    owner, channel = key
+    if owner == "bones" and channel in PLACE:
+        if len(values) == PLACE[channel] * len(thing.pose.bones):
+            thing.pose.bones.foreach_set(channel, values)
+    elif owner == "shapes" and channel == "value":
+        _keys(thing).key_blocks.foreach_set("value", values)
+    elif channel in PLACE:
+        setattr(thing, channel, values)
+    else:
+        (thing.pose.bones[owner] if owner else thing)[channel[2:-2]] = values
