@@ -32,6 +32,7 @@ def stop() -> None:
     """Cancel what runs and forget it."""
     if _jobs:
         _jobs[0].cancel()
+        _jobs[0].folder.cleanup()
         _jobs.clear()
     if bpy.app.timers.is_registered(_watch):
         bpy.app.timers.unregister(_watch)
@@ -82,21 +83,20 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             for done, total in sample(context, armature):
                 yield done, total, f"Sampling the motion of {name}"
         armature, target, sampled = find(name), find(wanted), session.rigs[name]
-        folder = Path(tempfile.mkdtemp(prefix="neuralocks_"))
-        character = folder / "character.usdc"
+        stop()
+        folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
+        character = Path(folder.name) / "character.usdc"
         write_shot(character, armature, context.scene, sampled, [target] if self.kind == "strands" else [])
-        out = _out(target.name_full)
         settings = {
             "kind": self.kind,
             "character": str(character),
-            "out": out,
+            "out": _out(target.name_full),
             "minutes": context.scene.neuralocks.train_minutes,
             "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
-        stop()
         _jobs.append(TrainingJob(python, settings))
-        _jobs[0].target = (target.name_full, self.kind)
+        _jobs[0].target, _jobs[0].folder = (target.name_full, self.kind), folder
         bpy.app.timers.register(_watch, first_interval=0.5)
         return f"Training a model for {target.name_full} in the background"
 

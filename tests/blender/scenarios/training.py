@@ -10,9 +10,12 @@ from tests.blender.checks import MODEL, messages
 
 
 def training(folder: Path) -> None:
-    """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused."""
+    """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused,
+    and no exported character stays behind.
+    """
     import shutil
     import sys
+    import tempfile
     import time
 
     from dcc_addon.operators import training as operator
@@ -36,7 +39,11 @@ def training(folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+    exported = folder / "exported"
+    exported.mkdir()
+    tempfile.tempdir = str(exported)
     assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    assert len(list(exported.iterdir())) == 1
     try:
         bpy.ops.neuralocks.train()
     except RuntimeError as error:
@@ -47,6 +54,7 @@ def training(folder: Path) -> None:
     while operator.finish() is None and time.monotonic() < end:
         time.sleep(0.1)
     assert "trained" in messages()["training"], messages()
+    assert not list(exported.iterdir())
     assert Path(strands.neuralocks_hair.model).parent == folder
     strands.neuralocks_hair.live = True
     bpy.context.scene.frame_set(9)
