@@ -11,7 +11,15 @@ from bpy.props import (
 )
 
 from . import background, live
+from .scene.paths import FILE
 from .session import session
+
+OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}
+"""A choice made for a library override is saved with it."""
+SETTING = {"options": set()} | OVERRIDABLE
+"""Not to be animated: hair of one frame remembers two seconds of motion, and a bake has one look."""
+KEPT = {"options": {"HIDDEN"}} | OVERRIDABLE
+"""What is not for the artist's eyes."""
 
 
 def _is_armature(_self, candidate) -> bool:
@@ -76,16 +84,24 @@ class HairSettings(bpy.types.PropertyGroup):
     """On a hair Curves object."""
 
     armature: PointerProperty(
-        name="Armature", description="The rig whose head carries this hair", type=bpy.types.Object, poll=_is_armature
+        name="Armature",
+        description="The rig whose head carries this hair",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        **SETTING,
     )
     model: StringProperty(
         name="Model",
         description="Trained model file (*.neuralocks); empty means the model that comes with the add-on",
-        subtype="FILE_PATH",
+        **FILE,
         update=_model_changed,
+        **OVERRIDABLE,
     )
     live: BoolProperty(
-        name="Live", description="Move the hair with the character, at any frame and in renders", update=_live_changed
+        name="Live",
+        description="Move the hair with the character, at any frame and in renders",
+        update=_live_changed,
+        **SETTING,
     )
     bend: FloatProperty(
         name="Stiffness",
@@ -96,6 +112,7 @@ class HairSettings(bpy.types.PropertyGroup):
         soft_min=0.2,
         soft_max=5.0,
         update=_look_changed,
+        **SETTING,
     )
     weight: FloatProperty(
         name="Weight",
@@ -104,6 +121,7 @@ class HairSettings(bpy.types.PropertyGroup):
         min=0.5,
         max=2.0,
         update=_look_changed,
+        **SETTING,
     )
     damping: FloatProperty(
         name="Damping",
@@ -112,6 +130,7 @@ class HairSettings(bpy.types.PropertyGroup):
         min=0.4,
         max=2.0,
         update=_look_changed,
+        **SETTING,
     )
     clumping: FloatProperty(
         name="Clumping",
@@ -120,6 +139,7 @@ class HairSettings(bpy.types.PropertyGroup):
         min=0.0,
         max=4.0,
         update=_look_changed,
+        **SETTING,
     )
     motion: FloatProperty(
         name="Motion",
@@ -129,14 +149,16 @@ class HairSettings(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         update=_look_changed,
+        **SETTING,
     )
     resolve: BoolProperty(
         name="Keep out of Body",
         description="Push hair that the motion has brought into the body out of it, live and in bakes",
         default=True,
         update=_look_changed,
+        **SETTING,
     )
-    muted: StringProperty(options={"HIDDEN"}, description="Modifiers that are off while the hair is live, as JSON")
+    muted: StringProperty(description="Modifiers that are off while the hair is live, as JSON", **KEPT)
 
 
 class CharacterSettings(bpy.types.PropertyGroup):
@@ -148,34 +170,43 @@ class CharacterSettings(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_mesh,
         update=_character_changed,
+        **SETTING,
     )
     head_bone: StringProperty(
         name="Head bone",
         description="The bone that carries the hair; found by name when left empty",
         update=_character_changed,
+        **SETTING,
     )
     loop: BoolProperty(
         name="Loop",
         description="The frame range repeats: its last frame shows the pose of its first, and hair on the first "
         "frame remembers the end of the range",
         update=_loop_changed,
+        **SETTING,
     )
     rig_model: StringProperty(
         name="Model",
         description="Trained model file for hair bones (*.neuralocks); empty means the one that comes with the add-on",
-        subtype="FILE_PATH",
+        **FILE,
         update=_rig_model_changed,
+        **OVERRIDABLE,
     )
     rig_live: BoolProperty(
-        name="Live", description="Turn the hair bones with the motion of the head", update=_rig_live_changed
+        name="Live",
+        description="Turn the hair bones with the motion of the head",
+        update=_rig_live_changed,
+        **SETTING,
     )
     chains: StringProperty(
         name="Chains",
         description="Names of the first hair bones, with * for anything, separated by commas; found when left empty",
         update=_rig_model_changed,
+        **SETTING,
     )
     rig_kept: StringProperty(
-        options={"HIDDEN"}, description="Rotations of the hair bones from before they were live, as JSON"
+        description="Rotations of the hair bones from before they were live, as JSON",
+        **KEPT,
     )
     rig_motion: FloatProperty(
         name="Motion",
@@ -185,6 +216,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         update=_rig_look_changed,
+        **SETTING,
     )
 
 
@@ -200,12 +232,8 @@ class SceneSettings(bpy.types.PropertyGroup):
     use_scene_range: BoolProperty(
         name="Scene Range", description="Bake the frames of the scene", default=True, update=_range_changed
     )
-    frame_start: IntProperty(
-        name="Start", description="First frame of the bake", default=1, update=_range_changed
-    )
-    frame_end: IntProperty(
-        name="End", description="Last frame of the bake", default=250, update=_range_changed
-    )
+    frame_start: IntProperty(name="Start", description="First frame of the bake", default=1, update=_range_changed)
+    frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
         name="Sub-frames",
         description="Samples between two frames, for motion blur",
@@ -218,7 +246,7 @@ class SceneSettings(bpy.types.PropertyGroup):
         name="Output",
         description="Where the bake is written; // is the folder of this file",
         default="//neuralocks_bake.usdc",
-        subtype="FILE_PATH",
+        **FILE,
     )
     train_minutes: FloatProperty(
         name="Minutes", description="How long a training may take", default=15.0, min=0.05, max=720.0
@@ -253,8 +281,8 @@ CLASSES = (HairSettings, CharacterSettings, SceneSettings, Preferences)
 
 def attach() -> None:
     """Put the settings on Blender's types."""
-    bpy.types.Object.neuralocks_hair = PointerProperty(type=HairSettings)
-    bpy.types.Object.neuralocks_character = PointerProperty(type=CharacterSettings)
+    bpy.types.Object.neuralocks_hair = PointerProperty(type=HairSettings, **OVERRIDABLE)
+    bpy.types.Object.neuralocks_character = PointerProperty(type=CharacterSettings, **OVERRIDABLE)
     bpy.types.Scene.neuralocks = PointerProperty(type=SceneSettings)
 
 

@@ -14,6 +14,7 @@ from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
 from ..scene.lookup import find
+from ..scene.paths import FILE
 from ..scene.sampling import hairs_of, sample, stepping
 from ..services.names import identifier
 from ..services.threaded import Threaded
@@ -117,9 +118,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
     bl_label = "Bake to USD"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(
-        name="File", description="USD file to write; the one of the panel when empty", subtype="FILE_PATH"
-    )
+    filepath: StringProperty(name="File", description="USD file to write; the one of the panel when empty", **FILE)
 
     def steps(self, context):
         armature = shown_armature(context)
@@ -135,9 +134,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
     bl_idname = "neuralocks.bake_attach"
     bl_label = "Bake and Attach"
 
-    filepath: StringProperty(
-        name="File", description="USD file to write; the one of the panel when empty", subtype="FILE_PATH"
-    )
+    filepath: StringProperty(name="File", description="USD file to write; the one of the panel when empty", **FILE)
 
     def steps(self, context):
         armature, hair = shown_armature(context), shown_hair(context)

@@ -14,6 +14,7 @@ from ..models import model_path
 from ..scene import actions
 from ..scene.attach import check_own
 from ..scene.lookup import find
+from ..scene.paths import FILE
 from ..scene.sampling import ensure, sample, stepping
 from ..services.bones import chains_of
 from ..services.motion import frame_numbers
@@ -87,9 +88,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     bl_label = "USD Animation"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(
-        name="File", description="USD file to write; beside the panel's output when empty", subtype="FILE_PATH"
-    )
+    filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
 
     def steps(self, context):
         from usd.rig_bake import bake_rig
@@ -115,9 +114,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     bl_label = "C Header"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(
-        name="File", description="Header to write", default="//neuralocks_hair.h", subtype="FILE_PATH"
-    )
+    filepath: StringProperty(name="File", description="Header to write", default="//neuralocks_hair.h", **FILE)
 
     def work(self, context):
         from neuralocks_core.export_c import export_c

@@ -110,6 +110,16 @@ def linked(folder: Path) -> None:
     )
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     strands.neuralocks_hair.armature, strands.neuralocks_hair.model = rig, MODEL
+    strands.neuralocks_hair.bend, rig.neuralocks_character.head_bone = 2.5, "head"
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "override.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "override.blend"))
+    scene = bpy.context.scene
+    rig, strands = (
+        next(o for o in bpy.data.objects if o.type == kind and not o.library) for kind in ("ARMATURE", "CURVES")
+    )
+    assert (strands.neuralocks_hair.bend, rig.neuralocks_character.head_bone) == (2.5, "head"), "not saved"
+    assert (strands.neuralocks_hair.armature, strands.neuralocks_hair.model) == (rig, MODEL)
+    strands.neuralocks_hair.bend = 1.0
     assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
     played = points_at(strands, 9)
     assert apart(played, scenes.points(bpy.data.objects["Hair", str(bpy.data.libraries[0].filepath)])) > 0.01

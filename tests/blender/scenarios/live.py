@@ -44,6 +44,11 @@ def rest_is_safe(folder: Path) -> None:
     assert apart(points_at(strands, 14), moved) < 1e-6
     strands.neuralocks_hair.live = False
     assert apart(own(), groomed) == 0.0
+    try:
+        keyed = strands.neuralocks_hair.keyframe_insert("bend")
+    except TypeError:
+        keyed = False
+    assert not keyed, "a bake has one look, so the sliders have too"
 
 
 def posing(folder: Path) -> None:
