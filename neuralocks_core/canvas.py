@@ -155,11 +155,14 @@ def _over(image: np.ndarray, size: tuple[int, int], backdrop: np.ndarray) -> np.
 
 def open_canvas(width, height, triangles, strands, detail) -> VtkCanvas | PlainCanvas:
     """The best canvas that works here, for so many strands of `detail.vertices` points (see `preview.Detail`)."""
+    canvas = None
     try:
         canvas = VtkCanvas(width, height, triangles, strands, detail)
         canvas._plotter.render()
         return canvas
     except Exception:  # a missing wheel, library or driver each raises something of its own
+        if canvas is not None:
+            canvas.close()
         return PlainCanvas(width, height, triangles, strands, detail)
 
 
