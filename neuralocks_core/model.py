@@ -4,12 +4,12 @@
 
 import json
 import os
-import tempfile
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
 
 FORMAT = 1
 KINDS = {
@@ -62,22 +62,10 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
     if set(graphs) != set(KINDS[meta["kind"]]):
         raise ValueError(f"a {meta['kind']} model holds {KINDS[meta['kind']]}, not {tuple(graphs)}")
     text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-                for name, data in {"model.json": text.encode(), **graphs}.items():
-                    # A fixed date: the same training gives the same bytes.
-                    archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
-    except OSError as error:
-        raise NeuralocksError(
-            f"{path}: cannot be written ({error.strerror}); choose another folder"
-        ) from None
+    with atomic_write(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in {"model.json": text.encode(), **graphs}.items():
+            # A fixed date: the same training gives the same bytes.
+            archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
     return path
 
 

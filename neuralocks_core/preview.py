@@ -4,6 +4,7 @@
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 from neuralocks_core import shading
 from neuralocks_core.canvas import Camera, open_canvas
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.report import write_whole
+from neuralocks_core.files import atomic_write
 
 SUFFIXES = (".png", ".mp4", ".gif")
 
@@ -98,28 +99,22 @@ def render(
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(SUFFIXES)}")
-    if path.parent.is_dir() and not os.access(path.parent, os.W_OK):
-        raise NeuralocksError(f"{path}: its folder cannot be written to; choose another one")
-    _need("PIL", "pillow")
-    still = path.suffix.lower() == ".png"
+    kind = path.suffix.lower()
+    for module in ("PIL", "imageio", "imageio_ffmpeg")[: 3 if kind == ".mp4" else 1]:
+        _need(module)
+    still = kind == ".png"
     if still:
         frames = np.unique(np.linspace(0, len(scene.times) - 1, panels + 2)[1:-1].round().astype(int))
     else:
-        _need("imageio", "imageio")
         clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
         frames = np.abs(scene.times[None] - clock[:, None]).argmin(axis=1)
     width, height = size or ((440, 620) if still else (480, 600))
     # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
-    film = _Film(scene, width, height, detail or (PICTURE if still else CLIP), 0.02 if still else 0.3)
-    images = []
-    try:
-        for i, image in enumerate(film.shoot(frames)):
-            images.append(image)
-            if progress:
-                progress(i + 1, len(frames), f"drawing {path.name}")
-    finally:
-        film.close()
-    _write(path, images, scene.times[frames], rate)
+    detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
+    say = progress or (lambda done, total, message: None)
+    with atomic_write(path) as part, closing(_Film(scene, width, height, detail, calm)) as film:
+        with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
+            _WRITERS[kind](part, images, scene.times[frames], rate)
     return path
 
 
@@ -129,12 +124,12 @@ class _Film:
     def __init__(self, scene: Scene, width: int, height: int, detail: Detail, calm: float):
         self.scene, self.detail, self._calm = scene, detail, calm
         self._pick(detail.strands)
-        triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
-        self._canvas = open_canvas(width, height, triangles, len(self._tone), detail)
         self._albedo = None if scene.body_rest is None else self._dress()
         self._cameras = self._follow()
+        triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
+        self._canvas = open_canvas(width, height, triangles, len(self._tone), detail)
 
-    def shoot(self, frames) -> Iterator[np.ndarray]:
+    def shoot(self, frames, say: Callable[[int], None] = lambda done: None) -> Iterator[np.ndarray]:
         """Pictures (height, width, 3) uint8 of frames; one is lit while the one before is drawn."""
         with ThreadPoolExecutor(1) as pool:
             ahead = pool.submit(self.light, int(frames[0]))
@@ -143,6 +138,7 @@ class _Film:
                 if i + 1 < len(frames):
                     ahead = pool.submit(self.light, int(frames[i + 1]))
                 yield self._canvas.draw(self._cameras[frame], *lit)
+                say(i + 1)
 
     def light(self, frame: int) -> tuple:
         """Body, its colours, hair and its colours: everything about a frame but the drawing itself."""
@@ -229,48 +225,41 @@ def _blurred(values: np.ndarray, width: float) -> np.ndarray:
     return gaussian_filter1d(values, max(width, 1e-3), axis=0, mode="nearest")
 
 
-def _write(path: Path, images: list[np.ndarray], times: np.ndarray, rate: float) -> None:
-    def write(part: str) -> None:
-        if path.suffix.lower() == ".png":
-            from PIL import Image
-
-            Image.fromarray(_strip(images, times)).save(part)
-        else:
-            _clip(part, images, rate)
-
-    write_whole(path, write)
-
-
-def _strip(images: list[np.ndarray], times: np.ndarray) -> np.ndarray:
+def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
     from PIL import Image, ImageDraw
 
+    images = list(images)
     gap = np.full((images[0].shape[0], 4, 3), 255, np.uint8)
-    parts = [part for image in images for part in (gap, image)][1:]
-    strip = Image.fromarray(np.concatenate(parts, axis=1))
+    row = [piece for image in images for piece in (gap, image)][1:]
+    strip = Image.fromarray(np.concatenate(row, axis=1))
     pen, wide = ImageDraw.Draw(strip), images[0].shape[1] + 4
     for i, time in enumerate(times):
         pen.text((wide * i + 10, strip.height - 20), f"{time:.2f} s", fill=(230, 230, 230))
-    return np.asarray(strip)
+    strip.save(part)
 
 
-def _clip(part: str, images: list[np.ndarray], rate: float) -> None:
+def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+    from PIL import Image
+
+    frames = (Image.fromarray(image).quantize(128, dither=Image.Dither.NONE) for image in images)
+    first = next(frames)
+    first.save(part, save_all=True, append_images=frames, duration=round(1000 / rate), loop=0, optimize=True)
+
+
+def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
     import imageio.v2 as imageio
 
-    if part.endswith(".gif"):
-        from PIL import Image
-
-        frames = [Image.fromarray(image).quantize(128, dither=Image.Dither.NONE) for image in images]
-        rest = frames[1:]
-        frames[0].save(part, save_all=True, append_images=rest, duration=round(1000 / rate), loop=0, optimize=True)
-        return
-    _need("imageio_ffmpeg", "imageio-ffmpeg")
     with imageio.get_writer(part, fps=rate, codec="libx264", quality=8, macro_block_size=2) as writer:
         for image in images:
             writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
 
 
-def _need(module: str, package: str) -> None:
+_WRITERS = {".png": _strip, ".mp4": _mp4, ".gif": _gif}
+
+
+def _need(module: str) -> None:
     from importlib.util import find_spec
 
     if find_spec(module) is None:
+        package = {"PIL": "pillow"}.get(module, module.replace("_", "-"))
         raise NeuralocksError(f"preview: {package} is not installed; pip install 'neuralocks[preview]'")

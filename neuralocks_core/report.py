@@ -5,13 +5,13 @@ import io
 import json
 import math
 import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
 
 LABELS = {
     "stretch_percent": ("length error, mean", "%", "of a strand's rest length"),
@@ -107,7 +107,8 @@ class Card:
                 panel.set_xlabel("s")
                 panel.set_ylabel("cm against the head")
             row[0].legend(fontsize=8)
-        write_whole(path, lambda part: figure.savefig(part, dpi=110, format=path.suffix.lstrip(".") or "png"))
+        with atomic_write(path) as part:
+            figure.savefig(part, dpi=110, format=path.suffix.lstrip(".") or "png")
         return path
 
     def _measures(self, name, values):
@@ -135,29 +136,6 @@ class Card:
                 cells = [_number(values[key]) if key in values else "" for values in rows.values()]
                 table.add_row(f"{label} {unit}".strip(), *cells, remark)
         return table
-
-
-def write_whole(path: Path, write) -> None:
-    """Let `write(part)` make a file beside the target, then put it in its place.
-
-    Raises:
-        NeuralocksError: the folder is missing, not writable or full.
-    """
-    if not path.parent.is_dir():
-        raise NeuralocksError(f"{path.parent}: no such folder; make it first")
-    part = None
-    try:
-        handle, part = tempfile.mkstemp(suffix=path.suffix, prefix=".part-", dir=path.parent)
-        os.close(handle)
-        write(part)
-        os.chmod(part, 0o644)
-        os.replace(part, path)
-    except OSError as error:
-        fact = error.strerror or str(error)
-        raise NeuralocksError(f"{path}: cannot be written ({fact}); choose a writable folder with space") from None
-    finally:
-        if part and os.path.exists(part):
-            os.unlink(part)
 
 
 def _number(value) -> str:

@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write a character as a UsdSkel asset: skeleton, skinned mesh, blend shapes, scalp."""
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
+
+from .border import write_stage
 
 ROOT = "/Body"
 SKELETON = f"{ROOT}/Rig"
 MESH = f"{ROOT}/Skin"
-FORMATS = (".usd", ".usda", ".usdc")
 
 
 def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str, float] | None = None) -> Path:
@@ -28,23 +26,8 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
     Raises:
         NeuralocksError: the path has another ending or cannot be written, anny is missing or a phenotype is wrong.
     """
-    path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise NeuralocksError(f"{path}: a body is written as USD; end the name with {', '.join(FORMATS)}")
     body = statistical_body(phenotype) if body is None else body
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".body-") as folder:
-            part = Path(folder) / path.name
-            stage = Usd.Stage.CreateNew(str(part))
-            _author(stage, body)
-            stage.GetRootLayer().Save()
-            del stage
-            os.replace(part, path)
-    except OSError as error:
-        fact = f"cannot be written ({error.strerror})"
-        raise NeuralocksError(f"{path}: {fact}; choose a folder you can write to") from None
-    return path
+    return write_stage(Path(path), lambda stage: _author(stage, body))
 
 
 def _author(stage, body: StatisticalBody) -> None:

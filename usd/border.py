@@ -3,6 +3,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
+
+LAYERS = (".usd", ".usda", ".usdc")
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,25 @@ def open_stage(path) -> Usd.Stage:
     if stage is None:
         raise NeuralocksError(f"{path}: not a readable USD file; export it again")
     return stage
+
+
+def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
+    """Write a new USD file at once under its final name, with what `author` puts into the stage.
+
+    Raises:
+        NeuralocksError: the path has another ending, or cannot be written.
+    """
+    if path.suffix.lower() not in LAYERS:
+        raise NeuralocksError(f"{path}: is written as USD; end the name with {', '.join(LAYERS)}")
+    try:
+        with atomic_write(path) as part:
+            stage = Usd.Stage.CreateNew(str(part))
+            author(stage)
+            stage.GetRootLayer().Save()
+            del stage
+    except Tf.ErrorException as error:
+        raise NeuralocksError(f"{path}: cannot be written ({first_line(error)}); choose another folder") from None
+    return path
 
 
 def first_line(error: Exception) -> str:

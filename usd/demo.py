@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
 from neuralocks_core.report import Card
 
 from .bake import BakeResult, bake
@@ -51,7 +52,7 @@ def shipped_shot() -> Path:
 
 
 def demo(
-    out="out/demo", model=None, *, clip: bool = True, progress: Callable[[int, int, str], None] | None = None
+    out, model=None, *, clip: bool = True, progress: Callable[[int, int, str], None] | None = None
 ) -> Demo:
     """Bake the shipped shot, measure it and draw it.
 
@@ -65,10 +66,6 @@ def demo(
         NeuralocksError: something is missing or cannot be written. A missing preview library is only noted.
     """
     out = Path(out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be made ({error.strerror}); choose another folder") from None
     shot, seconds, notes = shipped_shot(), {}, []
     outputs = {"bake": out / "demo.usdc"}
 
@@ -85,7 +82,8 @@ def demo(
     baked = read_baked(outputs["bake"])
     card = timed("report card", lambda: evaluate(baked, progress=progress))
     outputs["report card"] = out / "report.json"
-    outputs["report card"].write_text(card.to_json() + "\n")
+    with atomic_write(outputs["report card"]) as part:
+        part.write_text(card.to_json() + "\n", encoding="utf-8")
     for name, file in (("picture", "demo.png"), ("clip", "demo.mp4")):
         if name == "clip" and not clip:
             continue

@@ -2,12 +2,11 @@
 """Unpack a model for other runtimes: plain ONNX files and a description of their inputs."""
 
 import json
-import os
+from contextlib import ExitStack
 from pathlib import Path
 
 from neuralocks_core import model as model_file
-
-from .spool import cannot_write
+from neuralocks_core.files import atomic_write
 
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
@@ -55,17 +54,9 @@ def export_model(model, folder) -> list[Path]:
             "shape": MEASURES,
         }
     files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
-    parts = {name: folder / f".{name}.part" for name in files}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, part in parts.items():
-            part.write_bytes(files[name])
-        for name, part in parts.items():
-            os.replace(part, folder / name)
-    except OSError as error:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
-        raise cannot_write(folder, error) from None
+    with ExitStack() as all_or_none:
+        for name, data in files.items():
+            all_or_none.enter_context(atomic_write(folder / name)).write_bytes(data)
     return [folder / name for name in files]
 
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write grooms as USD BasisCurves with the attributes that other tools read, and import them from any file."""
 
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +10,9 @@ from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
-from .border import Border, first_line, open_stage
+from .border import Border, open_stage, write_stage
 from .curves import find_curves, read_groom
 from .placement import Placement
-from .spool import cannot_write
 
 USD = (".usd", ".usda", ".usdc", ".usdz")
 
@@ -67,29 +64,17 @@ def write_grooms(path, grooms: list[tuple[Groom, Spline]]) -> Path:
     Raises:
         NeuralocksError: the path has another ending or cannot be written.
     """
-    path = Path(path)
-    if path.suffix.lower() not in USD[:3]:
-        raise NeuralocksError(f"{path}: a groom is written as USD; end its name with .usd, .usda or .usdc")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".groom-") as folder:
-            part = Path(folder) / path.name
-            stage = Usd.Stage.CreateNew(str(part))
-            UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-            UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-            root = UsdGeom.Xform.Define(stage, "/Groom")
-            Usd.ModelAPI(root).SetKind("component")
-            stage.SetDefaultPrim(root.GetPrim())
-            for groom, spline in grooms:
-                author_groom(stage, _free_path(stage, groom.name), groom, spline)
-            stage.GetRootLayer().Save()
-            del stage
-            os.replace(part, path)
-    except Tf.ErrorException as error:
-        raise NeuralocksError(f"{path}: cannot be written ({first_line(error)}); choose another folder") from None
-    except OSError as error:
-        raise cannot_write(path, error) from None
-    return path
+
+    def author(stage: Usd.Stage) -> None:
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        root = UsdGeom.Xform.Define(stage, "/Groom")
+        Usd.ModelAPI(root).SetKind("component")
+        stage.SetDefaultPrim(root.GetPrim())
+        for groom, spline in grooms:
+            author_groom(stage, _free_path(stage, groom.name), groom, spline)
+
+    return write_stage(Path(path), author)
 
 
 def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()) -> UsdGeom.BasisCurves:

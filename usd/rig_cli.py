@@ -144,18 +144,12 @@ def export_onnx(
     out: Annotated[Path, typer.Option("-o", "--out", help="ONNX file to write.")] = Path("hair.onnx"),
 ) -> None:
     """Write the network as ONNX with a batch axis, for crowds."""
-    import os
-
     from neuralocks_core import model as model_file
+    from neuralocks_core.files import atomic_write
 
     data = model_file.read(model or model_file.shipped("rig"), "rig").graphs["rig.onnx"]
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        part = out.with_name(f".{out.name}.part")
+    with atomic_write(out) as part:
         part.write_bytes(data)
-        os.replace(part, out)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
     typer.echo(f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz")
 
 

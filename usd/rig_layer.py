@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The override layer of a rig bake: one SkelAnimation, the shot's own channels with new rotations of the hair joints."""
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import rotation_part, to_quaternion
 
 from .joints import JointSource
@@ -144,18 +143,6 @@ def _blend_shapes(layer, prim, animation) -> None:
 
 
 def _save(layer: Sdf.Layer, out: Path) -> None:
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f".{out.stem}.", suffix=out.suffix, dir=out.parent)
-        os.close(handle)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
-    try:
-        if not layer.Export(temporary, args={"format": "usda" if out.suffix == ".usda" else "usdc"}):
+    with atomic_write(out) as part:
+        if not layer.Export(str(part), args={"format": "usda" if out.suffix == ".usda" else "usdc"}):
             raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, out)
-    except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
-    finally:
-        Path(temporary).unlink(missing_ok=True)

@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import cannot_write
 
 from .rig_stage import read_rigged_hair, weight_notes
 
@@ -81,4 +82,4 @@ def _check_writable(out: Path) -> None:
         with tempfile.TemporaryFile(dir=out.parent):
             pass
     except OSError as error:
-        raise NeuralocksError(f"{out}: cannot be written ({error.strerror}); choose another folder") from None
+        raise cannot_write(out, error) from None

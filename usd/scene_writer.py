@@ -3,17 +3,13 @@
 hands over.
 """
 
-import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
-from neuralocks_core.errors import NeuralocksError
-
-from .border import row_matrix
+from .border import row_matrix, write_stage
 
 ROOT = "/Character"
 
@@ -92,23 +88,7 @@ def write_scene(path, scene: SceneArrays) -> Path:
     Raises:
         NeuralocksError: the file cannot be written there.
     """
-    path = Path(path)
-    if path.suffix.lower() not in (".usd", ".usda", ".usdc"):
-        raise NeuralocksError(f"{path}: a shot is written as USD; end the name with .usdc")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".shot-") as folder:
-            part = Path(folder) / path.name
-            stage = Usd.Stage.CreateNew(str(part))
-            _author(stage, scene)
-            stage.GetRootLayer().Save()
-            del stage
-            os.replace(part, path)
-    except OSError as error:
-        raise NeuralocksError(
-            f"{path}: cannot be written ({error.strerror}); choose a folder you can write to"
-        ) from None
-    return path
+    return write_stage(Path(path), lambda stage: _author(stage, scene))
 
 
 def hair_path(name: str) -> str:

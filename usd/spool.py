@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import cannot_write
 
 try:
     import fcntl
@@ -137,14 +138,3 @@ def program_files() -> list[Path]:
 
     folders = Path(__file__).parent, Path(neuralocks_core.__file__).parent
     return [file for folder in folders for file in folder.rglob("*.py")]
-
-
-def cannot_write(path: Path, error: OSError) -> NeuralocksError:
-    """The one line for a file system that refuses."""
-    import errno
-
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return NeuralocksError(
-            f"{path}: no space left on the disk; free some, or choose another folder"
-        )
-    return NeuralocksError(f"{path}: cannot be written ({error.strerror}); choose a folder you can write to")

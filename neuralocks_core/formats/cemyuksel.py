@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import os
 import struct
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import NeuralocksError
+from ..files import atomic_write
 from ..groom import Groom
 from .raw import RawGroom, bad_file, floats
 
@@ -100,16 +99,5 @@ def write(path: str | Path, groom: Groom, unit: float = 0.01, up: str = "Z") -> 
     blocks = [header, (groom.counts - 1).astype("<u2").tobytes(), (points * scale).astype("<f4").tobytes()]
     if each:
         blocks.append((widths * scale).astype("<f4").tobytes())
-    try:
-        handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.writelines(blocks)
-            os.replace(scratch, path)
-        except BaseException:
-            os.unlink(scratch)
-            raise
-    except OSError as error:
-        raise NeuralocksError(
-            f"{path}: cannot be written ({error.strerror}); check the folder and its space"
-        ) from None
+    with atomic_write(path) as part, open(part, "wb") as file:
+        file.writelines(blocks)

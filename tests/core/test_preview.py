@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import sys
+
 import numpy as np
 import pytest
 
@@ -87,7 +89,35 @@ def test_hair_in_front_dims_what_is_behind_it():
     assert behind == pytest.approx(5, rel=0.25) and before < 0.05 and aside == 0
 
 
-@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("missing/hair.png", "no such folder")])
-def test_bad_targets_are_named(tmp_path, name, said):
+@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("file/hair.png", "cannot be written")])
+def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, monkeypatch, name, said):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(preview, "_Film", lambda *arguments: pytest.fail("the drawing was begun"))
     with pytest.raises(NeuralocksError, match=said):
         preview.render(scene(2, 20), tmp_path / name, size=(64, 64), panels=1)
+
+
+def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(preview, "_Film", lambda *arguments: pytest.fail("the drawing was begun"))
+    with pytest.raises(NeuralocksError, match="imageio-ffmpeg is not installed"):
+        preview.render(scene(2, 20), tmp_path / "hair.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_canvas_that_cannot_draw_is_closed(monkeypatch):
+    class Broken:
+        closed = 0
+
+        def __init__(self, *arguments):
+            self._plotter = self
+
+        def render(self):
+            raise RuntimeError("no driver")
+
+        def close(self):
+            Broken.closed += 1
+
+    monkeypatch.setattr(canvas, "VtkCanvas", Broken)
+    assert isinstance(canvas.open_canvas(8, 8, np.zeros((0, 3), int), 1, SMALL), canvas.PlainCanvas)
+    assert Broken.closed == 1

@@ -6,8 +6,10 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import cannot_write
 from usd.bake import bake
 from usd.inspect import inspect
+from usd.spool import Spool
 
 from .shots import JOINTS, Recipe, write_shot
 
@@ -234,12 +236,10 @@ def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
     with pytest.raises(NeuralocksError, match="cannot be written"):
         bake(shot, target / "out.usdc", model)  # a file where a folder should be
 
-    import usd.spool as spool
-
     def full(self, *arguments):
-        raise spool.cannot_write(self.out, OSError(28, "No space left on device"))
+        raise cannot_write(self.out, OSError(28, "No space left on device"))
 
-    monkeypatch.setattr(spool.Spool, "write", full)
+    monkeypatch.setattr(Spool, "write", full)
     with pytest.raises(NeuralocksError, match="no space left"):
         bake(shot, tmp_path / "out.usdc", model)
     monkeypatch.setattr("usd.samples.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that are under their name whole or not at all."""
+
+import errno
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from neuralocks_core.errors import NeuralocksError
+
+
+@contextmanager
+def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
+    """A path to write to beside `path`, which takes its place when the block ends without an error.
+
+    It has the same name in a hidden folder of its own, since writers choose a format by the ending. What is missing of
+    the way to `path` is made. Entered before long work, a folder that cannot be written is known before it.
+
+    Raises:
+        NeuralocksError: for every OSError in the block; nothing is left of it, and what was under `path` stays.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-", ignore_cleanup_errors=True) as folder:
+            part = Path(folder) / path.name
+            yield part
+            os.replace(part, path)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+def cannot_write(path: str | os.PathLike, error: OSError) -> NeuralocksError:
+    """The one line for a file system that refuses."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return NeuralocksError(f"{path}: no space left on the disk; free some, or choose another folder")
+    fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
+    return NeuralocksError(f"{path}: cannot be written ({fact}); choose a folder you can write to")

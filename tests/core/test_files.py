@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A file is whole or not there, whatever happens while it is written."""
+
+import errno
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
+
+
+def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
+    path = tmp_path / "new" / "a.txt"
+    for text in ("one", "two"):
+        with atomic_write(path) as part:
+            part.write_text(text)
+            assert part.suffix == ".txt" and (not path.exists() or path.read_text() == "one")
+    assert path.read_text() == "two" and list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(OSError(errno.ENOSPC, "full"), "no space"), (OSError("odd\nthing"), r"\(odd\)"), (KeyboardInterrupt(), None)],
+    ids=["full", "without a number", "interrupted"],
+)
+def test_a_failure_leaves_what_was_there_and_nothing_beside_it(tmp_path, error, said):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    kind = NeuralocksError if isinstance(error, OSError) else type(error)
+    with pytest.raises(kind, match=said), atomic_write(path) as part:
+        part.write_text("half")
+        raise error
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_cannot_be_is_known_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(NeuralocksError, match="cannot be written"), atomic_write(tmp_path / "file" / "a.txt"):
+        pytest.fail("the work was begun")
