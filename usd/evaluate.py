@@ -16,6 +16,7 @@ from neuralocks_core.resolve import CLAMPED, Resolver
 from neuralocks_core.strands import K, StrandSet, strand_set
 
 from .baked import Baked, read_baked
+from .damage import names_damage
 from .stage import StageGroom
 
 STRANDS = 600
@@ -27,6 +28,7 @@ SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
 
 
+@names_damage
 def evaluate(
     baked,
     reference: bool = False,

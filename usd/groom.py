@@ -12,6 +12,7 @@ from neuralocks_core.groom import Groom
 
 from .border import Border, open_stage, write_stage
 from .curves import find_curves, read_groom
+from .damage import names_damage
 from .placement import Placement
 
 USD = (".usd", ".usda", ".usdc", ".usdz")
@@ -119,6 +120,7 @@ def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()
     return curves
 
 
+@names_damage
 def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[str]]:
     stage = open_stage(source)
     border = Border.of(stage)

@@ -13,6 +13,7 @@ from neuralocks_core.rig.rigging import assemble_rig
 from .attach import attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom
+from .damage import names_damage
 from .groom import USD
 from .placement import Placement
 from .rig_source import read_rig
@@ -50,6 +51,7 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     return {"file": str(path), "kind": "hair", "grooms": [_groom(groom)], "stops": [], "spoils": notes}
 
 
+@names_damage
 def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     stage = open_stage(path)
     stops: list[str] = []

@@ -6,8 +6,10 @@ from pathlib import Path
 from neuralocks_core import preview as drawing
 
 from .baked import Baked, read_baked
+from .damage import names_damage
 
 
+@names_damage
 def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress=None) -> Path:
     """Draw a bake without a display.
 

@@ -13,6 +13,7 @@ from pxr import UsdSkel
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigModel, RigSampler
 
+from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
 from .time_codes import time_codes
@@ -39,6 +40,7 @@ class RigBakeResult:
     notes: list[str]
 
 
+@names_damage
 def bake_rig(
     shot,
     out,

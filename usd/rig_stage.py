@@ -13,6 +13,7 @@ from neuralocks_core.rig.finding import SkinnedMesh
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 
 from .border import Border, open_stage, transformed
+from .damage import names_damage
 from .rig_source import StageRig, read_rig
 
 
@@ -33,6 +34,7 @@ class RiggedHair:
     rig: HairRig = field(repr=False)
 
 
+@names_damage
 def read_rigged_hair(
     path: str | Path,
     *,

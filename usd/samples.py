@@ -17,6 +17,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 
 from .behind import Behind
+from .damage import names_damage
 from .override import OverrideWriter, reload_open, to_text, used_files
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
@@ -33,6 +34,7 @@ class Poser(Protocol):
         """(P, 3) float32, in the prim's own space and units."""
 
 
+@names_damage
 def write_samples(
     shot: Shot,
     out: Path,

@@ -14,6 +14,7 @@ from neuralocks_core.groom import Groom
 from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom
+from .damage import names_damage
 from .placement import Placement
 from .rig_source import StageRig, read_rig
 
@@ -69,6 +70,7 @@ class Shot:
     notes: tuple[str, ...]
 
 
+@names_damage
 def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Shot:
     """Read a shot for a bake.
 
@@ -109,6 +111,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     return Shot(path, stage, border, used, tuple(found), first, last, tuple(dict.fromkeys(notes)))
 
 
+@names_damage
 def read_rigs(
     path, skeleton: str | None = None, head: str | None = None, *, all_shapes: bool = True
 ) -> tuple[StageRig, ...]:

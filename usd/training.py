@@ -16,6 +16,7 @@ from neuralocks_core.training.rollouts import TrainingScene
 from .attach import attach
 from .border import open_stage
 from .curves import find_curves, read_groom
+from .damage import names_damage
 from .grow import Barber
 from .placement import Placement
 from .stage import StageRig, read_rigs
@@ -61,6 +62,7 @@ def training_scene(
     return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
 
 
+@names_damage
 def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[StrandSet]:
     stage = open_stage(Path(source))
     prims = find_curves(stage)

@@ -9,6 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 from usd.bake import bake
 from usd.inspect import inspect
+from usd.stage import read_shot
 from usd.spool import Spool
 
 from .shots import JOINTS, Recipe, write_shot
@@ -183,6 +184,22 @@ def test_truncated_crate_is_refused(tmp_path, model):
             bake(cut, tmp_path / "out.usdc", model)
         cut.unlink()
     assert not list(tmp_path.iterdir())
+
+
+def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
+    """Damage in the middle of a crate file: it opens, and its samples are gone."""
+    path = write_shot(tmp_path, Recipe(extension="usdc", frames=40, vertices=24))
+    whole = path.read_bytes()
+    found = set()
+    for place in range(200, len(whole) - 4000, len(whole) // 24):
+        broken = tmp_path / f"{place}.usdc"
+        broken.write_bytes(whole[:place] + b"\xff" * 64 + whole[place + 64 :])
+        try:
+            read_shot(broken)
+        except NeuralocksError as error:
+            assert str(error).startswith(str(broken)) or "/Hero" in str(error)
+            found.add("damaged" in str(error))
+    assert True in found
 
 
 def test_one_frame_is_a_held_pose(tmp_path, model):
