@@ -67,8 +67,9 @@ def before_save(*_):
 
 @persistent
 def after_save(*_):
-    """Go on as before the save."""
-    live.refresh(bpy.context.scene)
+    """Go on as before the save, in all scenes; last in the one that is shown, for hair that is in others too."""
+    for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
+        live.refresh(scene)
 
 
 @persistent

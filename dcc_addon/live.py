@@ -40,9 +40,20 @@ def refresh(scene, wait: bool = False) -> None:
     """Show the hair of the current frame, outside of a frame change; `wait` as for `update`."""
     if session.paused or scene is None:
         return
-    graph = bpy.context.evaluated_depsgraph_get() if bpy.context.scene == scene else None
+    graph = _graph_of(scene)
     if graph is not None:
         update(scene, graph, wait=wait)
+
+
+def _graph_of(scene):
+    """The depsgraph of a scene, evaluated; None for one that has not been shown yet."""
+    if bpy.context.scene == scene:
+        return bpy.context.evaluated_depsgraph_get()
+    for layer in scene.view_layers:
+        if layer.depsgraph is not None:
+            layer.update()
+            return layer.depsgraph
+    return None
 
 
 def update(scene, graph, moved: bool = False, wait: bool = False) -> None:

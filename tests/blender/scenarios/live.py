@@ -51,6 +51,23 @@ def rest_is_safe(folder: Path) -> None:
     assert not keyed, "a bake has one look, so the sliders have too"
 
 
+def saved_from_elsewhere(folder: Path) -> None:
+    """Saving while another scene is shown leaves the hair of this one as it was."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    points_at(strands, 9)
+
+    def own():
+        return np.array([p.position for p in strands.data.points])
+
+    moved = own()
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "two.blend"))
+    assert apart(own(), moved) == 0.0 and not messages(), messages()
+
+
 def posing(folder: Path) -> None:
     """The hair follows a pose made by hand without a frame change; edited animation is noticed and sampled again."""
     from dcc_addon.session import session
