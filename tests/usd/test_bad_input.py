@@ -9,8 +9,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 from usd.bake import bake
 from usd.inspect import inspect
-from usd.stage import read_shot
 from usd.spool import Spool
+from usd.stage import read_shot
 
 from .shots import JOINTS, Recipe, write_shot
 
