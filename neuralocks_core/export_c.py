@@ -114,7 +114,8 @@ def _example(model: RigModel, header: str, prefix: str) -> str:
     text = (_TEXTS / "example.c.in").read_text(encoding="utf-8")
     for name, wanted in (("DYNAMIC", model.dynamic), ("STATIC", not model.dynamic)):
         text = re.sub(rf"@IF_{name}@\n(.*?)@END@\n", lambda m: m[1] if wanted else "", text, flags=re.S)  # noqa: B023
-    return text.replace("@HEADER@", header).replace("@PREFIX@", prefix).replace("@UPPER@", prefix.upper())
+    names = {"HEADER": header, "STEM": Path(header).stem, "PREFIX": prefix, "UPPER": prefix.upper()}
+    return re.sub("@([A-Z]+)@", lambda m: names[m[1]], text)
 
 
 def _float(value) -> str:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One network in numpy, ONNX and C: the same answers, bounded for anything."""
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -117,6 +118,14 @@ def test_header_and_example_compile_without_a_warning(tmp_path, compiler, dynami
     for options in (("-O0",), ("-O3", "-march=native")):
         program = compiled(tmp_path, source, options, compiler)
         assert "hair_0_1 turns by" in subprocess.run([program], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="no cc here")
+def test_the_example_is_built_by_the_line_that_it_gives(tmp_path):
+    export_c(random_model(), tmp_path / "braid.h")
+    command = re.search(r"cc -std=c99 .*", (tmp_path / "braid_example.c").read_text())[0]
+    done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and "turns by" in done.stdout, done.stderr
 
 
 def test_anything_gives_a_bounded_unit_quaternion(tmp_path):
