@@ -100,7 +100,7 @@ def make_character(path: Path, body_path: Path) -> None:
 
 
 def make_shot(path: Path, character_path: Path) -> None:
-    """Six seconds that loop: a nod, a look aside, a shake, a bow and a hop."""
+    """Eight seconds that loop: a nod, a look aside, a shake, a bow and a hop."""
     source = open_stage(character_path)
     skeleton_prim = next(p for p in source.Traverse() if p.IsA(UsdSkel.Skeleton))
     rig = read_rig(source, skeleton_prim, Border.of(source))

@@ -47,7 +47,7 @@ class Card:
     Attributes:
         title: of what.
         grooms: groom -> measures, plain numbers (NaN where there is nothing to measure) and facts in words.
-        compared: groom -> whose answer ("network", "held pose", "rigid") -> measures; empty without reference.
+        compared: groom -> whose answer ("bake", "held pose", "rigid") -> measures; empty without reference.
         curves: groom -> {"times": (T,), answer: mean tip displacement (T, 3) [m]}.
         notes: what a reader should know, one line each.
     """
@@ -94,7 +94,7 @@ class Card:
         axes = figure.subplots(rows, 3, squeeze=False, sharex="row")
         style = {
             "reference": {"color": "black", "lw": 2.2},
-            "network": {"color": "tab:red", "lw": 1.6},
+            "bake": {"color": "tab:red", "lw": 1.6},
             "held pose": {"color": "tab:blue", "lw": 1, "ls": "--"},
             "rigid": {"color": "0.6", "lw": 1, "ls": ":"},
         }

@@ -29,7 +29,7 @@ class BakeResult:
         grooms: per groom: path, strands, points, joint, how the joint was found.
         notes: what a user should know.
         seconds: wall time.
-        resumed: frames taken over from an interrupted bake.
+        resumed: frames taken over from an interrupted bake, counted for each groom.
     """
 
     path: Path
@@ -72,7 +72,7 @@ def bake(
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
         subframes: samples per frame, for motion blur.
         material: a Material, or words NAME=VALUE.
-        strength: motion strength from 0 (each pose as if held) to 1.
+        strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
         resolve: push hair out of the body after the network.
         loop: the clip's last sample is followed by its first: hair on the first frame remembers the end of the clip.
         velocities: write velocities.

@@ -64,8 +64,8 @@ def evaluate(
     for item in baked.shot.grooms:
         subject = _Subject(baked, item, say)
         measured[item.path] = subject.measures(material)
-        curves[item.path] = {"times": baked.times, "network": metrics.tip_curves(subject.moved)}
-        curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["network"])
+        curves[item.path] = {"times": baked.times, "bake": metrics.tip_curves(subject.moved)}
+        curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
         if reference and len(baked.codes) >= 3:
             rows, tips = subject.compared(material, model)
             compared[item.path] = rows
@@ -188,7 +188,7 @@ class _Subject:
         some = strands.subset(few)
         rig = self.item.attachment.rig
         true = comparison.simulated(self.character, some, rig.clip, times, material, progress=self.say)
-        answers = {"network": self.moved[:, few], "held pose": self._held(material, model, few)}
+        answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
         tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}

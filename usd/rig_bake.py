@@ -28,7 +28,7 @@ class RigBakeResult:
         skeleton: the Skeleton prim.
         animation: the new SkelAnimation prim.
         joints: how many hair joints move.
-        samples: time codes of the rotations.
+        samples: how many time codes the rotations are written at.
         notes: what a user should know.
     """
 
@@ -67,7 +67,7 @@ def bake_rig(
         frames: as `time_codes.time_codes` takes them; the animation's own samples are always among those written.
         subframes: samples a frame.
         loop: the clip's last sample is followed by its first.
-        strength: motion strength of a dynamic model, 0 to 1.
+        strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
         progress: called with (done, total, message).
 
     Raises:

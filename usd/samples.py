@@ -57,7 +57,7 @@ def write_samples(
         progress: called with (done, total, message).
 
     Returns:
-        Frames taken over from an interrupted bake of the same inputs.
+        Frames taken over from an interrupted bake of the same inputs, counted for each groom.
 
     Raises:
         NeuralocksError: the file cannot be written. Nothing is left then, neither under its name nor beside it; only a

@@ -14,8 +14,8 @@ def card():
     return Card(
         "shot.usdc",
         {"/Hair": {"strands": 12, "stretch_percent": 0.0, "droop_cm": 3.25, "settling_s": float("nan")}},
-        {"/Hair": {"network": {"motion_error_median": 0.31}, "rigid": {"motion_error_median": 1.0}}},
-        {"/Hair": {"times": times, "reference": wave, "network": 0.8 * wave, "rigid": 0 * wave}},
+        {"/Hair": {"bake": {"motion_error_median": 0.31}, "rigid": {"motion_error_median": 1.0}}},
+        {"/Hair": {"times": times, "reference": wave, "bake": 0.8 * wave, "rigid": 0 * wave}},
         ("a [note] with brackets",),
     )
 
@@ -30,7 +30,7 @@ def test_text_holds_every_number_and_note():
 def test_json_is_plain_and_says_null_for_what_was_not_measured():
     values = json.loads(card().to_json())
     assert values["grooms"]["/Hair"]["settling_s"] is None
-    assert values["compared"]["/Hair"]["network"]["motion_error_median"] == 0.31
+    assert values["compared"]["/Hair"]["bake"]["motion_error_median"] == 0.31
 
 
 def test_plot_is_a_picture_and_never_half_written(tmp_path):
