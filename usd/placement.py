@@ -25,7 +25,8 @@ class Placement:
                     break
             walk = walk.GetParent()
         self.samples = sorted(set(self.samples))
-        self._still = None if self.samples else self._evaluate(Usd.TimeCode.Default())
+        # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
+        self._still = None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
 
     def at(self, time_code: float) -> np.ndarray:
         """Transform (4, 4) at a time code.
@@ -37,15 +38,12 @@ class Placement:
 
     @property
     def reference(self) -> np.ndarray:
-        """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample.
-
-        An animated transform often has no default value, so the default time would drop its scale.
-        """
+        """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample."""
         return self._still if self._still is not None else self.at(self.samples[0])
 
     def _evaluate(self, time: Usd.TimeCode) -> np.ndarray:
         matrix = column_matrix(UsdGeom.XformCache(time).GetLocalToWorldTransform(self.prim))
-        when = "" if time.IsDefault() else f" at time code {time.GetValue():g}"
+        when = "" if time.IsEarliestTime() else f" at time code {time.GetValue():g}"
         if not np.isfinite(matrix).all():
             raise NeuralocksError(
                 f"{self.prim.GetPath()}: its transform{when} holds NaN or infinity; repair it or a parent's"

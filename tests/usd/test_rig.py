@@ -134,6 +134,16 @@ def test_units_axes_and_rates_cancel(tmp_path):
     assert np.abs(hair_turns(tmp_path / "out_fast.usda", [1, 13, 25, 39]) - wanted).max() < 1e-5
 
 
+def test_a_scale_keyed_once_is_a_scale(tmp_path):
+    """An FBX armature of size 0.01 leaves Blender with one time sample of it and no default value."""
+    wanted = describe_chains(read_rigged_hair(small_shot(tmp_path / "plain.usda")).rig.chains)
+    stage = Usd.Stage.Open(str(small_shot(tmp_path / "fbx.usda", scale=100.0)))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Who")).AddScaleOp().Set(Gf.Vec3f(0.01), 1)
+    stage.GetRootLayer().Save()
+    assert describe_chains(read_rigged_hair(tmp_path / "fbx.usda").rig.chains) == wanted
+
+
 def test_ranges_cannot_change_a_sample(tmp_path):
     """The same bytes twice, and the same samples whatever else is asked for; a dynamic model too."""
     shot = small_shot(tmp_path / "shot.usda")
