@@ -191,7 +191,7 @@ def findings(armature) -> tuple[list[str], str]:
     from .services import rig as rig_service
 
     chosen = armature.neuralocks_character.head_bone
-    key = armature.name_full, len(armature.data.bones), chosen
+    key = armature.name_full, tuple(armature.data.bones.keys()), chosen
     if key not in _findings:
         _findings.clear()
         try:

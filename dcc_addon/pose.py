@@ -21,10 +21,10 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
             f"{armature.name_full}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
         )
     reader = session.readers.get(armature.name_full)
-    if reader is None or len(armature.pose.bones) != len(sampled.rig.bones):
+    if reader is None or tuple(armature.pose.bones.keys()) != reader.bones:
         session.forget_motion(armature.name_full)
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
-    if sampled.key[0] != timing_of(scene) and not sampled.stale:
+    if moved and sampled.key[0] != timing_of(scene):
         sampled.stale = session.wanting = True
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))

@@ -34,11 +34,16 @@ def read(armature, head_bone: str = "") -> RigArrays:
 
 
 class PoseReader:
-    """Reads world transforms of all joints of one armature, fast and in the order of its `RigArrays`."""
+    """Reads world transforms of all joints of one armature, fast and in the order of its `RigArrays`.
+
+    Attributes:
+        bones: names in the armature's own order.
+    """
 
     def __init__(self, armature, bones: tuple[str, ...]):
         self.name = armature.name_full
-        pose = {bone.name: i for i, bone in enumerate(armature.pose.bones)}
+        self.bones = tuple(armature.pose.bones.keys())
+        pose = {name: i for i, name in enumerate(self.bones)}
         self._order = np.array([pose[name] for name in bones], int)
         self._buffer = np.empty((len(pose), 4, 4), np.float32)
 

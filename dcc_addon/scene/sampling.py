@@ -66,7 +66,7 @@ def key_of(armature, scene) -> tuple:
         timing_of(scene),
         tuple(body.name_full for body in bodies),
         settings.head_bone,
-        len(armature.data.bones),
+        tuple(armature.data.bones.keys()),
         tuple(sorted(o.name_full for o in hairs_of(armature, scene))),
     )
 

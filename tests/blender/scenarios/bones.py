@@ -75,3 +75,27 @@ def bones(folder: Path) -> None:
     assert "hair_02" in (folder / "hair.h").read_text()
     for f in still:
         assert apart(turns(f)[others], still[f][others]) < 1e-6
+
+
+def renamed_bones(folder: Path) -> None:
+    """A bone that gets another name is noticed as one more bone would be."""
+    from dcc_addon import live
+    from dcc_addon.panels import findings
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    scene = bpy.context.scene
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    rig.neuralocks_character.rig_live = True
+    scene.frame_set(5)
+    assert not messages() and not live.needs_sampling(scene)
+    assert "Head: head " in findings(rig)[0][0]
+    rig.data.bones["hair.01"].name, rig.data.bones["head"].name = "hair.root", "Head"
+    assert live.needs_sampling(scene) == [rig] and "Head: Head " in findings(rig)[0][0]
+    scene.frame_set(6)
+    assert "bones have changed" in messages()["Rig"], messages()
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    scene.frame_set(7)
+    assert "hair_01" in messages()["Rig"], messages()  # the model was made for other bones
