@@ -175,10 +175,11 @@ def _measured(character, children, tops, meshes) -> HairChains:
         order.append(joint)
         stack += reversed(children[joint])
     order.sort()
+    carries = _carrying(character, order, meshes)
     rows, free = {}, {}
     for joint in order:
         end = None if children[joint] else _free_end(character, joint, joint in tops, meshes, places)
-        if children[joint] or end is not None:
+        if children[joint] and joint in carries or end is not None:
             rows[joint] = len(rows)
             free[joint] = end
     if not rows:
@@ -211,6 +212,23 @@ def _measured(character, children, tops, meshes) -> HairChains:
     _check_scale(skeleton, joints)
     axes = to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
     return HairChains(names, joints, parents, chain, places[joints], axes, bone_joint, bone_end, np.array(bones))
+
+
+def _carrying(character, order, meshes) -> set[int]:
+    """Those of these joints that drive skin or have skin further down: end joints may have ends of their own, which
+    exporters add. All of them where none drives any, as in a rig that nobody has skinned yet.
+    """
+    parents = character.skeleton.parents
+    used = np.zeros(len(parents), bool)
+    for mesh in meshes or ():
+        used |= mesh.driven_by(len(parents))
+    carries = set()
+    for joint in order:
+        up = joint if used[joint] else -1
+        while up >= 0 and up not in carries:
+            carries.add(up)
+            up = int(parents[up])
+    return carries if carries else set(order)
 
 
 def _free_end(character, joint, is_top, meshes, places) -> np.ndarray | None:

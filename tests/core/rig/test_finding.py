@@ -29,6 +29,16 @@ def test_strange_names_are_found_by_what_they_drive():
     assert find_chains(who, [lock, body, jaw]).names == ("J_opt_C_01_1",)
 
 
+def test_an_end_joint_may_have_an_end_of_its_own():
+    """FBX exporters add leaf bones to whatever is last: the bone still ends where the rig's own end joint lies."""
+    who = character(tail("hair", 4))
+    mesh = skin(who, {"hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
+    chains = find_chains(who, [mesh])
+    assert chains.names == ("hair_1", "hair_2")
+    assert chains.chain_length(0) == pytest.approx(2 * np.hypot(0.06, 0.01))
+    assert len(find_chains(who)) == 3  # without skin, nothing tells
+
+
 @pytest.mark.parametrize("name", ["hair_group", "head_twist"])
 def test_a_holder_that_drives_nothing_is_no_bone(name):
     """Whatever its name, with one child as with several: turning it would swing the hair's roots through the skull."""
