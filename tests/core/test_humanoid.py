@@ -95,7 +95,7 @@ def test_a_rig_without_a_head_is_refused_with_the_remedy():
 
 
 def test_missing_joints_fall_back_towards_the_trunk():
-    paths, parents = rig("hips\n spine\n  head")
+    paths, parents = rig("hips\n spine\n  head\n  shoulder_L\n   upper_arm_L")
     humanoid = find_humanoid(paths, parents)
-    assert paths[humanoid.nearest("left_upper_arm")] in paths
-    assert humanoid.nearest("neck") == humanoid["head"] or "neck" in humanoid
+    wanted = {"left_lower_arm": "upper_arm_L", "right_lower_arm": "spine", "right_shoulder": "spine", "neck": "head"}
+    assert {name: paths[humanoid.nearest(name)].rpartition("/")[2] for name in wanted} == wanted
