@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line `neuralocks`. Each command imports what it needs when it runs, so that `--help` comes at once."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,8 +8,9 @@ import typer
 
 from .cli_bake import bake_command, simulate_command
 from .cli_train import train_command
-from .command import command_of, note, one_line, print_json
+from .command import command_of, note, print_json
 from .options import AsJson, Head, Joints, Model, Out, Skeleton, numbers, pairs
+from .rig_cli import app as rig_app
 
 app = typer.Typer(
     name="neuralocks",
@@ -25,27 +25,12 @@ command = command_of(app)
 command("bake")(bake_command)
 command("simulate")(simulate_command)
 command("train")(train_command)
+app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of `neuralocks`."""
-    from neuralocks_core.errors import NeuralocksError
-
-    _add_rig()
-    try:
-        app(arguments)
-    except NeuralocksError as error:  # from commands of other modules
-        one_line(f"error: {error}")
-        sys.exit(1)
-
-
-def _add_rig() -> None:
-    try:
-        from .rig_cli import app as rig_app
-    except ModuleNotFoundError:
-        return
-    if not any(group.name == "rig" for group in app.registered_groups):
-        app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
+    app(arguments)
 
 
 @command("import")

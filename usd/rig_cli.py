@@ -11,15 +11,13 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 
 from .command import command_of, note, print_json
+from .options import AsJson, Head, Skeleton
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
 command = command_of(app)
 
-Head = Annotated[str | None, typer.Option(help="Joint that carries the hair, if it is not named like a head.")]
-Skeleton = Annotated[str | None, typer.Option(help="Skeleton prim, where several have hair chains.")]
 Chains = Annotated[list[str] | None, typer.Option(help="Name pattern of hair chains' first joints, such as 'Hair*_1'.")]
-Json = Annotated[bool, typer.Option("--json", help="Print for a machine to read.")]
 Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
 
 
@@ -41,7 +39,7 @@ def train(
     chains: Chains = None,
     head: Head = None,
     skeleton: Skeleton = None,
-    as_json: Json = False,
+    as_json: AsJson = False,
 ) -> None:
     """Train a tiny network for the hair joints of one rig. No data is needed."""
     if out.suffix != ".neuralocks":
@@ -99,7 +97,7 @@ def bake(
     strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
     head: Head = None,
     skeleton: Skeleton = None,
-    as_json: Json = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write the hair joints' animation as an override layer of the shot."""
     from .rig_bake import bake_rig
@@ -159,7 +157,7 @@ def inspect(
     chains: Chains = None,
     head: Head = None,
     skeleton: Skeleton = None,
-    as_json: Json = False,
+    as_json: AsJson = False,
 ) -> None:
     """List the hair chains of a rig with their lengths and joint counts."""
     from .rig_stage import describe_chains, read_rigged_hair, weight_notes

@@ -4,7 +4,7 @@
     next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt + gravity
     direction * gravity power dt
 
-then back to the bone's length, out of colliders, and the joint turns from its rest axis to the new one. State is
+then back to the bone's length, and the joint turns from its rest axis to the new one. State is
 carried from frame to frame, and drag acts per frame, whatever its length: that is the specified behaviour.
 """
 
@@ -25,13 +25,11 @@ class SpringSettings:
         stiffness: pull to the rest direction [m/s].
         drag: share of the tail's motion that is lost each frame.
         gravity_power: pull downwards [m/s].
-        hit_radius: of a tail [m].
     """
 
     stiffness: float = 1.0
     drag: float = 0.4
     gravity_power: float = 0.0
-    hit_radius: float = 0.0
 
 
 def spring_bones(
@@ -39,7 +37,6 @@ def spring_bones(
     heads: np.ndarray,
     step: float,
     settings: SpringSettings = SpringSettings(),
-    spheres: np.ndarray | None = None,
 ) -> np.ndarray:
     """Turns (C, T, N, 4) wxyz, canonical, of joints that swing as spring bones.
 
@@ -48,7 +45,6 @@ def spring_bones(
         heads: canonical space to world, (C, T, 4, 4).
         step: time between frames [s].
         settings: as the artist sets them.
-        spheres: colliders fixed to the head: centre and radius, canonical, (K, 4) [m].
     """
     heads = np.asarray(heads, float)
     clips, frames = heads.shape[:2]
@@ -70,13 +66,6 @@ def spring_bones(
             new = tail[:, j] + (tail[:, j] - previous[:, j]) * (1 - settings.drag)
             new = new + axis * settings.stiffness * step + np.array([0.0, -1.0, 0.0]) * settings.gravity_power * step
             new = _at_length(place[:, j], new, lengths[j])
-            for sphere in spheres if spheres is not None else ():
-                centre = rotation @ sphere[:3] + origin
-                off = new - centre
-                distance = np.linalg.norm(off, axis=-1, keepdims=True)
-                reach = sphere[3] + settings.hit_radius
-                out = centre + off / np.maximum(distance, 1e-9) * reach
-                new = np.where(distance < reach, _at_length(place[:, j], out, lengths[j]), new)
             previous[:, j], tail[:, j] = tail[:, j], new
             local = np.einsum("cji,cj->ci", carrier, new - place[:, j]) / lengths[j]
             turn = _from_to(bones[j] / lengths[j], local)
