@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes on beside Blender: sampling in the background, hair prepared by threads, work that is cancelled."""
+
+import time
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, apart, make_live, messages, points_at
+
+
+def prepared_once(_folder: Path) -> None:
+    """An edit of one character's animation prepares no hair again, neither its own nor that of others; an edit of its
+    body, and another armature for the hair, do.
+    """
+    from dcc_addon.session import session
+
+    first, second = scenes.armature("Anna"), scenes.armature("Ben")
+    scenes.dance(first)
+    scenes.dance(second)
+    skin = scenes.body(first)
+    one, two = scenes.hair(first, 20, name="One"), scenes.hair(second, 30, name="Two")
+    make_live(first, one)
+    make_live(second, two)
+    before = points_at(one, 12)
+    prepared = dict(session.hairs)
+    assert set(prepared) == {"One", "Two"}
+
+    def sample():
+        bpy.context.scene.neuralocks.armature = first
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+    def fresh(hair):
+        """Points of hair that is prepared anew."""
+        session.hairs.clear()
+        return points_at(hair, 12)
+
+    first.pose.bones["head"].rotation_euler[1] += 0.5
+    first.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
+    sample()
+    edited = points_at(one, 12)
+    assert session.hairs == prepared and apart(edited, before) > 0.01
+    assert apart(fresh(one), edited) == 0.0
+    points_at(two, 12)
+    prepared = dict(session.hairs)
+
+    for vertex in skin.data.vertices:
+        vertex.co.x *= 1.3
+    sample()
+    wide = points_at(one, 12)
+    assert session.hairs["Two"] is prepared["Two"] and session.hairs["One"] is not prepared["One"]
+    assert apart(fresh(one), wide) == 0.0
+
+    prepared = session.hairs["One"]
+    one.location.y += 0.05  # the same character, yet other hair on it
+    sample()
+    there = points_at(one, 12)
+    assert session.hairs["One"] is not prepared and apart(fresh(one), there) == 0.0
+
+    one.neuralocks_hair.armature = one.parent = second
+    bpy.context.scene.neuralocks.armature = second
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    moved = points_at(one, 12)
+    assert apart(moved, there) > 0.001 and apart(fresh(one), moved) == 0.0
+    assert not messages(), messages()
+
+
+def prepared_beside(_folder: Path) -> None:
+    """In a window a thread prepares the hair: at rest until then, as ever afterwards; Live cancels; a render waits."""
+    from dcc_addon import live, live_strands, preparing, properties
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 1500)
+    own = strands.neuralocks_hair
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+    own.live = False
+    groomed = points_at(strands, 9)
+    live_strands.at_once = lambda graph: graph.mode == "RENDER"
+    properties._by_script = lambda context: False
+
+    def finish():
+        while preparing.look() is not None:
+            time.sleep(0.01)
+        assert not session.preparing
+
+    own.live = True
+    assert session.preparing and apart(scenes.points(strands), groomed) == 0.0
+    points_at(strands, 12)
+    assert apart(points_at(strands, 9), groomed) == 0.0
+    finish()
+    assert apart(scenes.points(strands), shown) == 0.0 and not messages(), messages()
+
+    own.live = False
+    own.live = True
+    assert session.preparing
+    own.live = False
+    finish()
+    assert not session.hairs and apart(scenes.points(strands), groomed) == 0.0
+
+    own.model = "/nowhere.neuralocks"
+    own.live = True
+    finish()
+    assert "no such" in messages()["Hair"], messages()
+    own.model = MODEL
+    assert session.preparing
+    live.refresh(bpy.context.scene, wait=True)
+    assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
+
+
+def loaded_meanwhile(folder: Path) -> None:
+    """Another file is opened while frames are stepped, or Blender ends a bake that the panel shows: live goes on."""
+    from types import SimpleNamespace
+
+    from dcc_addon.operators.bake import bake_steps
+    from dcc_addon.operators.base import Stepwise
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    steps = bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
+    next(steps)
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    try:
+        steps.close()
+    except ReferenceError:
+        pass
+    assert session.paused == 0, session.paused
+    rig, strands = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert apart(points_at(strands, 9), shown) == 0.0
+
+    ended = []
+    manager = SimpleNamespace(event_timer_remove=ended.append, progress_end=lambda: ended.append("progress"))
+    running = Stepwise()
+    running._timer, running._steps = "timer", bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
+    next(running._steps)
+    assert session.paused == 1
+    running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
+    assert session.paused == 0 and ended == ["timer", "progress"]
+    assert apart(points_at(strands, 9), shown) == 0.0
+
+
+def prepared_together(_folder: Path) -> None:
+    """Showing one hair may stop what others are prepared from, or fail: the rest arrives all the same."""
+    import dcc_addon.preparing as preparing
+    from dcc_addon.session import session
+
+    arrived = []
+
+    def wait():
+        while preparing.look() is not None:
+            time.sleep(0.01)
+
+    def stop_the_second(name):
+        arrived.append(name)
+        session.stop_preparing("Two")
+
+    def fail(name):
+        arrived.append(name)
+        raise KeyError(name)
+
+    for name, then in (("One", stop_the_second), ("Two", arrived.append), ("Three", fail), ("Four", arrived.append)):
+        preparing.start(name, lambda say, name=name: name.lower(), then)
+    while any(job.running for job in session.preparing.values()):
+        time.sleep(0.01)
+    wait()
+    assert arrived == ["One", "Three", "Four"], arrived
+    assert session.hairs == {"One": "one", "Three": "three", "Four": "four"}, session.hairs
+    assert "KeyError" in messages()["Three"] and not session.preparing
+
+
+def sampled_beside(_folder: Path) -> None:
+    """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is mended."""
+    from dcc_addon import background
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+
+    def sample():
+        session.rigs["Rig"].stale = True
+        while background._tick() is not None:
+            pass
+        assert session.sampling is None and not background._work
+
+    def broken(_context, _armature):
+        yield 1, 2
+        raise KeyError("a bone")
+
+    working, background.sample = background.sample, broken
+    sample()
+    assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
+    background.sample = working
+    sample()
+    assert session.rigs["Rig"].stale, "what has failed is not tried again and again"
+
+    rig.scale = (-1, 1, 1)
+    bpy.context.view_layer.update()
+    assert not session.failed
+    sample()
+    assert "mirrored" in messages()["Rig"] and session.failed == {"Rig"}
+    rig.scale = (1, 1, 1)
+    bpy.context.view_layer.update()
+    sample()
+    assert not messages() and not session.rigs["Rig"].stale, messages()
+    assert apart(points_at(strands, 9), shown) == 0.0
