@@ -144,6 +144,15 @@ class Character:
         transform[:3, 3] = self.skeleton.bind[self.head, :3, 3]
         return transform
 
+    @cached_property
+    def bind_to_canonical(self) -> np.ndarray:
+        """Transform (4, 4) from bind world to canonical space."""
+        return np.linalg.inv(self.canonical_to_bind)
+
+    def canonical(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the bind pose [m], world, in canonical space."""
+        return points @ self.bind_to_canonical[:3, :3].T + self.bind_to_canonical[:3, 3]
+
     def carrying(self, joints: np.ndarray) -> np.ndarray:
         """Rigid transforms (..., 4, 4), bind world to posed world, with which the head carries the groom.
 

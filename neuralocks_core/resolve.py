@@ -53,9 +53,7 @@ class Resolver:
         """The exact collider in bind pose, if there is a body."""
         if self.body is None:
             return None
-        to_canonical = np.linalg.inv(self.character.canonical_to_bind)
-        points = self.body.shaped(self._constant) @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-        return Collider(points, self.body.triangles)
+        return Collider(self.character.canonical(self.body.shaped(self._constant)), self.body.triangles)
 
     def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
         """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: to measure with."""
@@ -115,7 +113,7 @@ class Resolver:
         length = float(strands.length[strands.valid].max())
         roots = strands.rest[strands.valid, 0]
         low, high = roots.min(axis=0) - length, roots.max(axis=0) + length
-        return NearBody(body, np.linalg.inv(character.canonical_to_bind), still, low, high)
+        return NearBody(body, character.bind_to_canonical, still, low, high)
 
     @property
     def _constant(self) -> np.ndarray:
@@ -221,14 +219,13 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion."""
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
     shift = turn = np.zeros(len(character.skeleton.names))
     for joints in clip.joints:
         against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
         off = against @ character.canonical_to_bind - np.eye(4)
         turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
         shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
-    far = np.linalg.norm(body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3], axis=1)
+    far = np.linalg.norm(character.canonical(body.points), axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
     return np.sum(body.joint_weights * each, axis=1) < STILL
 
@@ -240,8 +237,7 @@ def _within_reach(character: Character, strands: StrandSet) -> Body | None:
     roots = strands.rest[strands.valid, 0]
     if not len(roots):
         return None
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
-    points = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    points = character.canonical(body.points)
     low, high = roots.min(axis=0), roots.max(axis=0)
     near = np.linalg.norm(points - np.clip(points, low, high), axis=1) < length + 0.15
     faces = body.triangles[near[body.triangles].any(axis=1)]

@@ -167,8 +167,7 @@ def _by_itself(character, children, below, meshes) -> list[int]:
 
 def _measured(character, children, tops, meshes) -> HairChains:
     skeleton = character.skeleton
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
-    places = skeleton.bind[:, :3, 3] @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    places = character.canonical(skeleton.bind[:, :3, 3])
     order, stack = [], list(reversed(tops))
     while stack:
         joint = stack.pop()
@@ -210,7 +209,7 @@ def _measured(character, children, tops, meshes) -> HairChains:
     for row, parent in enumerate(parents):
         chain[row] = chain[parent] if parent >= 0 else (parents[:row] < 0).sum()
     _check_scale(skeleton, joints)
-    axes = to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
+    axes = character.bind_to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
     return HairChains(names, joints, parents, chain, places[joints], axes, bone_joint, bone_end, np.array(bones))
 
 
@@ -236,14 +235,13 @@ def _free_end(character, joint, is_top, meshes, places) -> np.ndarray | None:
     is an end marker.
     """
     parent = int(character.skeleton.parents[joint])
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
     points = [
         mesh.points[np.sum(mesh.joint_weights * (mesh.joint_indices == joint), axis=1) > 0.3] for mesh in meshes or ()
     ]
     points = np.concatenate(points) if points else np.zeros((0, 3))
     if not len(points):
         return None
-    reach = points @ to_canonical[:3, :3].T + to_canonical[:3, 3] - places[joint]
+    reach = character.canonical(points) - places[joint]
     along = reach.mean(axis=0) if is_top else places[joint] - places[parent]
     size = np.linalg.norm(along)
     if size < _NO_BONE:

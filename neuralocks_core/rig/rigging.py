@@ -39,7 +39,6 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
     moving[chains.joints] = True
     for joint in range(count):
         moving[joint] |= skeleton.parents[joint] >= 0 and moving[skeleton.parents[joint]]
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
     body_triangles, points, weights, triangles = [], [], [], []
     start, taken = 0, 0
     for mesh, (body, moved) in zip(meshes, split_meshes(meshes, skeleton.parents, character.head, moving)):
@@ -47,7 +46,7 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
         start += len(mesh.points)
         if not moved.any():
             continue
-        points.append(mesh.points[moved] @ to_canonical[:3, :3].T + to_canonical[:3, 3])
+        points.append(character.canonical(mesh.points[moved]))
         weights.append(
             skin_weights(chains, count, skeleton.parents, mesh.joint_indices[moved], mesh.joint_weights[moved])
         )

@@ -19,8 +19,7 @@ def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | 
     body = character.body
     if body is None:
         return None
-    to_canonical = np.linalg.inv(character.canonical_to_bind)
-    points = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+    points = character.canonical(body.points)
     near = (points[:, 1] > -reach) & (np.abs(points[:, 0]) < 0.45)
     faces = body.triangles[near[body.triangles].all(axis=1)]
     used = np.unique(faces)

@@ -124,7 +124,7 @@ class _BodyPatch:
     def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
         body, character = rig.character.body, rig.character
         reach = np.linalg.norm(rig.points, axis=1).max() + 0.2
-        near = np.linalg.norm(_canonical(rig), axis=1) < reach
+        near = np.linalg.norm(rig.character.canonical(rig.character.body.points), axis=1) < reach
         inside = near[body.triangles].all(axis=1)
         used = np.unique(body.triangles[inside])
         place = np.zeros(len(body.points), int)
@@ -166,7 +166,7 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     body = rig.character.body
     if body is None:
         return np.full(len(points), np.inf)
-    return Collider(_canonical(rig), body.triangles).distance(points)[0]
+    return Collider(rig.character.canonical(rig.character.body.points), body.triangles).distance(points)[0]
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:
@@ -218,7 +218,7 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tup
     body, character = rig.character.body, rig.character
     if body is None:
         return None
-    canonical = _canonical(rig)
+    canonical = rig.character.canonical(rig.character.body.points)
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
@@ -232,9 +232,3 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tup
         points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
         turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
     return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)
-
-
-def _canonical(rig: HairRig) -> np.ndarray:
-    """The body's vertices in bind pose (V, 3) [m], canonical."""
-    to_canonical = np.linalg.inv(rig.character.canonical_to_bind)
-    return rig.character.body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
