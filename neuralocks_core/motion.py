@@ -24,7 +24,8 @@ class Clip:
         times: ascending sample times, (T,) [s].
         joints: world transforms, (T, J, 4, 4) [m].
         shape: blend shape weights, (T, B) or (T, 0).
-        loop: whether the last sample is followed by the first, so that history is taken modulo the period.
+        loop: whether the motion repeats, the last sample showing the pose of the first; history is then taken modulo the
+            period.
     """
 
     times: np.ndarray

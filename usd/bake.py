@@ -74,7 +74,7 @@ def bake(
         material: a Material, or words NAME=VALUE.
         strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
         resolve: push hair out of the body after the network.
-        loop: the clip's last sample is followed by its first: hair on the first frame remembers the end of the clip.
+        loop: the clip repeats, its last sample shows the pose of its first: hair there remembers the end of the clip.
         velocities: write velocities.
         jobs: threads; all cores if left out.
         progress: called with (done, total, message); raising from it stops the bake.
@@ -103,7 +103,8 @@ def bake(
         return GroomPoser(item, strand_model, look, **options)
 
     resumed = write_samples(shot, out, codes, poser, inputs | options, velocities=velocities, progress=progress)
-    return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)
+    notes = [*shot.notes, *(text for rig in shot.rigs if loop for text in rig.loop_notes())]
+    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 
 def as_material(material) -> Material:

@@ -23,7 +23,9 @@ def bake_command(
     material: Materials = None,
     strength: Annotated[float, typer.Option(help="Motion strength: 0 is each pose as if held, 1 as trained.")] = 1.0,
     resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
-    loop: Annotated[bool, typer.Option("--loop", help="The clip's last sample is followed by its first.")] = False,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
+    ] = False,
     velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
     jobs: Jobs = None,
     as_json: AsJson = False,

@@ -23,7 +23,7 @@ class GroomPoser:
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
         resolve: push hair out of the body after the network.
-        loop: the clip's last sample is followed by its first.
+        loop: the clip repeats, its last sample shows the pose of its first.
     """
 
     def __init__(

@@ -66,7 +66,7 @@ def bake_rig(
         head: joint that carries the hair.
         frames: as `time_codes.time_codes` takes them; the animation's own samples are always among those written.
         subframes: samples a frame.
-        loop: the clip's last sample is followed by its first.
+        loop: the clip repeats, its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
         progress: called with (done, total, message).
 
@@ -90,6 +90,7 @@ def bake_rig(
     turns = _turns(hair, model, codes, loop, strength, progress)
     animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
+    notes += hair.source.loop_notes() if loop else []
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 

@@ -93,7 +93,9 @@ def bake(
     model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
     frames: Annotated[str | None, typer.Option(help="A:B[:STEP]; the shot's range if left out.")] = None,
     subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
-    loop: Annotated[bool, typer.Option("--loop", help="The clip's last sample is followed by its first.")] = False,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
+    ] = False,
     strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
     head: Head = None,
     skeleton: Skeleton = None,

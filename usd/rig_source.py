@@ -17,6 +17,9 @@ from .border import Border
 from .joints import JointSource
 from .surface import SkinnedMesh, bound_meshes, merged_body
 
+LOOP_GAP = 2.0
+"""Turn of a joint from the last sample of a loop to its first [degrees] that is worth a word."""
+
 
 @dataclass(frozen=True)
 class StageRig:
@@ -48,6 +51,19 @@ class StageRig:
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+
+    def loop_notes(self) -> list[str]:
+        """What is wrong with the motion as a loop: its last sample must show the pose of its first."""
+        ends = self.clip.joints[[0, -1], :, :3, :3]
+        first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
+        turn = np.degrees(np.arccos(np.clip((np.einsum("jab,jab->j", first, last) - 1) / 2, -1, 1)))
+        if turn.max() <= LOOP_GAP:
+            return []
+        name, (start, end) = self.source.names[int(turn.argmax())], self.time_codes[[0, -1]]
+        return [
+            f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
+            "a loop ends with the pose that it begins with"
+        ]
 
     @cached_property
     def _to_world(self) -> np.ndarray:

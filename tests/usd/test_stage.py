@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading stages: poses as UsdSkel evaluates them, skin as UsdSkel deforms it, and which joint carries what."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
 from usd.border import Border
 from usd.stage import read_rigs, read_shot
 
@@ -137,6 +139,14 @@ def test_rigs_are_read_without_grooms_or_animation(tmp_path):
     assert len(read_rigs(path)[0].clip.times) == 1
     with pytest.raises(NeuralocksError, match="no animation"):
         read_shot(path)
+
+
+def test_a_loop_that_does_not_close_is_said(tmp_path):
+    rig = read_shot(write_shot(tmp_path)).rigs[0]
+    closed = replace(rig, clip=Clip(rig.clip.times[:3], rig.clip.joints[[0, 1, 0]]))
+    assert not closed.loop_notes()
+    (note,) = rig.loop_notes()
+    assert "/Hero/Rig" in note and "time codes 1 and 9" in note
 
 
 @given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
