@@ -43,14 +43,16 @@ def _tick():
     scene = context.scene
     if _busy(context):
         return PAUSE
+    if _work and _work[0][0] != scene.name_full:  # another one is shown since
+        _work.clear()
     if not _work:
         todo = [a for a in needs_sampling(scene) if a.name_full not in session.failed]
         if not todo:
             session.sampling = None
             _redraw(context)
             return None
-        _work.append((todo[0].name_full, sample(context, todo[0])))
-    name, frames = _work[0]
+        _work.append((scene.name_full, todo[0].name_full, sample(context, todo[0])))
+    _, name, frames = _work[0]
     end = time.perf_counter() + SLICE
     try:
         with stepping(scene):

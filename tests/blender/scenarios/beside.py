@@ -215,3 +215,12 @@ def sampled_beside(_folder: Path) -> None:
     sample()
     assert not messages() and not session.rigs["Rig"].stale, messages()
     assert apart(points_at(strands, 9), shown) == 0.0
+
+    background.SLICE, session.rigs["Rig"].stale, scene = 0.0, True, bpy.context.scene
+    background._tick()
+    assert session.sampling is not None
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    assert background._tick() is None and session.sampling is None, "nobody looks at what was sampled"
+    bpy.context.window.scene = scene
+    sample()
+    assert not messages() and not session.rigs["Rig"].stale, messages()
