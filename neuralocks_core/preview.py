@@ -14,6 +14,7 @@ from neuralocks_core import shading
 from neuralocks_core.canvas import Camera, open_canvas
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
+from neuralocks_core.normals import vertex_normals
 
 SUFFIXES = (".png", ".mp4", ".gif")
 
@@ -155,7 +156,7 @@ class _Film:
         body, body_tint = None, np.zeros((0, 3))
         if scene.body is not None:
             body = np.asarray(scene.body(frame), float)
-            normals = shading.vertex_normals(body, scene.triangles)
+            normals = vertex_normals(body, scene.triangles)
             body_tint = shading.body_colours(body, normals, self._albedo, shadow, camera.to_eye, self._axes)
         return body, body_tint, hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3))
 

@@ -167,14 +167,6 @@ def srgb(linear: np.ndarray) -> np.ndarray:
     return np.clip(np.where(toned < 0.0031308, 12.92 * toned, 1.055 * toned ** (1 / 2.4) - 0.055), 0, 1)
 
 
-def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area-weighted unit normals (V, 3)."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    face = np.cross(b - a, c - a)
-    result = np.stack([np.bincount(triangles.ravel(), np.repeat(face[:, i], 3), len(points)) for i in range(3)], axis=1)
-    return result / np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-12)
-
-
 def _highlight(tangent, outward, half, shift, sharpness):
     bent = tangent + shift * outward
     along = bent @ half

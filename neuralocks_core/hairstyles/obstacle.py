@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NeuralocksError
+from ..normals import vertex_normals
 from .scalp import Scalp
 
 _CELL = 0.08
@@ -90,13 +91,10 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
         raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     face = np.cross(b - a, c - a)
-    normal = np.zeros_like(points)
-    for corner in range(3):
-        np.add.at(normal, triangles[:, corner], face)
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
     used = np.unique(triangles)
     sample = np.concatenate([points[used], (a + b + c) / 3])
-    normal = np.concatenate([normal[used], face])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal = np.concatenate([vertex_normals(points, triangles)[used], face])
     low, high = grid.min(axis=0) - 0.1, grid.max(axis=0) + 0.1
     inside = ((sample > low) & (sample < high)).all(axis=1)
     if not inside.any():

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NeuralocksError
+from ..normals import vertex_normals
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
 # forehead, up is in skull heights from the head's centre. From the nape behind and over the ear, the
@@ -94,7 +95,7 @@ class Scalp:
         order = np.argsort(random.random(len(place)) / np.maximum(chance, 1e-6), kind="stable")[:count]
         order.sort()
         order = random.permutation(order)
-        normals = self._normals()[self.triangles[triangle[order]]]
+        normals = vertex_normals(self.points, self.triangles)[self.triangles[triangle[order]]]
         normal = np.einsum("nc,nci->ni", weight[order], normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         return Roots(place[order], normal, border[order] * 0.1 * self.radius)
@@ -122,15 +123,6 @@ class Scalp:
         near = cKDTree(every).query_ball_point(places, reach, return_length=True)
         filled = near * self.area / len(every) / (np.pi * reach**2)
         return np.clip((filled - 0.38) / 0.2, 0.0, 1.0)
-
-    def _normals(self) -> np.ndarray:
-        """(V, 3) unit normals of the points; zero off the scalp."""
-        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
-        face = np.cross(b - a, c - a)
-        normal = np.zeros_like(self.points)
-        for corner in range(3):
-            np.add.at(normal, self.triangles[:, corner], face)
-        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
 @dataclass(frozen=True, eq=False)

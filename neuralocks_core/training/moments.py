@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from neuralocks_core.locks import lock_mates, neighbours
+from neuralocks_core.normals import vertex_normals
 from neuralocks_core.physics.body_collision import MARGIN
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density
@@ -171,13 +172,3 @@ def nearest_planes(surface: cKDTree, normals: np.ndarray, points: np.ndarray) ->
     planes = np.concatenate([normal, offset[..., None]], axis=-1)
     planes[~contact] = (0.0, 0.0, 0.0, -1000.0)
     return planes.astype(np.float32), distance.astype(np.float32)
-
-
-def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(V, 3) outward unit normals, weighted by the area of the faces around."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    across = np.cross(b - a, c - a)
-    normals = np.zeros_like(points)
-    for corner in range(3):
-        np.add.at(normals, triangles[:, corner], across)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

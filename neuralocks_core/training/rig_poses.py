@@ -5,6 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.collider import Collider
+from neuralocks_core.normals import vertex_normals
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
@@ -147,7 +148,7 @@ class _BodyPatch:
         shaped = self.points + np.tensordot(shape, self.offsets, 1)
         blended = np.einsum("vi,vixy->vxy", self.weights, skinning[self.indices, :3])
         points = (np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]).astype(np.float32)
-        return points, _normals(points, self.triangles)
+        return points, vertex_normals(points, self.triangles).astype(np.float32)
 
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -203,14 +204,6 @@ def _random_skinning(character, count, rng) -> np.ndarray:
     return skinning
 
 
-def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area-weighted unit vertex normals (V, 3) float32."""
-    a, b, c = (points[triangles[:, i]].astype(float) for i in range(3))
-    face = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(triangles.ravel(), np.repeat(face[:, i], 3), len(points)) for i in range(3)], axis=1)
-    return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)).astype(np.float32)
-
-
 def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tuple[np.ndarray, np.ndarray] | None:
     """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
     canonical space of the head.
@@ -223,7 +216,7 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tup
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
     chosen = np.sort(np.random.default_rng(0).permutation(near)[:most_points])
-    normals = _normals(body.points.astype(np.float32), body.triangles)[chosen].astype(float)
+    normals = vertex_normals(body.points, body.triangles)[chosen]
     to_head = np.linalg.inv(character.canonical_to_world(joints))
     skinning = to_head[:, None] @ joints @ character.inverse_bind
     points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
