@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
 
-import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
@@ -12,9 +11,6 @@ from .scene import rotations
 from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
-
-SAME = 1e-7
-"""Quaternions that differ by less are the same turn."""
 
 
 def live_armatures(scene) -> list:
@@ -42,13 +38,14 @@ def _update(armature, scene, graph, moved) -> None:
     turns = bones.turns([shown_frame(scene) / sampled.motion.rate], settings.rig_motion, joints[None])[0]
     if not settings.rig_kept:
         settings.rig_kept = rotations.kept(armature, bones.bones)
-    changed = False
-    for name, turn in zip(bones.bones, turns.tolist(), strict=True):
-        bone = armature.pose.bones[name]
-        if bone.rotation_mode != "QUATERNION" or np.abs(np.subtract(bone.rotation_quaternion, turn)).max() > SAME:
-            bone.rotation_mode, bone.rotation_quaternion, changed = "QUATERNION", turn, True
-    if changed:  # a tag is an update, which calls here again: it must end when nothing changes any more
-        armature.update_tag()
+    own = armature.pose.bones
+    changed = [rotations.turn(own[name], bones.modes[name], turn) for name, turn in zip(bones.bones, turns.tolist())]
+    if any(changed):  # a tag is an update, which calls here again: it must end when nothing changes any more
+        if graph.mode == "RENDER":
+            # What is tagged is copied for the render as it is in the viewport, at another frame: it is animated again.
+            armature.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+        else:
+            armature.update_tag()
     session.messages.pop(armature.name_full, None)
 
 
@@ -61,6 +58,7 @@ def bind(armature, sampled) -> LiveBones:
         bones = session.chains[armature.name_full] = LiveBones.of(
             model, sampled.rig, sampled.character, settings.chains
         )
+        bones.modes = rotations.free_modes(armature, bones.bones)
     bones.follow(sampled.character, sampled.clip)
     return bones
 

@@ -3,6 +3,15 @@
 
 import json
 
+import bpy
+import numpy as np
+from mathutils import Quaternion
+
+SAME = 1e-7
+"""Values that differ by less are the same turn."""
+CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
+"""By rotation mode, where a bone keeps how it is turned."""
+
 
 def kept(armature, bones) -> str:
     """Rotation modes, and the values of every mode, of the bones named, as JSON."""
@@ -32,3 +41,45 @@ def give_back(armature, text: str) -> bool:
     if found:
         armature.update_tag()
     return bool(found)
+
+
+def free_modes(armature, bones) -> dict[str, str]:
+    """For each bone a rotation mode whose values no animation writes; the last of them where all are animated."""
+    animated = _animated(armature.animation_data)
+    found = {}
+    for name in bones:
+        start = f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
+        found[name] = next((mode for mode, channel in CHANNELS.items() if start + channel not in animated), "XYZ")
+    return found
+
+
+def turn(bone, mode: str, wxyz) -> bool:
+    """Turn a bone in a rotation mode; whether that changed anything."""
+    values = np.array(wxyz, np.float32)
+    if mode == "AXIS_ANGLE":
+        axis, angle = Quaternion(wxyz).to_axis_angle()
+        values = np.array([angle, *axis], np.float32)
+    elif mode == "XYZ":
+        values = np.array(Quaternion(wxyz).to_euler("XYZ"), np.float32)
+    if bone.rotation_mode == mode and np.abs(np.subtract(getattr(bone, CHANNELS[mode]), values)).max() <= SAME:
+        return False
+    bone.rotation_mode = mode
+    setattr(bone, CHANNELS[mode], values)
+    return True
+
+
+def _animated(data) -> set[str]:
+    """Paths that actions, strips and drivers write."""
+    if data is None:
+        return set()
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    for strip in strips:  # grows: strips within strips
+        strips.extend(getattr(strip, "strips", ()))
+    actions = {data.action, *(strip.action for strip in strips)} - {None}
+    return {curve.data_path for curve in [*data.drivers, *(c for action in actions for c in _curves(action))]}
+
+
+def _curves(action) -> list:
+    if hasattr(action, "fcurves"):
+        return list(action.fcurves)
+    return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair bones: which they are, and how they turn at any time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -38,11 +38,13 @@ class LiveBones:
     Attributes:
         bones: names of the hair bones, (N), as in Blender.
         joints: their places in the skeleton, (N,).
+        modes: by bone, the rotation mode in which it is turned.
     """
 
     model: RigModel
     bones: tuple[str, ...]
     joints: np.ndarray
+    modes: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":

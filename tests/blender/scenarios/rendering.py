@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a renderer is given, seen by an engine of our own."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import apart, make_live, messages
+
+
+def rendered(folder: Path) -> None:
+    """An animation is rendered as it is shown, with live strands and live hair bones, keyed ones too: every bone of the
+    rig and every point of the hair.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    tail = rig.pose.bones["hair.02"]
+    tail.rotation_mode = "QUATERNION"
+    for frame in (1, 24):  # as a key on the whole character leaves it
+        tail.keyframe_insert("rotation_quaternion", frame=frame)
+    strands, scene = scenes.hair(rig, 20), bpy.context.scene
+    make_live(rig, strands)
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+    def seen(graph):
+        evaluated = rig.evaluated_get(graph)
+        bones = [np.array(evaluated.matrix_world) @ np.array(bone.matrix) for bone in evaluated.pose.bones]
+        return np.array(bones), scenes.points(strands, graph)
+
+    def shown(frame):
+        scene.frame_set(frame)
+        return seen(bpy.context.evaluated_depsgraph_get())
+
+    still = shown(5)
+    rig.neuralocks_character.rig_live = True
+    view = {frame: shown(frame) for frame in (5, 6, 7)}
+    tips = [bone.name == "hair.02" for bone in rig.pose.bones]
+    assert apart(still[0][tips], view[5][0][tips]) > 0.01 and not messages(), messages()
+
+    got = {}
+
+    class Witness(bpy.types.RenderEngine):
+        bl_idname, bl_label = "WITNESS", "Witness"
+
+        def render(self, graph):
+            got[graph.scene.frame_current] = seen(graph)
+
+    bpy.utils.register_class(Witness)
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.render.engine, scene.render.filepath = "WITNESS", str(folder / "r_")
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.neuralocks.frame_start, scene.neuralocks.frame_end = 1, 24
+    scene.neuralocks.use_scene_range = False  # the frames before the render are remembered
+    scene.frame_set(15)
+    scene.frame_start, scene.frame_end = 5, 7
+    bpy.ops.render.render(animation=True)
+    bpy.utils.unregister_class(Witness)
+    assert sorted(got) == sorted(view)
+    for frame, (bones, points) in view.items():
+        assert apart(got[frame][0], bones) < 1e-6, frame
+        assert apart(got[frame][1], points) < 1e-6, frame
