@@ -56,8 +56,13 @@ class OverrideWriter:
         names = Sdf.ValueTypeNames
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
         Sdf.AttributeSpec(over, "points", names.Point3fArray)
+        # What the shot says of motion is not that of these points: a renderer would blur by it.
+        authored = {name for name in ("velocities", "accelerations") if item.prim.GetAttribute(name).HasAuthoredValue()}
         if velocities:
             Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
+            authored.discard("velocities")
+        for name in sorted(authored):
+            Sdf.AttributeSpec(over, name, names.Vector3fArray).default = Sdf.ValueBlock()
 
     def sample(self, item: StageGroom, time_code: float, name: str, blocks: Iterable[np.ndarray]) -> None:
         """Add one time sample of `points` (and of the extent with it) or `velocities`.

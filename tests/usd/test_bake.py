@@ -268,6 +268,14 @@ def test_a_bake_of_a_bake_is_the_bake(baked, tmp_path, model):
     assert np.abs(world_points(again.path, 5.0) - world_points(baked[1].path, 5.0)).max() < 1e-6
 
 
+def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
+    first = bake(write_shot(tmp_path), tmp_path / "first.usdc", model, frames=[4, 5])
+    again = bake(first.path, tmp_path / "again.usdc", model, frames=[5], velocities=False, material=["weight=2"])
+    stage = Usd.Stage.Open(str(again.path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    assert curves.GetPointsAttr().GetTimeSamples() == [5] and not curves.GetVelocitiesAttr().HasValue()
+
+
 def test_a_groom_inside_an_instance_is_baked(tmp_path, model):
     write_shot(tmp_path, name="asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
