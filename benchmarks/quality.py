@@ -183,7 +183,10 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
         row[f"{name} ratio"] = metrics.motion_ratio(points, truth, times)
         if name == "network":
             row["dynamic frames"] = metrics.dynamic_frames(points, truth, times)
-            row["settles s"], row["solver settles s"] = (settling(clip, p, times) for p in (points, truth))
+            stop = stops(clip, times)
+            for key, of in ("settles s", points), ("solver settles s", truth):
+                row[key] = metrics.settling_time(of, times, stop) if np.isfinite(stop) else float("nan")
+            row["echo"], row["solver echo"] = (metrics.echo(p, truth, times, stop) for p in (points, truth))
             row["inside"], row["inside 3 mm"] = inside(bench, points, heads, posed, rest)
             row["solver inside"] = inside(bench, truth, heads, posed, rest)[0]
             row["still jitter mm"] = metrics.jitter(points[-10:])
@@ -194,12 +197,12 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
     return row
 
 
-def settling(clip, points: np.ndarray, times: np.ndarray) -> float:
-    """Seconds until hair stands after the body does; not a number where the clip has no second of rest at its end."""
+def stops(clip, times: np.ndarray) -> float:
+    """When the body comes to rest [s]; not a number where the clip has no second of rest at its end."""
     joints = clip.at(times)
     moving = np.abs(np.diff(joints, axis=0)).max(axis=(1, 2, 3)) > 1e-4
     stop = times[np.flatnonzero(moving).max(initial=-1) + 1]
-    return metrics.settling_time(points, times, stop) if times[-1] - stop > 1.0 else float("nan")
+    return stop if times[-1] - stop > 1.0 else float("nan")
 
 
 def table(rows: list[dict], by: str) -> None:

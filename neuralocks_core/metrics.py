@@ -141,6 +141,17 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float, share: flo
     return float(times[loud[-1] + 1] - stop) if len(loud) else 0.0
 
 
+def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: float) -> float:
+    """Mean speed of the tips between half a second and two seconds after `stop`, in percent of the largest that the
+    reference's have after it: what comes back when hair should come to rest.
+    """
+    tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in (points, reference))
+    since = (times[1:] + times[:-1]) / 2 - stop
+    later = (since >= 0.5) & (since < 2.0)
+    peak = true[since >= 0].max(initial=0.0)
+    return 100 * float(tips[later].mean() / peak) if later.any() and peak > STILL else float("nan")
+
+
 def jitter(points: np.ndarray) -> float:
     """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 where nothing moves."""
     return 1000 * float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max(initial=0.0))

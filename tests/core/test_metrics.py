@@ -82,6 +82,16 @@ def test_settling_of_a_decaying_swing():
     assert metrics.jitter(still) == 0
 
 
+def test_echo_of_a_decaying_swing():
+    """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; nothing that stands echoes."""
+    points, _ = swinging(amplitude=0.2, frequency=4, decay=3)
+    mean = (np.exp(-1.5) - np.exp(-6)) / (3 * 1.5)
+    assert metrics.echo(points, points, TIMES, stop=0.0) == pytest.approx(100 * mean * 2 / np.pi, rel=0.15)
+    still = np.broadcast_to(points[:1], points.shape)
+    assert metrics.echo(still, points, TIMES, stop=0.0) == 0
+    assert np.isnan(metrics.echo(points, still, TIMES, stop=0.0))
+
+
 def test_lengths_of_ragged_strands_and_stretch():
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [5, 5, 5], [0, 0, 0], [0, 0, 3.0]])
     counts = np.array([3, 1, 2])
