@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
 def import_command(
     file: Annotated[Path, typer.Argument(help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves.")],
     out: Out,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m or metres per unit of the file.")] = None,
+    unit: Annotated[str | None, typer.Option(help="mm, cm, m, in, or metres per unit of the file.")] = None,
     up: Annotated[str | None, typer.Option(help="Upward axis of the file: Y or Z.")] = None,
     as_json: AsJson = False,
 ) -> None:

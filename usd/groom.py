@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 
 from .border import Border, open_stage, write_stage
@@ -124,9 +125,8 @@ def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()
 def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[str]]:
     stage = open_stage(source)
     border = Border.of(stage)
-    if up is not None and str(up).upper() not in ("Y", "Z"):
-        raise NeuralocksError(f"--up {up}: is not an axis; give Y or Z")
-    border = Border(_metres(unit, border), (up or border.up_axis).upper(), border.rate)
+    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
+    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate)
     found, notes = [], []
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)
@@ -136,19 +136,6 @@ def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[
     if not found:
         raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
     return found, notes
-
-
-def _metres(unit, border: Border) -> float:
-    if unit is None:
-        return border.metres_per_unit
-    known = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-    try:
-        value = known.get(str(unit).lower()) or float(unit)
-    except ValueError:
-        value = -1.0
-    if not 1e-7 < value < 1e7:
-        raise NeuralocksError(f"--unit {unit}: is not mm, cm, m or a number of metres")
-    return value
 
 
 def _free_path(stage: Usd.Stage, name: str) -> str:

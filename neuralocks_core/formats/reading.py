@@ -12,12 +12,10 @@ from ..errors import NeuralocksError
 from ..groom import LARGEST_COORDINATE, Groom
 from . import cemyuksel, counted, tressfx, tressfx_text
 from .raw import RawGroom, bad_file
+from .units import UNITS, metres_per_unit, upward_axis
 
 EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
 """What `read` knows by name; the content decides where it says what it is."""
-
-UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
-"""Metres per unit of the names that users may write."""
 
 LARGEST_FILE = 4 * 2**30
 """Bytes; a groom of a million strands of 100 vertices is a third of it."""
@@ -46,9 +44,8 @@ def read_with_notes(
 ) -> tuple[Groom, list[str]]:
     """The same as `read`, and one line for each thing that was assumed or left out."""
     path = Path(path)
-    wanted = None if unit is None else _metres_per_unit(unit)
-    if up is not None and str(up).upper() not in {"Y", "Z"}:
-        raise NeuralocksError(f"--up {up}: is not an axis; give Y or Z")
+    wanted = None if unit is None else metres_per_unit(unit)
+    wanted_axis = None if up is None else upward_axis(up)
     content = _content(path)
     raw = _reader(path, content)(content, str(path))
     notes = list(raw.notes)
@@ -61,7 +58,7 @@ def read_with_notes(
         name = next(n for n, value in UNITS.items() if value == scale)
         fact = f"does not state its unit; took 1 {name}, which suits a human scalp"
         notes.append(f"{path}: {fact}; --unit says otherwise")
-    axis = str(up or raw.up).upper()
+    axis = wanted_axis or raw.up
     with np.errstate(over="ignore"):  # Groom refuses what overflows
         points = points * np.float32(scale)
     if axis == "Z":
@@ -85,16 +82,6 @@ def read_with_notes(
         fact = f"{still} of {groom.strand_count} strands have no two distinct points"
         notes.append(f"{path}: {fact}; they are kept, but will not move on their own")
     return groom, notes
-
-
-def _metres_per_unit(unit: str | float) -> float:
-    try:
-        value = UNITS[unit] if unit in UNITS else float(unit)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 1e-6 <= value <= 1e6:
-        raise NeuralocksError(f"--unit {unit}: is not a unit; give mm, cm, m, in, or metres per unit")
-    return float(value)
 
 
 def _content(path: Path) -> bytes:

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The units and axes that users may name for a file that does not say its own."""
+
+import math
+
+from ..errors import NeuralocksError
+
+UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
+"""Name -> metres."""
+
+
+def metres_per_unit(unit: str | float) -> float:
+    """Metres per unit, of a name in UNITS (in either case) or a number of metres.
+
+    Raises:
+        NeuralocksError: it is neither.
+    """
+    try:
+        value = UNITS.get(str(unit).strip().lower()) or float(unit)
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not 1e-6 <= value <= 1e6:
+        raise NeuralocksError(f"--unit {unit}: is not a unit; give {', '.join(UNITS)}, or metres per unit")
+    return value
+
+
+def upward_axis(up: str) -> str:
+    """"Y" or "Z", of either in either case.
+
+    Raises:
+        NeuralocksError: it is neither.
+    """
+    axis = str(up).strip().upper()
+    if axis not in ("Y", "Z"):
+        raise NeuralocksError(f"--up {up}: is not an axis; give Y or Z")
+    return axis
