@@ -20,12 +20,12 @@ _work: list = []
 
 
 def request() -> None:
-    """Sample what is out of date, soon; without a window there is nobody to wait, and operators sample when they need
-    it.
+    """Sample what is out of date, soon and from the start; without a window there is nobody to wait, and operators sample
+    when they need it.
     """
+    _work.clear()
     if bpy.app.background:
         return
-    _work.clear()
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=PAUSE)
 

@@ -55,6 +55,7 @@ def on_load(*_):
 def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
+    background.request()  # what is half sampled holds on to a scene that is no more
     live.refresh(scene)
 
 
