@@ -8,6 +8,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from .operators.training import job
+from .services.words import for_the_panel
 from .session import session
 
 LOOP_GAP = 2.0
@@ -207,7 +208,7 @@ def findings(armature) -> tuple[list[str], str]:
 def message(layout, name: str) -> None:
     """What went wrong with an object, if anything did."""
     if session.messages.get(name):
-        words(layout, session.messages[name], "ERROR")
+        words(layout, for_the_panel(session.messages[name]), "ERROR")
 
 
 def progress(layout, done: float, text: str) -> None:

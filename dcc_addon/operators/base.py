@@ -9,6 +9,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from ..scene.sampling import stepping
+from ..services.words import for_the_panel
 from ..session import session
 
 SLICE = 0.06
@@ -28,7 +29,7 @@ class Hardened:
         try:
             message = function()
         except NeuralocksError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, for_the_panel(str(error)))
             return {"CANCELLED"}
         except Exception as error:
             traceback.print_exc()

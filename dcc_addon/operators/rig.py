@@ -97,10 +97,13 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
 
         armature, scene = shown_armature(context), context.scene
         settings, name = armature.neuralocks_character, armature.name_full
-        out = Path(output_path(self.filepath or scene.neuralocks.output.replace("bake", "rig_bake")))
+        out = Path(output_path(self.filepath or scene.neuralocks.output))
+        if not self.filepath:
+            out = out.with_name(f"{out.stem}_rig{out.suffix}")
         with stepping(scene):
             for done, total in sample(context, armature):
                 yield done, total, f"Sampling the motion of {name}"
+        bind(find(name), session.rigs[name])  # says what is wrong before anything is written
         shot = out.with_name(f"{out.stem}_shot.usdc")
         write_shot(shot, find(name), scene, session.rigs[name], [])
         bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion, loop=settings.loop)

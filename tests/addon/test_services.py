@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from dcc_addon import build
-from dcc_addon.services import axes, card, names, rig, training_job
+from dcc_addon.services import axes, bones, card, names, rig, training_job, words
 from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.motion import Motion, frame_numbers, similar
+from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.report import Card
 from neuralocks_core.rotation import from_vector
@@ -176,6 +178,20 @@ def test_rig_problems_in_plain_words(bones, head, words):
 def test_bad_hair_in_plain_words(points, counts, words):
     with pytest.raises(NeuralocksError, match=words):
         rig.groom("Hair", points, np.array(counts, int), np.eye(4))
+
+
+def test_errors_name_what_the_panel_has(tmp_path):
+    """No option and no command of a terminal, whatever the chains are called."""
+    skeleton = Skeleton(BONES, PARENTS, _rest())
+    character = Character(skeleton, None, rig.RigArrays("Rig", BONES, PARENTS, _rest()).humanoid())
+    for patterns in ("", "curl*", "spine", "head"):
+        with pytest.raises(NeuralocksError) as error:
+            bones.chains_of(character, patterns)
+        assert "--" in str(error.value)
+        assert "--" not in (said := words.for_the_panel(str(error.value))) and "neuralocks " not in said, said
+    with pytest.raises(NeuralocksError) as error:
+        model.read(tmp_path / "nowhere.neuralocks", "strands")
+    assert "--" not in words.for_the_panel(str(error.value))
 
 
 def test_card_fits_a_sidebar():

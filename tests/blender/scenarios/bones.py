@@ -57,10 +57,11 @@ def bones(folder: Path) -> None:
     for f in still:
         assert apart(turns(f), still[f]) < 1e-6
 
-    assert bpy.ops.neuralocks.export_skel(filepath=str(folder / "skel.usdc")) == {"FINISHED"}
+    scene.neuralocks.output = str(folder / "bakes" / "hair.usdc")
+    assert bpy.ops.neuralocks.export_skel() == {"FINISHED"}
     from usd.stage import read_rigs
 
-    written = read_rigs(folder / "skel.usdc")[0]
+    written = read_rigs(folder / "bakes" / "hair_rig.usdc")[0]
     leaves = [name.split("/")[-1] for name in written.character.skeleton.names]
     order = [leaves.index(bone.name.replace(".", "_")) for bone in rig.pose.bones]
     z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
