@@ -129,8 +129,10 @@ def read_rigs(
 
 def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
     """First and last time code: the stage's own, else the animation's."""
-    if stage.HasAuthoredTimeCodeRange() and stage.GetEndTimeCode() >= stage.GetStartTimeCode():
-        return float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
+    if stage.HasAuthoredTimeCodeRange():
+        first, last = float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
+        if np.isfinite([first, last]).all() and first <= last:
+            return first, last
     return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
 
 

@@ -202,6 +202,12 @@ def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
     assert True in found
 
 
+@pytest.mark.parametrize("end", [float("inf"), float("nan"), -3.0])
+def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, end):
+    shot = read_shot(edited(tmp_path, lambda stage: (stage.SetStartTimeCode(1), stage.SetEndTimeCode(end))))
+    assert (shot.first, shot.last) == (1, 9)
+
+
 def test_one_frame_is_a_held_pose(tmp_path, model):
     result = bake(write_shot(tmp_path, Recipe(frames=1)), tmp_path / "out.usdc", model)
     assert result.frames == [1.0] and any("one sample" in note for note in result.notes)
