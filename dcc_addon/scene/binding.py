@@ -16,17 +16,28 @@ def bind_places(context, armature, names) -> dict[str, np.ndarray]:
     Blender itself is asked, for hair may hang on a bone in many ways: as its child or its child's, by constraints, by
     another armature that moves this one.
     """
-    view, things = context.view_layer, [find(name) for name in names]
-    graph = context.evaluated_depsgraph_get()
-    here = world(armature, graph)
-    with _at_rest({armature, *(a for thing in things for a in _reached(thing, set()))}):
-        view.update()
+    things = [find(name) for name in names]
+    here = world(armature, context.evaluated_depsgraph_get())
+    with at_rest(context, armature, *things):
         graph = context.evaluated_depsgraph_get()
         # An armature that hangs on a bone of another one has moved too.
         back = here @ np.linalg.inv(world(armature, graph))
-        places = {thing.name_full: back @ world(thing, graph) for thing in things}
-    view.update()
-    return places
+        return {thing.name_full: back @ world(thing, graph) for thing in things}
+
+
+@contextmanager
+def at_rest(context, *things):
+    """Meanwhile all armatures that these objects depend on, and they themselves, are in their rest poses."""
+    kept = [(a.data, a.data.pose_position) for a in {a for thing in things for a in _reached(thing, set())}]
+    try:
+        for data, _ in kept:
+            data.pose_position = "REST"
+        context.view_layer.update()
+        yield
+    finally:
+        for data, position in reversed(kept):
+            data.pose_position = position
+        context.view_layer.update()
 
 
 def carrying_bone(thing, armature) -> str | None:
@@ -41,25 +52,14 @@ def carrying_bone(thing, armature) -> str | None:
 
 
 def _reached(thing, seen: set) -> set:
-    """Armatures on whose pose an object's place depends."""
+    """Armatures on whose pose an object's place, or its shape, depends."""
     if thing is None or thing in seen:
         return set()
     seen.add(thing)
     found = {thing} if thing.type == "ARMATURE" else set()
+    found |= {modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object}
     for constraint in thing.constraints:
         several = [target.target for target in getattr(constraint, "targets", ())]
         for target in (getattr(constraint, "target", None), *several):
             found |= _reached(target, seen)
     return found | _reached(thing.parent, seen)
-
-
-@contextmanager
-def _at_rest(armatures):
-    kept = [(a.data, a.data.pose_position) for a in armatures]
-    try:
-        for data, _ in kept:
-            data.pose_position = "REST"
-        yield
-    finally:
-        for data, position in reversed(kept):
-            data.pose_position = position

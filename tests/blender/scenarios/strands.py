@@ -25,6 +25,23 @@ def particles(_folder: Path) -> None:
     away = np.linalg.norm(points - [0, 0, 1.6], axis=2)
     assert np.abs(away[:, 0] - 0.1).max() < 2e-3 and (away[:, -1] > 0.25).all()
 
+    # In the middle of a rig's dance the hair is found as it is at rest.
+    rig = scenes.armature()
+    scenes.dance(rig, (-8, 24))
+    skinned = bpy.data.objects.new("Skinned", ball.data.copy())
+    bpy.context.scene.collection.objects.link(skinned)
+    skinned.location, skinned.parent = ball.location, rig
+    skinned.vertex_groups.new(name="head").add(range(len(ball.data.vertices)), 1.0, "REPLACE")
+    skinned.modifiers.new("Armature", "ARMATURE").object = rig
+    skinned.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings = settings
+    bpy.context.scene.frame_set(9)
+    bpy.context.view_layer.objects.active = skinned
+    assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+    found = bpy.context.scene.neuralocks.hair
+    assert found.parent == skinned and rig.data.pose_position == "POSE"
+    own, same = (np.array([p.position for p in hair.data.points]) for hair in (found, strands))
+    assert apart(own, same) < SAME
+
 
 def ways_of_parenting(folder: Path) -> None:
     """Hair parented to the armature, to its head bone or to what is parented to that, constrained to the bone, or grown
