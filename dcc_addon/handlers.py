@@ -8,7 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
 from .live_strands import EDITING
-from .scene.sampling import ensure
+from .scene.sampling import bodies_of, ensure
 from .session import session
 
 
@@ -31,7 +31,9 @@ def on_update(scene, graph):
     names = {a.name_full for a in live.carriers(scene)}
     if not names:
         return
-    if any(isinstance(thing, bpy.types.Action) for thing in changed):
+    meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
+    edited = meshes and any(b.data.name_full in meshes for a in live.carriers(scene) for b in bodies_of(a, scene))
+    if edited or any(isinstance(thing, bpy.types.Action) for thing in changed):
         _mark_stale()
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)

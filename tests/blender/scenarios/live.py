@@ -72,6 +72,7 @@ def posing(folder: Path) -> None:
     from dcc_addon.session import session
 
     rig = scenes.armature()
+    skin = scenes.body(rig)
     scenes.dance(rig)
     strands = scenes.hair(rig, 50)
     make_live(rig, strands)
@@ -86,6 +87,14 @@ def posing(folder: Path) -> None:
     )
     assert not session.rigs["Rig"].stale
 
+    for vertex in skin.data.vertices:
+        vertex.co.x *= 1.01
+    skin.data.update()
+    bpy.context.view_layer.update()
+    assert session.rigs["Rig"].stale, "the body that hair is kept out of is another one"
+    bpy.ops.neuralocks.sample_motion()
+    before = points_at(strands, 9)
+    assert not session.rigs["Rig"].stale
     rig.pose.bones["head"].rotation_euler[1] += 0.5
     rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
     points_at(strands, 8)
