@@ -6,13 +6,13 @@ capital), parts by their usual names, and the trunk by hierarchy: the upper ches
 from the arms meet.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.joint_words import sides_and_keys
 
 PARTS = {
     "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder"),
@@ -26,42 +26,6 @@ PARTS = {
 }
 TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
-_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_NOISE = {
-    "bip",
-    "bip01",
-    "bip001",
-    "j",
-    "c",
-    "def",
-    "org",
-    "mixamorig",
-    "cc",
-    "base",
-    "bone",
-    "jnt",
-    "joint",
-    "skin",
-    "b",
-    "sk",
-    "valvebiped",
-}
-_JAPANESE = {
-    "左": "Left",
-    "右": "Right",
-    "頭": "Head",
-    "手首": "Wrist",
-    "足首": "Ankle",
-    "首": "Neck",
-    "肩": "Clavicle",
-    "腕": "UpperArm",
-    "ひじ": "Elbow",
-    "足": "UpLeg",
-    "ひざ": "Knee",
-    "両目": "Eyes",
-    "目": "Eye",
-}
-"""MikuMikuDance's standard bones, in files with UTF-8 names; of words within words the longer comes first."""
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
@@ -138,7 +102,8 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
             )
         put(name, find_joint(names, wanted), "given by hand")
 
-    sides, keys = zip(*(_side_and_key(name) for name in names), strict=True)
+    parts = {word for words in PARTS.values() for word in words}
+    sides, keys = zip(*sides_and_keys([_leaf(name) for name in names], parts), strict=True)
     for side in ("left", "right"):
         for part, joint in _limbs(side, sides, keys, parents).items():
             put(f"{side}_{part}", joint, f"by name '{_leaf(names[joint])}'")
@@ -171,23 +136,6 @@ def find_joint(names, wanted: str) -> int:
 
 def _leaf(name: str) -> str:
     return name.rsplit("/", 1)[-1]
-
-
-def _side_and_key(name: str) -> tuple[str, str]:
-    """('left' | 'right' | '', part name in lower case without digits, sides and rig prefixes)."""
-    leaf = _leaf(name).rsplit(":", 1)[-1]
-    if not leaf.isascii():
-        for word, part in _JAPANESE.items():
-            leaf = leaf.replace(word, part)
-    tokens = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", leaf)
-    tokens = [token.lower() for token in tokens if not token.isdigit()]
-    if len(tokens) == 1 and tokens[0][:4] == "left" and len(tokens[0]) > 4:
-        tokens = ["left", tokens[0][4:]]
-    elif len(tokens) == 1 and tokens[0][:5] == "right" and len(tokens[0]) > 5:
-        tokens = ["right", tokens[0][5:]]
-    side = next((_SIDES[token] for token in tokens if token in _SIDES), "")
-    rest = [token for token in tokens if token not in _SIDES and token not in _NOISE]
-    return side, "".join(rest)
 
 
 def _depth(joint: int, parents) -> int:

@@ -48,6 +48,27 @@ RIGS = {
         "  mixamorig:LeftShoulder\n   mixamorig:LeftArm\n  mixamorig:RightShoulder\n   mixamorig:RightArm",
         {"head": "mixamorig:Head", "left_upper_arm": "mixamorig:LeftArm", "upper_chest": "mixamorig:Spine2"},
     ),
+    "HumanIK in a namespace, in USD": (
+        "Root\n hero_rig_Character1_Hips\n  hero_rig_Character1_Spine\n   hero_rig_Character1_Spine1\n"
+        "    hero_rig_Character1_Neck\n     hero_rig_Character1_Head\n    hero_rig_Character1_LeftShoulder\n"
+        "     hero_rig_Character1_LeftArm\n      hero_rig_Character1_LeftForeArm\n       hero_rig_Character1_LeftHand\n"
+        "    hero_rig_Character1_RightShoulder\n     hero_rig_Character1_RightArm",
+        {"head": "hero_rig_Character1_Head", "left_shoulder": "hero_rig_Character1_LeftShoulder",
+         "left_upper_arm": "hero_rig_Character1_LeftArm", "left_lower_arm": "hero_rig_Character1_LeftForeArm",
+         "right_upper_arm": "hero_rig_Character1_RightArm", "upper_chest": "hero_rig_Character1_Spine1"},
+    ),
+    "AutoRig Pro": (
+        "root_x\n spine_01_x\n  spine_03_x\n   neck_x\n    head_x\n   shoulder_l\n    arm_stretch_l\n     forearm_stretch_l\n"
+        "   shoulder_r\n    arm_stretch_r",
+        {"head": "head_x", "neck": "neck_x", "left_shoulder": "shoulder_l", "left_upper_arm": "arm_stretch_l",
+         "left_lower_arm": "forearm_stretch_l", "right_upper_arm": "arm_stretch_r"},
+    ),
+    "Daz": (
+        "hip\n abdomenLower\n  chestUpper\n   lCollar\n    lShldrBend\n     lShldrTwist\n      lForearmBend\n"
+        "   rCollar\n    rShldrBend\n   neckLower\n    neckUpper\n     head",
+        {"head": "head", "upper_chest": "chestUpper", "left_shoulder": "lCollar", "left_upper_arm": "lShldrBend",
+         "left_lower_arm": "lForearmBend", "neck": "neckLower"},
+    ),
     "Rigify": (
         "DEF-spine\n DEF-spine.001\n  DEF-spine.002\n   DEF-spine.003\n    DEF-spine.004\n     DEF-spine.005\n"
         "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The words of joint names: which side a joint is on, and what is left once namespaces and rig prefixes are gone."""
+
+import re
+from collections import Counter
+
+_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_NOISE = {
+    "bip",
+    "bip01",
+    "bip001",
+    "j",
+    "c",
+    "def",
+    "org",
+    "mixamorig",
+    "cc",
+    "base",
+    "bone",
+    "jnt",
+    "joint",
+    "skin",
+    "b",
+    "sk",
+    "valvebiped",
+    "bend",
+    "stretch",
+    "x",
+}
+_JAPANESE = {
+    "左": "Left",
+    "右": "Right",
+    "頭": "Head",
+    "手首": "Wrist",
+    "足首": "Ankle",
+    "首": "Neck",
+    "肩": "Clavicle",
+    "腕": "UpperArm",
+    "ひじ": "Elbow",
+    "足": "UpLeg",
+    "ひざ": "Knee",
+    "両目": "Eyes",
+    "目": "Eye",
+}
+"""MikuMikuDance's standard bones, in files with UTF-8 names; of words within words the longer comes first."""
+_TRUNK = {"head", "neck", "spine", "hair"}
+"""With the parts of limbs, words that say what a joint is, however many begin with them."""
+SHARED = 0.9
+"""Share of the joints that begin with a namespace; exporters put a root of their own above them."""
+
+
+def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
+    """('left' | 'right' | '', words in one, in lower case, without numbers, sides and prefixes) of each joint.
+
+    Args:
+        names: the joints' own names, without their parents'.
+        parts: words that mean a part of the body.
+    """
+    return [_side_and_key(words) for words in _without_namespace([_words(name) for name in names], parts)]
+
+
+def _words(leaf: str) -> list[str]:
+    """Words of a joint's own name in lower case, without numbers."""
+    leaf = leaf.rsplit(":", 1)[-1]
+    if not leaf.isascii():
+        for word, part in _JAPANESE.items():
+            leaf = leaf.replace(word, part)
+    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", leaf)
+    return [word.lower() for word in words if not word.isdigit()]
+
+
+def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str]]:
+    """The words of each joint without those that nearly all begin with: in USD a namespace's colon is an underscore
+    (`Character1_LeftArm`).
+    """
+    while True:
+        first, count = Counter(words[0] for words in names if words).most_common(1)[0] if any(names) else ("", 0)
+        if count < max(SHARED * len(names), 4) or first in _SIDES or first in meant | _TRUNK:
+            return names
+        names = [words[1:] if words[:1] == [first] else words for words in names]
+
+
+def _side_and_key(words: list[str]) -> tuple[str, str]:
+    """('left' | 'right' | '', part name without sides and rig prefixes)."""
+    if len(words) == 1 and words[0][:4] == "left" and len(words[0]) > 4:
+        words = ["left", words[0][4:]]
+    elif len(words) == 1 and words[0][:5] == "right" and len(words[0]) > 5:
+        words = ["right", words[0][5:]]
+    side = next((_SIDES[word] for word in words if word in _SIDES), "")
+    return side, "".join(word for word in words if word not in _SIDES and word not in _NOISE)
