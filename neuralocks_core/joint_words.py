@@ -25,6 +25,7 @@ _NOISE = {
     "valvebiped",
     "bend",
     "stretch",
+    "armature",
     "x",
 }
 _JAPANESE = {

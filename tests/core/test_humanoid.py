@@ -63,6 +63,12 @@ RIGS = {
         {"head": "head_x", "neck": "neck_x", "left_shoulder": "shoulder_l", "left_upper_arm": "arm_stretch_l",
          "left_lower_arm": "forearm_stretch_l", "right_upper_arm": "arm_stretch_r"},
     ),
+    "an avatar through glTF": (
+        "Armature_rootJoint\n pelvis_Armature\n  chest_Armature\n   neck_Armature\n    head_Armature\n"
+        "   shoulder_l_Armature\n    upper_arm_l_Armature\n   shoulder_r_Armature\n    upper_arm_r_Armature",
+        {"head": "head_Armature", "left_shoulder": "shoulder_l_Armature", "left_upper_arm": "upper_arm_l_Armature",
+         "right_upper_arm": "upper_arm_r_Armature", "upper_chest": "chest_Armature"},
+    ),
     "Daz": (
         "hip\n abdomenLower\n  chestUpper\n   lCollar\n    lShldrBend\n     lShldrTwist\n      lForearmBend\n"
         "   rCollar\n    rShldrBend\n   neckLower\n    neckUpper\n     head",
