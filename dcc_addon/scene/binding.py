@@ -5,24 +5,46 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
+
+from .armature import matrix
 from .lookup import find
 from .placing import world
 
 
-def bind_places(context, armature, names) -> dict[str, np.ndarray]:
+def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str, np.ndarray]:
     """World transforms (4, 4) of objects, by full name, as they are when the rig that carries them is in its rest pose
     and the armature object stands where it does now.
 
     Blender itself is asked, for hair may hang on a bone in many ways: as its child or its child's, by constraints, by
     another armature that moves this one.
+
+    Args:
+        context: of Blender.
+        armature, reader, rest: the armature object, its `PoseReader`, and its rest pose (J, 4, 4) in its own space.
+        names: of the objects.
+
+    Raises:
+        NeuralocksError: Blender does not move the armature.
     """
     things = [find(name) for name in names]
     here = world(armature, context.evaluated_depsgraph_get())
     with at_rest(context, armature, *things):
         graph = context.evaluated_depsgraph_get()
+        evaluated = armature.evaluated_get(graph)
+        expected = matrix(evaluated.matrix_world) @ rest
+        if not np.allclose(reader.world(evaluated), expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max()):
+            raise hidden(armature)
         # An armature that hangs on a bone of another one has moved too.
         back = here @ np.linalg.inv(world(armature, graph))
         return {thing.name_full: back @ world(thing, graph) for thing in things}
+
+
+def hidden(armature) -> NeuralocksError:
+    """What to say of an armature that is not evaluated."""
+    return NeuralocksError(
+        f"{armature.name_full}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
+    )
 
 
 @contextmanager

@@ -13,7 +13,7 @@ def world(thing, graph) -> np.ndarray:
     then comes from its parent's.
     """
     evaluated = thing.evaluated_get(graph)
-    if evaluated.is_evaluated:
+    if evaluated.is_evaluated and not _left_out(thing, graph):
         return matrix(evaluated.matrix_world)
     own, parent = matrix(thing.matrix_basis), thing.parent
     if parent is None:
@@ -26,6 +26,15 @@ def world(thing, graph) -> np.ndarray:
         tail[1, 3] = bone.bone.length
         place = place @ matrix(bone.matrix) @ tail
     return place @ matrix(thing.matrix_parent_inverse) @ own
+
+
+def _left_out(thing, graph) -> bool:
+    """Whether an object is hidden such that Blender may leave it where it was in another frame, without telling; by the
+    eye in the outliner it is hidden from view only.
+    """
+    if graph.mode == "RENDER" or len(thing.constraints) or thing.animation_data is not None:
+        return False
+    return not thing.hide_get() and not thing.visible_get()
 
 
 def mute_deformers(hair) -> None:

@@ -13,7 +13,7 @@ from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
-from .binding import bind_places
+from .binding import bind_places, hidden
 from .lookup import find
 from .placing import world
 from .unkeyed import Unkeyed
@@ -97,11 +97,10 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
         armature = _found(name)
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
-            raise NeuralocksError(
-                f"{name}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
-            )
+            raise hidden(armature)
         if not row:
-            reader, binds = armature_reader.PoseReader(armature, rig.bones), bind_places(context, armature, tracked)
+            reader = armature_reader.PoseReader(armature, rig.bones)
+            binds = bind_places(context, armature, tracked, reader, rig.rest)
             graph = context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
         joints[row] = reader.world(evaluated)

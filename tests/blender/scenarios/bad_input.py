@@ -143,6 +143,21 @@ def bad_hair(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "away.usdc")) == {"FINISHED"}
     assert apart(baked_points(folder / "away.usdc", "/Character/Hair_Other", 9), shown) < SAME
 
+    # Hidden hair is where it is; a hidden armature that nothing seen depends on stands still, which is no motion.
+    other.hide_viewport = True
+    scene.frame_set(20)
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "hidden.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "hidden.usdc", "/Character/Hair_Other", 9), shown) < SAME
+    skin.hide_viewport = strands.hide_viewport = rig.hide_viewport = True
+    scene.frame_set(14)
+    try:
+        bpy.ops.neuralocks.sample_motion()
+    except RuntimeError as error:
+        assert "hidden" in str(error), error
+    else:
+        raise AssertionError("an armature that stands still was sampled")
+    other.hide_viewport = skin.hide_viewport = strands.hide_viewport = rig.hide_viewport = False
+
     steps = sample(bpy.context, rig)
     next(steps)
     bpy.data.objects.remove(skin)
