@@ -113,6 +113,10 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
     untrimmed = places[""][0] @ rig.rest
     motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
+    head = rig.humanoid()["head"]
+    for other in tracked:
+        own = rig_service.on_head(places[other], places[""], joints[:, head], untrimmed[head])
+        binds[other] = binds[other] if own is None else own
     arrays = [(body_reader.read(find(body), armature), binds[body]) for body in bodies]
     metres = unit * rig_service.size_shown(rig, places[""][0], motion)
     character = rig_service.character(rig, places[""][0], arrays, metres)

@@ -14,7 +14,7 @@ from neuralocks_core.winding import inside_out
 
 from . import names
 from .axes import to_core, transformed
-from .motion import Motion, similar, trim_of
+from .motion import TOLERANCE, Motion, similar, trim_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +145,21 @@ def size_shown(rig: RigArrays, place: np.ndarray, motion: Motion) -> float:
     head = rig.humanoid()["head"]
     size = float(np.median(sizes_shown(motion.world()[:, head], bind_world(rig, place)[head])))
     return 1.0 if abs(size - 1) < 1e-4 else size
+
+
+def on_head(places: np.ndarray, objects: np.ndarray, heads: np.ndarray, bind: np.ndarray) -> np.ndarray | None:
+    """The place (4, 4) in the bind pose of something that goes with the head throughout, by whatever means; None where
+    its motion does not say so.
+
+    Args:
+        places, objects, heads: world transforms (T, 4, 4) of it, of the armature object and of the head.
+        bind: of the head in the bind pose (4, 4).
+    """
+    by_object, by_head = (np.linalg.inv(carrier) @ places for carrier in (objects, heads))
+    still = TOLERANCE * max(1.0, np.abs(places).max())
+    if np.ptp(by_object, axis=0).max() <= still or np.ptp(by_head, axis=0).max() > still:
+        return None
+    return bind @ by_head[0]
 
 
 def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:

@@ -43,6 +43,31 @@ def particles(_folder: Path) -> None:
     assert apart(own, same) < SAME
 
 
+def control_rig(folder: Path) -> None:
+    """Hair on the head bone of a rig that another one copies, wherever the two stand."""
+    control = scenes.armature("Control")
+    scenes.dance(control, (-8, 24))
+    rig = scenes.armature("Deform")
+    for bone in rig.pose.bones:
+        copy = bone.constraints.new("COPY_TRANSFORMS")
+        copy.target, copy.subtarget = control, bone.name
+    plain, on_control = scenes.hair(rig, 30), scenes.hair(rig, 30, parent=False, name="OnControl")
+    rest = control.data.bones["head"]
+    on_control.parent, on_control.parent_type, on_control.parent_bone = control, "BONE", "head"
+    on_control.matrix_parent_inverse = (rest.matrix_local @ scenes.translation((0, rest.length, 0))).inverted()
+    bpy.context.scene.neuralocks.armature = rig
+    for hair in (plain, on_control):
+        hair.neuralocks_hair.model = MODEL
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for hair in (plain, on_control):
+        hair.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(9)
+    points = scenes.points(plain)
+    assert apart(scenes.points(on_control), points) < SAME and not messages(), messages()
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "control.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "control.usdc", "/Character/Hair_OnControl", 9), points) < SAME
+
+
 def ways_of_parenting(folder: Path) -> None:
     """Hair parented to the armature, to its head bone or to what is parented to that, constrained to the bone, or grown
     on a deformed surface moves in the same way, also where the first frame is no rest pose.
