@@ -100,15 +100,21 @@ class Resolver:
         parts = [rest.distance(self.strands.rest[i : i + 2048])[0] for i in range(0, len(self.strands.rest), 2048)]
         return clearance(np.concatenate(parts))
 
+    def serves(self, clip: Clip) -> bool:
+        """Whether one that is made for this clip pushes hair just alike."""
+        if self.body is None:
+            return True
+        same = np.array_equal(clip.shape[:1], self._clip.shape[:1])
+        return same and np.array_equal(_stands_still(self.character, self.body, clip), self._still)
+
+    @cached_property
+    def _still(self) -> np.ndarray:
+        return _stands_still(self.character, self.body, self._clip)
+
     @cached_property
     def _near(self) -> NearBody:
-        body, character, strands = self.body, self.character, self.strands
-        still = _stands_still(character, body, self._clip)
+        body, character, strands, still = self.body, self.character, self.strands, self._still
         if body.shapes:
-            varies = np.ptp(self._clip.shape, axis=0) > 1e-6
-            for offsets, moves in zip(body.shapes.values(), varies):
-                if moves:
-                    still &= ~(np.abs(offsets) > 1e-5).any(axis=1)
             body = replace(body, points=body.shaped(self._constant))
         length = float(strands.length[strands.valid].max())
         roots = strands.rest[strands.valid, 0]
@@ -218,7 +224,9 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
-    """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion."""
+    """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion, and are
+    moved by no blend shape.
+    """
     shift = turn = np.zeros(len(character.skeleton.names))
     for joints in clip.joints:
         against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
@@ -227,7 +235,11 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
         shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
     far = np.linalg.norm(character.canonical(body.points), axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
-    return np.sum(body.joint_weights * each, axis=1) < STILL
+    still = np.sum(body.joint_weights * each, axis=1) < STILL
+    for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
+        if varies:
+            still &= ~(np.abs(offsets) > 1e-5).any(axis=1)
+    return still
 
 
 def _within_reach(character: Character, strands: StrandSet) -> Body | None:

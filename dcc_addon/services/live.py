@@ -60,7 +60,9 @@ class LiveHair:
         if clip is not self._clip:
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
             self._boundary = SampledBoundary(self._sampler)
-            self._resolver, self._held, self._shown = None, b"", b""
+            self._held, self._shown = b"", b""
+            if self._resolver is not None and not self._resolver.serves(clip):
+                self._resolver = None
 
     def points(
         self,

@@ -5,10 +5,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from neuralocks_core.character import Body
+from neuralocks_core.character import Body, Character
 from neuralocks_core.collider import Collider
+from neuralocks_core.groom import Groom
+from neuralocks_core.motion import Clip
 from neuralocks_core.near_body import NearBody
-from neuralocks_core.resolve import MARGIN, clearance, resolved
+from neuralocks_core.resolve import MARGIN, Resolver, clearance, resolved
+from neuralocks_core.rotation import from_vector
+from neuralocks_core.strands import strand_set
+from tests.core import rigs
 
 HEAD = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
 EXACT = Collider(HEAD.vertices, HEAD.faces)
@@ -114,3 +119,39 @@ def test_hair_slides_over_the_skin_without_jumps(body):
     moved = np.stack([resolved(step, body, FREE[:40]) for step in steps])
     jump = np.linalg.norm(np.diff(moved, axis=0), axis=-1)
     assert np.quantile(jump, 0.99) < 1e-3 and jump.max() < 8e-3
+
+
+def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
+    """Another clip of an edited animation, with the results of a resolver of its own, bit for bit."""
+    mesh, person = trimesh.creation.icosphere(subdivisions=2, radius=0.1), rigs.person()
+    ball, count = person.skeleton.bind[person.head, :3, 3] + mesh.vertices, len(mesh.vertices)
+    body = Body(
+        np.concatenate([ball, ball - [0, 0.15, 0]]),
+        np.concatenate([mesh.faces, mesh.faces + count]),
+        np.repeat([[person.head], [0]], count, axis=0),
+        np.ones((2 * count, 1)),
+        {"wide": np.full((2 * count, 3), 0.01)},
+    )
+    character = Character(person.skeleton, body)
+    points = strands() + person.skeleton.bind[person.head, :3, 3]
+    groom = Groom("Hair", points.reshape(-1, 3), np.full(60, 24))
+    hair = strand_set(groom, groom.points[0], character.head_centre, character.facing)
+    times = np.arange(5) / 24
+
+    def clip(shape=0.0, **motion):
+        made = rigs.moved(times, **motion)
+        return Clip(times, made.joints, np.full((5, 1), shape))
+
+    def turn(t):
+        return from_vector(np.stack([0 * t, 3 * t, 0 * t], axis=-1))
+
+    walk, run = clip(offset=lambda t: t[:, None] * [1, 0, 0]), clip(offset=lambda t: t[:, None] * [0, 0, 3])
+    resolver = Resolver(character, hair, walk)
+    assert resolver.serves(run) and not resolver.serves(clip(head_turn=turn)) and not resolver.serves(clip(shape=0.5))
+    results = []
+    for one in (resolver, Resolver(character, hair, run)):
+        moved = np.zeros((60, 24, 3), np.float32)
+        moved[:, 2:] += np.float32(0.01)
+        one.apply(moved, run.joints[3], run.shape[3])
+        results.append(moved)
+    assert np.array_equal(*results) and np.abs(results[0] - 0.01).max() > 0.02, "nothing was pushed"

@@ -26,6 +26,7 @@ def prepared_once(_folder: Path) -> None:
     before = points_at(one, 12)
     prepared = dict(session.hairs)
     assert set(prepared) == {"One", "Two"}
+    one_resolver = prepared["One"]._resolver
 
     def sample():
         bpy.context.scene.neuralocks.armature = first
@@ -41,6 +42,7 @@ def prepared_once(_folder: Path) -> None:
     sample()
     edited = points_at(one, 12)
     assert session.hairs == prepared and apart(edited, before) > 0.01
+    assert one_resolver is session.hairs["One"]._resolver, "the same skin stands still"
     assert apart(fresh(one), edited) == 0.0
     points_at(two, 12)
     prepared = dict(session.hairs)
