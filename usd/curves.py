@@ -8,7 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
 from .border import transformed
-from .surface import rest_value
+from .surface import rest_primvar, rest_value
 
 
 def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
@@ -105,7 +105,7 @@ def _uniform(prim: Usd.Prim, names, count: int, width: int) -> np.ndarray | None
         if not primvar or not primvar.HasValue():
             continue
         try:
-            values = np.asarray(primvar.ComputeFlattened())
+            values = np.asarray(rest_primvar(primvar))
         except (TypeError, ValueError):
             continue
         values = (

@@ -15,6 +15,7 @@ from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from .border import Border, open_stage, transformed
 from .damage import names_damage
 from .rig_source import StageRig, read_rig
+from .surface import rest_primvar
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def weight_notes(source: StageRig) -> list[str]:
     notes = []
     for mesh in source.meshes:
         primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
-        values = np.asarray(primvar.ComputeFlattened() if primvar and primvar.HasValue() else [], float)
+        values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
         size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
         if len(values) % size or not len(values):
             continue

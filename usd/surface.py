@@ -85,7 +85,7 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
     path = prim.GetPath()
     primvars = influences(prim)
     size = max(int(primvars[0].GetElementSize()), 1)
-    indices, weights = (np.asarray(p.ComputeFlattened(), kind) for p, kind in zip(primvars, (int, float)))
+    indices, weights = (np.asarray(rest_primvar(p), kind) for p, kind in zip(primvars, (int, float)))
     rows = 1 if primvars[0].GetInterpolation() == "constant" else count
     if len(indices) != rows * size or len(weights) != rows * size:
         raise NeuralocksError(
@@ -112,7 +112,7 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
 
 def geom_bind(prim: Usd.Prim) -> np.ndarray:
     """Transform (4, 4) from the prim's points to authored bind space."""
-    value = UsdSkel.BindingAPI(prim).GetGeomBindTransformAttr().Get()
+    value = rest_value(UsdSkel.BindingAPI(prim).GetGeomBindTransformAttr())
     matrix = np.eye(4) if value is None else column_matrix(value)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
         raise NeuralocksError(f"{prim.GetPath()}: its geomBindTransform is not finite or flat; bind it again")
@@ -180,6 +180,12 @@ def rest_value(attribute: Usd.Attribute):
     """The default-time value, else the earliest sample."""
     value = attribute.Get(Usd.TimeCode.Default())
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def rest_primvar(primvar: UsdGeom.Primvar):
+    """As `rest_value`, one value for each element."""
+    value = primvar.ComputeFlattened(Usd.TimeCode.Default())
+    return primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if value is None else value
 
 
 def _triangles(mesh: UsdGeom.Mesh, path, count: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
@@ -139,6 +139,33 @@ def test_rigs_are_read_without_grooms_or_animation(tmp_path):
     assert len(read_rigs(path)[0].clip.times) == 1
     with pytest.raises(NeuralocksError, match="no animation"):
         read_shot(path)
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_values_at_a_single_time_are_values_at_rest(tmp_path, bound):
+    """Exporters of single frames write all that may vary as one sample, transforms and weights too."""
+    place = np.eye(4)
+    place[:3, 3] = 3, 0, 1
+    path = write_shot(tmp_path, Recipe(bound=bound, place=place, unit=0.01))
+    right = read_shot(path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+
+    def sampled(path):
+        spec = layer.GetAttributeAtPath(path) if path.IsPropertyPath() else None
+        if spec and spec.HasDefaultValue() and spec.variability != Sdf.VariabilityUniform:
+            value = spec.default
+            spec.ClearDefaultValue()
+            layer.SetTimeSample(path, 1.0, value)
+
+    layer.Traverse("/", sampled)
+    other = tmp_path / "sampled.usda"
+    layer.Export(str(other))
+    read = read_shot(other)
+    assert read.grooms[0].joint == right.grooms[0].joint
+    np.testing.assert_array_equal(read.grooms[0].groom.points, right.grooms[0].groom.points)
+    np.testing.assert_array_equal(read.grooms[0].placement.at(5), right.grooms[0].placement.at(5))
+    np.testing.assert_array_equal(read.rigs[0].character.body.points, right.rigs[0].character.body.points)
+    np.testing.assert_array_equal(read.rigs[0].character.body.joint_indices, right.rigs[0].character.body.joint_indices)
 
 
 def test_a_loop_that_does_not_close_is_said(tmp_path):
