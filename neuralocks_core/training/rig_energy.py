@@ -13,7 +13,7 @@ import torch
 
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
-from neuralocks_core.training.rig_poses import PosePool, rest_distances
+from neuralocks_core.training.rig_poses import PosePool, rest_clearance
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class RigEnergy(torch.nn.Module):
         keep("points", rig.points[chosen])
         keep("weights", rig.weights[chosen])
         # What rests on the skin, or in it, is not pushed.
-        keep("margins", np.minimum(material.margin, rest_distances(rig, rig.points[chosen])))
+        keep("margins", np.minimum(material.margin, rest_clearance(rig, rig.points[chosen])))
         self.bone_joint = torch.as_tensor(chains.bone_joint.astype(np.int64))
         self.levels = [torch.as_tensor(level) for level in chains.levels()]
         self.ups = [torch.as_tensor(chains.parents[level].astype(np.int64)) for level in chains.levels()]

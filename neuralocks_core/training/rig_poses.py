@@ -162,6 +162,23 @@ def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.
     )
 
 
+def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Distance (V,) [m] that canonical points (V, 3) may come near the body: what they have in bind pose, exactly or by
+    the nearest body vertex's plane, whichever is less.
+
+    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair was thrown
+    from where the artist had put it.
+    """
+    exact, body = rest_distances(rig, points), rig.character.body
+    if body is None or not len(points):
+        return exact
+    used = np.unique(body.triangles)
+    vertices = rig.character.canonical(body.points)
+    normals = vertex_normals(vertices, body.triangles)[used]
+    nearest = cKDTree(vertices[used]).query(points)[1]
+    return np.minimum(exact, np.einsum("vi,vi->v", points - vertices[used][nearest], normals[nearest]))
+
+
 def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     """Signed distances (V,) [m] of canonical points (V, 3) to the body in bind pose; infinite without one."""
     body = rig.character.body

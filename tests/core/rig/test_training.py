@@ -147,6 +147,25 @@ def test_margins_are_those_at_rest_at_most():
     np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
 
 
+def test_hair_over_the_faces_of_a_coarse_body_is_not_thrown_off():
+    """There the plane of the nearest vertex lies centimetres above the surface."""
+    rig, _ = with_balls()
+    body, ball = rig.character.body, trimesh.creation.icosphere(1, 0.12)
+    points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
+    joints = np.repeat([body.joint_indices[0], body.joint_indices[-1]], len(ball.vertices), axis=0)
+    body = Body(points, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]), joints, np.ones_like(joints, float))
+    rig = replace(rig, character=replace(rig.character, body=body))
+    over = ball.triangles_center + 0.004 * ball.face_normals + [0, 0.07, 0.02]
+    rig = replace(rig, points=over, weights=np.eye(1, len(rig.chains) + 1).repeat(len(over), 0))
+    assert (np.abs(rest_distances(rig, over) - 0.004) < 1e-3).all()
+    pool = PosePool(rig, 4, np.random.default_rng(0))
+    rest = torch.zeros(4, len(rig.chains), 4)
+    rest[..., 0] = 1
+    poses = np.arange(4)
+    collision = RigEnergy(rig, RigMaterial()).parts(pool, poses, rest, pool.gravity(poses))[1]
+    assert collision.max() < 0.1, collision
+
+
 def test_depths_in_motion_are_those_of_the_bind_pose_there():
     """Wherever the character stands: canonical points keep their distance."""
     rig, radius = with_balls()
