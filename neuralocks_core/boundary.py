@@ -46,7 +46,7 @@ class BoundarySpec:
     pose_joints: tuple[str, ...] = POSE_JOINTS
     linear: str = "gravity"
     chest: bool = True
-    taper: float = 0.3
+    taper: float = 0.7
 
     def __post_init__(self):
         object.__setattr__(self, "bins", tuple(index(b) for b in self.bins))

@@ -13,10 +13,11 @@ from neuralocks_core.strands import K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
-SPREAD = 0.5
-"""Hairs that ties hold against what drives them apart stray by the inverse root of the ties' stiffness (counted
-from 20 /s^2, see `Material.log_ratios`), as any spring does in a random drive of given energy; the solver's locks do so
-too (`benchmarks/materials.py`)."""
+SPREAD = 0.85
+"""How fast hairs part as ties get weaker. With this, free hair that is shaken parts by the same ratios as the solver's
+(`benchmarks/materials.py --groom library`), whose hairs stray by about the inverse root of the ties' stiffness (counted
+from 20 /s^2, see `Material.log_ratios`), as a spring does in a random drive; kept lengths take a part of what is asked
+for."""
 
 
 def spread(log_ratio: float) -> float:

@@ -30,7 +30,7 @@ _CHUNK = 1024
 def rig_spec(dynamic: bool = False) -> BoundarySpec:
     """What the network reads of the body."""
     bins = DYNAMIC_BINS if dynamic else ()
-    return BoundarySpec(bins=bins, pose_joints=("neck", "upper_chest"), chest=False)
+    return BoundarySpec(bins=bins, pose_joints=("neck", "upper_chest"), chest=False, taper=0.3)
 
 
 def feature_columns(spec: BoundarySpec) -> np.ndarray:

@@ -25,6 +25,8 @@ MARGIN = 0.004
 """[m] Distance to the body that the solver keeps, and below which the collision term acts."""
 STILL = 0.01
 """Motion, in strand lengths, below which a strand counts as standing."""
+CREEP = 0.002
+"""Motion from frame to frame, in strand lengths, below which a strand hardly moves."""
 TOGETHER = 0.003
 """Distance, in strand lengths, below which the hairs of a lock count as one."""
 
@@ -44,6 +46,7 @@ class RegressionOptions:
         position: weight of the position error, in strand lengths.
         velocity: weight of the error of frame differences, in strand lengths.
         swing: weight of the error about its mean over a strand's moments, relative to the strand's own motion.
+        settling: weight of the error of frame differences, relative to the strand's own frame difference.
         parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
         collision: weight of the depth under the target's body plane, in strand lengths.
         output: "direction" or "displacement".
@@ -63,6 +66,7 @@ class RegressionOptions:
     position: float = 3.0
     velocity: float = 6.0
     swing: float = 0.4
+    settling: float = 0.3
     parting: float = 0.3
     collision: float = 45.0
     output: str = "direction"
@@ -174,12 +178,13 @@ def regress(
 
 
 def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
-    """Weighted losses of a batch, each a mean in units of strand length, `swing` and `parting` ratios.
+    """Weighted losses of a batch, each a mean in units of strand length, `swing`, `settling` and `parting` ratios.
 
     `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
-    that motion, so that small motion counts as much as large, `parting` how wrong it is which way the strands of a lock
-    part, relative to how far they do, `collision` how far x lies under the plane of the body
-    next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    that motion, so that small motion counts as much as large, `settling` the same of one frame difference, so that hair
+    comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
+    they do, `collision` how far x lies under the plane of the body next to x*, beyond where x* itself lies or MARGIN,
+    whichever is nearer the body.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])
@@ -189,8 +194,12 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     length = batch["length"][:, None, :, None]
     position = _norm(error) / length
     pairs = error.unflatten(1, (-1, 2))
-    velocity = _norm(pairs[:, :, 1] - pairs[:, :, 0]) / length
+    late = pairs[:, :, 1] - pairs[:, :, 0]
+    velocity = _norm(late) / length
     squared = batch["length"].square()
+    true = batch["moved"].unflatten(1, (-1, 2))
+    true_late = (true[:, :, 1] - true[:, :, 0]).square().sum(-1).mean(-1) + CREEP**2 * squared[:, None]
+    settling = (late.square().sum(-1).mean(-1) / true_late + 1e-6).sqrt()
     true_swing = _spread(batch["moved"], 1).mean((1, 3)) + STILL**2 * squared
     swing = (_spread(error, 1).mean((1, 3)) / true_swing + 1e-6).sqrt()  # smooth at zero
     true_parting = _spread(batch["moved"], 2).mean((1, 2, 3)) + TOGETHER**2 * squared.mean(1)
@@ -203,6 +212,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
         "position": options.position * position.mean(),
         "velocity": options.velocity * velocity.mean(),
         "swing": options.swing * swing.mean(),
+        "settling": options.settling * settling.mean(),
         "parting": options.parting * parting.mean(),
         "collision": options.collision * (depth / length).mean(),
     }
