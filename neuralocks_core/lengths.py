@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
+KEPT = 65_536
+"""Most vertices for which a thread keeps its memory."""
 TINY = np.float32(1e-24)
 """[m^2] Keeps edges of no length finite."""
 
@@ -37,27 +41,42 @@ def keep_lengths(rest: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth
 
 
 def _kept(rest: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """(N, V, 3) displacement of N strands of V vertices that keeps their lengths."""
+    """(N, V, 3) displacement of N strands of V vertices that keeps their lengths; valid until this thread's next call."""
     # Coordinates first, strands last: what is done to one vertex of all strands is one contiguous array.
-    points, result = (np.ascontiguousarray(a.transpose(2, 1, 0)) for a in (rest, moved))
-    before = points[:, 1:] - points[:, :-1]
-    edges = result[:, 1:] - result[:, :-1]
+    room = _scratch.arrays(rest.shape[1], len(rest))
+    points, result = room.points, room.result
+    points[:], result[:] = rest.transpose(2, 1, 0), moved.transpose(2, 1, 0)
+    before, edges, drift = room.before, room.edges, room.drift
+    np.subtract(points[:, 1:], points[:, :-1], out=before)
+    np.subtract(result[:, 1:], result[:, :-1], out=edges)
     edges += before
-    lengths, squared = _dot(before, before), np.maximum(_dot(edges, edges), TINY)
-    scale = np.sqrt(lengths / squared)
+    lengths, squared, scale = room.lengths, room.squared, room.scale
+    _dot(before, before, lengths, room.spare)
+    _measure(edges, lengths, room)
     # Where lengths alone would put each vertex, seen from where it was moved to. Along the hair that does not matter,
     # to its side it takes the hair off its way, into the head even: so much each edge turns back.
-    drift = edges * ((scale - np.float32(1.0)) * smooth)
+    np.subtract(scale, np.float32(1.0), out=room.spare)
+    room.spare *= smooth
+    np.multiply(edges, room.spare, out=drift)
     _add_up(drift)
-    drift -= _dot(drift, edges) / squared * edges
+    along = _dot(drift, edges, room.along, room.spare)
+    along /= squared
+    drift -= np.multiply(edges, along, out=points[:, 1:])
     edges *= scale
     edges -= drift
     edges[:, 1:] += drift[:, :-1]
-    edges *= np.sqrt(lengths / np.maximum(_dot(edges, edges), TINY))
+    _measure(edges, lengths, room)
+    edges *= scale
     edges -= before
     _add_up(edges)
     np.add(result[:, :1], edges, out=result[:, 1:])
     return result.transpose(2, 1, 0)
+
+
+def _measure(edges: np.ndarray, lengths: np.ndarray, room: _Room) -> None:
+    """Squared lengths of edges, and the factors that give them the wanted ones (squared, too)."""
+    np.maximum(_dot(edges, edges, room.squared, room.spare), TINY, out=room.squared)
+    np.sqrt(np.divide(lengths, room.squared, out=room.scale), out=room.scale)
 
 
 def _add_up(edges: np.ndarray) -> None:
@@ -70,9 +89,49 @@ def _add_up(edges: np.ndarray) -> None:
         edges[:, vertex] += edges[:, vertex - 1]
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray, spare: np.ndarray) -> np.ndarray:
     """(V, N) products of vectors whose coordinates come first."""
-    total = a[0] * b[0]
+    np.multiply(a[0], b[0], out=out)
     for left, right in zip(a[1:], b[1:]):
-        total += left * right
-    return total
+        out += np.multiply(left, right, out=spare)
+    return out
+
+
+class _Room:
+    """Arrays for N strands of V vertices, cut from one piece of memory."""
+
+    SIZE = 20
+    """Numbers a vertex."""
+
+    def __init__(self, memory: np.ndarray, vertices: int, strands: int) -> None:
+        self.vertices, self.strands = vertices, strands
+        self._memory, self._taken = memory, 0
+        self.points, self.result = (self._cut(3, vertices) for _ in range(2))
+        self.before, self.edges, self.drift = (self._cut(3, vertices - 1) for _ in range(3))
+        self.lengths, self.squared, self.scale, self.along, self.spare = (
+            self._cut(1, vertices - 1)[0] for _ in range(5)
+        )
+
+    def _cut(self, coordinates: int, vertices: int) -> np.ndarray:
+        begin = self._taken
+        self._taken += coordinates * vertices * self.strands
+        return self._memory[begin : self._taken].reshape(coordinates, vertices, self.strands)
+
+
+class _Scratch(threading.local):
+    """The last room of each thread, for a groom's chunks are alike: memory that is asked for anew each time costs more
+    than what is computed in it.
+    """
+
+    room: _Room | None = None
+
+    def arrays(self, vertices: int, strands: int) -> _Room:
+        """Room for so many; what is in it is anything."""
+        room = self.room
+        if room is None or (room.vertices, room.strands) != (vertices, strands):
+            room = _Room(np.empty(_Room.SIZE * vertices * strands, np.float32), vertices, strands)
+            self.room = room if vertices * strands <= KEPT else None
+        return room
+
+
+_scratch = _Scratch()
