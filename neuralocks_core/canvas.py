@@ -61,16 +61,17 @@ class VtkCanvas:
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
         """An image (height, width, 3) uint8 of body points (V, 3) and hair points (P, 3) with colours in 0..1."""
         body_colours, hair_colours = ((255 * c).astype(np.uint8) for c in (body_colours, hair_colours))
-        if self._hair is None:
-            self._hair = self._pyvista.PolyData(hair, lines=self._lines)
-            self._hair["rgb"] = hair_colours
-            self._plotter.add_mesh(self._hair, scalars="rgb", rgb=True, lighting=False, line_width=self._width)
-            if body is not None:
+        if len(hair):
+            if self._hair is None:
+                self._hair = self._pyvista.PolyData(hair, lines=self._lines)
+                self._hair["rgb"] = hair_colours
+                self._plotter.add_mesh(self._hair, scalars="rgb", rgb=True, lighting=False, line_width=self._width)
+            self._hair.points, self._hair["rgb"] = hair, hair_colours
+        if body is not None:
+            if self._body is None:
                 self._body = self._pyvista.PolyData(body, faces=self._faces)
                 self._body["rgb"] = body_colours
                 self._plotter.add_mesh(self._body, scalars="rgb", rgb=True, lighting=False)
-        self._hair.points, self._hair["rgb"] = hair, hair_colours
-        if body is not None:
             self._body.points, self._body["rgb"] = body, body_colours
         view = self._plotter.camera
         view.position, view.focal_point, view.up = camera.eye, camera.target, camera.up

@@ -52,12 +52,14 @@ class Scene:
         head: rigid transforms bind world -> posed world of the head (T, 4, 4).
         facing: rotation (3, 3) whose transpose's third column is where the face looks in bind pose.
         centre: middle of the head in bind pose (3,) [m].
-        counts: vertices of each strand (S,).
-        rest: strand points in bind pose (P, 3) [m].
+        counts: vertices of each strand (S,); none where all hair is mesh hair.
+        rest: points of strands, or of mesh hair, in bind pose (P, 3) [m].
         hair: frame number -> strand points (P, 3) [m], world.
         triangles: of the body (F, 3), or None.
         body: frame number -> body points (V, 3) [m], world, or None.
         body_rest: body points in bind pose (V, 3) [m], or None.
+        mesh_hair: vertices of the body that are hair (V,) bool, or None.
+        look: colours.
     """
 
     times: np.ndarray
@@ -70,6 +72,7 @@ class Scene:
     triangles: np.ndarray | None = None
     body: Callable[[int], np.ndarray] | None = None
     body_rest: np.ndarray | None = None
+    mesh_hair: np.ndarray | None = None
     look: shading.Look = field(default_factory=shading.Look)
 
 
@@ -143,8 +146,20 @@ class _Film:
 
     def light(self, frame: int) -> tuple:
         """Body, its colours, hair and its colours: everything about a frame but the drawing itself."""
-        scene, camera = self.scene, self._cameras[frame]
-        head = scene.head[frame]
+        scene, camera, shadow = self.scene, self._cameras[frame], None
+        hair = tint = np.zeros((0, 3))
+        if len(self._low):
+            hair, tint, shadow = self._strands(frame)
+        body, body_tint = None, np.zeros((0, 3))
+        if scene.body is not None:
+            body = np.asarray(scene.body(frame), float)
+            normals = vertex_normals(body, scene.triangles)
+            body_tint = shading.body_colours(body, normals, self._albedo, shadow, camera.to_eye, self._axes)
+        return body, body_tint, hair, tint
+
+    def _strands(self, frame: int) -> tuple:
+        """Points and colours of all strands that are drawn, and the shadow that they throw."""
+        scene, camera, head = self.scene, self._cameras[frame], self.scene.head[frame]
         own = self._own(scene.hair(frame))
         centre = head[:3, :3] @ scene.centre + head[:3, 3]
         counts = np.full(len(own), self.detail.vertices)
@@ -153,12 +168,7 @@ class _Film:
         )
         hair = np.repeat(own, self._copies, axis=0) + self._beside @ head[:3, :3].T
         tint = np.repeat(tint.reshape(own.shape), self._copies, axis=0) * self._tone
-        body, body_tint = None, np.zeros((0, 3))
-        if scene.body is not None:
-            body = np.asarray(scene.body(frame), float)
-            normals = vertex_normals(body, scene.triangles)
-            body_tint = shading.body_colours(body, normals, self._albedo, shadow, camera.to_eye, self._axes)
-        return body, body_tint, hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3))
+        return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
 
     def close(self) -> None:
         self._canvas.close()
@@ -168,15 +178,15 @@ class _Film:
         scene, rng = self.scene, np.random.default_rng(3)
         starts = np.cumsum(scene.counts) - scene.counts
         usable = np.flatnonzero(scene.counts > 1)
-        if not len(usable):
+        if not len(usable) and scene.mesh_hair is None:
             raise NeuralocksError("preview: the groom has no strand of two points; there is nothing to draw")
         rows = usable[:: max(1, -(-len(usable) // strands))]
-        self._copies = copies = int(np.clip(round(strands / len(rows)), 1, 12))
+        self._copies = copies = int(np.clip(round(strands / max(len(rows), 1)), 1, 12))
         place = np.linspace(0, 1, self.detail.vertices)[None] * (scene.counts[rows] - 1)[:, None]
         low = np.minimum(place.astype(int), scene.counts[rows, None] - 2)
         self._low, self._part = starts[rows, None] + low, (place - low)[..., None]
-        roots = scene.rest[starts[usable]]
-        spacing = 1.3 * np.sqrt(4 * np.pi * max(np.var(roots, axis=0).sum(), 1e-6) / len(usable))
+        roots = scene.rest[starts[usable]] if len(usable) else np.zeros((1, 3))
+        spacing = 1.3 * np.sqrt(4 * np.pi * max(np.var(roots, axis=0).sum(), 1e-6) / len(roots))
         beside = rng.normal(0, 0.5 * spacing, (len(rows) * copies, 1, 3))
         beside[::copies] = 0
         self._tone = np.exp(rng.normal(0, 0.25, (len(rows) * copies, 1, 1)))
@@ -189,11 +199,14 @@ class _Film:
         return points[self._low] * (1 - self._part) + points[self._low + 1] * self._part
 
     def _dress(self) -> np.ndarray:
-        """Skin above the collar, dark cloth below: linear RGB (V, 3)."""
+        """Skin above the collar, dark cloth below, and mesh hair: linear RGB (V, 3)."""
         scene = self.scene
         below = (scene.centre[1] - scene.body_rest[:, 1] - 0.25) / 0.03
         cloth = np.clip(below, 0, 1)[:, None]
-        return (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
+        result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
+        if scene.mesh_hair is not None:
+            result[scene.mesh_hair] = scene.look.tip
+        return result
 
     def _follow(self) -> list[Camera]:
         """One camera a frame: it goes along with the head's path, smoothed, and does not turn."""

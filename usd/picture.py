@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`neuralocks preview`: a picture strip or a clip of a bake."""
+"""`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair."""
 
 from pathlib import Path
+
+from pxr import Usd, UsdGeom
 
 from neuralocks_core import preview as drawing
 
 from .baked import Baked, read_baked
+from .border import Border, open_stage
 from .damage import names_damage
+from .rig_picture import rigged_scene
+from .rig_stage import read_rigged_hair
 
 
 @names_damage
 def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress=None) -> Path:
-    """Draw a bake without a display.
+    """Draw a bake without a display; mesh hair on joints where the stage has no strands.
 
     Args:
         baked: path of the bake, or a `Baked` already read.
@@ -23,7 +28,13 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
     Raises:
         NeuralocksError: the file is no bake, or the picture cannot be made.
     """
-    if not isinstance(baked, Baked):
-        baked = read_baked(baked, grooms, skeleton, head)
-    rate = min(baked.shot.border.rate, 30.0)
-    return drawing.render(baked.scene(), path, size=size, rate=rate, progress=progress)
+    if isinstance(baked, Baked) or grooms or _has_strands(stage := open_stage(baked)):
+        baked = baked if isinstance(baked, Baked) else read_baked(baked, grooms, skeleton, head)
+        scene, rate = baked.scene(), baked.shot.border.rate
+    else:
+        scene, rate = rigged_scene(read_rigged_hair(baked, skeleton=skeleton, head=head)), Border.of(stage).rate
+    return drawing.render(scene, path, size=size, rate=min(rate, 30.0), progress=progress)
+
+
+def _has_strands(stage: Usd.Stage) -> bool:
+    return any(prim.IsA(UsdGeom.BasisCurves) for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))

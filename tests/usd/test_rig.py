@@ -14,6 +14,7 @@ from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.network import feature_columns, input_limits
 from usd.rig_bake import bake_rig
 from usd.rig_layer import NAME
+from usd.rig_picture import rigged_scene
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
@@ -211,6 +212,30 @@ def test_the_example_and_its_command_line(tmp_path):
         [*command, "--model", str(tmp_path / "no.neuralocks")], capture_output=True, text=True, cwd=EXAMPLE.parents[1]
     )
     assert done.returncode == 1 and done.stderr.count("\n") == 1
+
+
+def test_a_picture_of_mesh_hair(tmp_path):
+    """Whole locks are hair, their roots on the head too, and nothing of the body is; hair that moves is drawn elsewhere."""
+    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+    from PIL import Image
+
+    from usd.picture import preview
+
+    baked = tmp_path / "baked.usda"
+    bake_rig(EXAMPLE / "shot.usda", baked)
+    rigged = read_rigged_hair(baked)
+    scene, meshes = rigged_scene(rigged), rigged.source.meshes
+    begin = 0
+    for mesh in meshes:
+        end = begin + len(mesh.points)
+        assert (scene.mesh_hair[begin:end] == ("hair" in mesh.prim.GetName().lower())).all()
+        begin = end
+    picture = np.asarray(Image.open(preview(baked, tmp_path / "hair.png", size=(120, 160))).convert("RGB"), float)
+    assert picture.shape == (160, 6 * 124 - 4, 3)
+    brown = picture[..., 0] - picture[..., 2] > 30
+    panels = [brown[:, i * 124 : i * 124 + 120] for i in range(6)]
+    assert all(panel.mean() > 0.02 for panel in panels)
+    assert (panels[0] != panels[4]).mean() > 0.02
 
 
 def test_a_vrm_avatar_through_blender(tmp_path):
