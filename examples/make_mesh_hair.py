@@ -18,6 +18,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.collider import Collider
+from neuralocks_core.normals import vertex_normals
 from neuralocks_core.puppet import Puppet
 from neuralocks_core.rotation import to_quaternion
 from usd.border import Border, open_stage, row_matrix
@@ -238,9 +239,9 @@ def _tube(curve, flats, half_width, half_thickness):
     for ring in range(len(arcs) - 1):
         for i in range(SIDES):
             a, b = ring * SIDES + i, ring * SIDES + (i + 1) % SIDES
-            faces.append([a, b, b + SIDES, a + SIDES])
-    faces.append(list(range(SIDES))[::-1])
-    faces.append([(len(arcs) - 1) * SIDES + i for i in range(SIDES)])
+            faces.append([a, a + SIDES, b + SIDES, b])
+    faces.append(list(range(SIDES)))
+    faces.append([(len(arcs) - 1) * SIDES + i for i in reversed(range(SIDES))])
     return rings.reshape(-1, 3), faces, np.repeat(np.clip(arcs / curve[1][-1], -1, 1), SIDES)
 
 
@@ -264,11 +265,7 @@ def _cap(stage, character, head_at):
     faces = [corners[starts[f] : starts[f] + counts[f]] for f in subset.GetIndicesAttr().Get()]
     used = np.unique(np.concatenate(faces))
     place = {int(v): i for i, v in enumerate(used)}
-    normals = np.zeros((len(character.body.points), 3))
-    a, b, c = (character.body.points[character.body.triangles[:, i]] for i in range(3))
-    for i in range(3):
-        np.add.at(normals, character.body.triangles[:, i], np.cross(b - a, c - a))
-    normals = normals[used] / np.linalg.norm(normals[used], axis=1, keepdims=True)
+    normals = vertex_normals(character.body.points, character.body.triangles)[used]
     points = character.body.points[used] - head_at + 0.009 * normals
     count = len(points)
     indices = np.stack([np.full(count, character.head), np.full(count, character.head)], axis=1)
