@@ -36,8 +36,9 @@ def keep_lengths(rest: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth
     for size in np.unique(alike):
         some = np.flatnonzero(alike == size)
         last = counts[some] - 1
-        grid = starts[some, None] + np.minimum(np.arange(last.max() + 1), last[:, None])
-        moved[grid] = _kept(rest[grid], moved[grid], smooth[some])
+        place = np.arange(last.max() + 1)
+        grid, own = starts[some, None] + np.minimum(place, last[:, None]), place <= last[:, None]
+        moved[grid[own]] = _kept(rest[grid], moved[grid], smooth[some])[own]
 
 
 def _kept(rest: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> np.ndarray:
@@ -58,17 +59,17 @@ def _kept(rest: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> np.ndarray
     np.subtract(scale, np.float32(1.0), out=room.spare)
     room.spare *= smooth
     np.multiply(edges, room.spare, out=drift)
-    _add_up(drift)
+    _add_up(drift, room.other)
     along = _dot(drift, edges, room.along, room.spare)
     along /= squared
-    drift -= np.multiply(edges, along, out=points[:, 1:])
+    drift -= np.multiply(edges, along, out=room.other)
     edges *= scale
     edges -= drift
     edges[:, 1:] += drift[:, :-1]
     _measure(edges, lengths, room)
     edges *= scale
     edges -= before
-    _add_up(edges)
+    _add_up(edges, room.other)
     np.add(result[:, :1], edges, out=result[:, 1:])
     return result.transpose(2, 1, 0)
 
@@ -79,14 +80,15 @@ def _measure(edges: np.ndarray, lengths: np.ndarray, room: _Room) -> None:
     np.sqrt(np.divide(lengths, room.squared, out=room.scale), out=room.scale)
 
 
-def _add_up(edges: np.ndarray) -> None:
+def _add_up(edges: np.ndarray, spare: np.ndarray) -> None:
     """Sums along the strands, in place."""
-    if edges.shape[1] > edges.shape[2]:
-        np.cumsum(edges, axis=1, out=edges)
-        return
-    # The same sums, for many strands at a time: four times as fast where they are many.
-    for vertex in range(1, edges.shape[1]):
-        edges[:, vertex] += edges[:, vertex - 1]
+    # Sums of 2, 4, 8 ... of them: the same numbers however many strands there are, in few calls, between which threads
+    # take turns.
+    reach = 1
+    while reach < edges.shape[1]:
+        spare[:] = edges
+        edges[:, reach:] += spare[:, :-reach]
+        reach *= 2
 
 
 def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray, spare: np.ndarray) -> np.ndarray:
@@ -100,14 +102,14 @@ def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray, spare: np.ndarray) -> np
 class _Room:
     """Arrays for N strands of V vertices, cut from one piece of memory."""
 
-    SIZE = 20
+    SIZE = 23
     """Numbers a vertex."""
 
     def __init__(self, memory: np.ndarray, vertices: int, strands: int) -> None:
         self.vertices, self.strands = vertices, strands
         self._memory, self._taken = memory, 0
         self.points, self.result = (self._cut(3, vertices) for _ in range(2))
-        self.before, self.edges, self.drift = (self._cut(3, vertices - 1) for _ in range(3))
+        self.before, self.edges, self.drift, self.other = (self._cut(3, vertices - 1) for _ in range(4))
         self.lengths, self.squared, self.scale, self.along, self.spare = (
             self._cut(1, vertices - 1)[0] for _ in range(5)
         )
