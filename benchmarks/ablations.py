@@ -82,7 +82,12 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
         normalise(net, *samples(banks["rollouts"]), spec.slices["history"], options.static)
         *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
-        print(f"| {row} | {state.step} | {time.process_time() - began:.0f} | " + " | ".join(f"{card[name]:.3g}" for name in names) + " |", flush=True)
+        print(
+            f"| {row} | {state.step} | {time.process_time() - began:.0f} | "
+            + " | ".join(f"{card[name]:.3g}" for name in names)
+            + " |",
+            flush=True,
+        )
 
 
 def main() -> None:

@@ -39,7 +39,9 @@ def main() -> None:
 
 
 def _compared(shot: Path, folder: Path, model, frames: int, plain: bool) -> None:
-    print("points only, not kept out of the body:" if plain else "as by default, with velocities, kept out of the body:")
+    print(
+        "points only, not kept out of the body:" if plain else "as by default, with velocities, kept out of the body:"
+    )
     for count in (frames, 2 * frames):
         out = folder / f"bake{count}.usdc"
         result = in_process(_bake, shot, out, model, count, plain)
@@ -65,6 +67,7 @@ def _compared(shot: Path, folder: Path, model, frames: int, plain: bool) -> None
 
 def import_time() -> float:
     """Seconds that the runtime adds to a start of Python; the best of three."""
+
     def once(code):
         start = time.perf_counter()
         subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -99,7 +99,10 @@ def on_head(path: str, character, scalp: np.ndarray):
     from neuralocks_core.strands import strand_set
 
     groom = read(path)
-    (centre, radius), (middle, wanted) = sphere(groom.points[np.cumsum(groom.counts) - groom.counts].astype(float)), sphere(scalp)
+    (centre, radius), (middle, wanted) = (
+        sphere(groom.points[np.cumsum(groom.counts) - groom.counts].astype(float)),
+        sphere(scalp),
+    )
     points = (groom.points - centre) * (wanted / radius) + middle
     to_bind = character.canonical_to_bind
     groom = replace(groom, points=(points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32))

@@ -58,9 +58,7 @@ def frame_cost(solver: Callable, rest: np.ndarray, head: np.ndarray, device: str
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--strands", type=int, default=3000)
     options.add_argument("--frames", type=int, default=30)
     options.add_argument("--device", default="cpu")
@@ -79,9 +77,7 @@ def main() -> None:
     rows = [("implicit, 1 step", simulate, {"substeps": 1}), ("implicit, 4 steps", simulate, {"substeps": 4})]
     rows += [(f"XPBD, {n} substeps", simulate_xpbd, {"substeps": n}) for n in (10, 20, 50)]
     print(f"{args.strands} strands of 24 vertices, {args.frames} frames, body {args.body}, {args.device}")
-    print(
-        f"{'solver':20} {'ms/frame':>9} {'strand-frames/s':>16} {'error %':>8} {'stretch %':>15} {'ratio':>6}"
-    )
+    print(f"{'solver':20} {'ms/frame':>9} {'strand-frames/s':>16} {'error %':>8} {'stretch %':>15} {'ratio':>6}")
     base = None
     for name, solver, settings in rows:
         solver(rest[:4], head[:3], device=args.device, **settings)  # compiles the kernels

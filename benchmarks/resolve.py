@@ -59,7 +59,9 @@ def main() -> None:
             distances[name].append(collider.distance(where, limit=0.02)[0].ravel())
         print(f"\r{done + 1} of {len(codes)} frames", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    print(f"{'':>8} {'ms a frame':>10} {'most':>6} | {'inside %':>8} {'3 mm %':>7} | jump a frame: {'mean':>8} {'99.9 %':>8} mm")
+    print(
+        f"{'':>8} {'ms a frame':>10} {'most':>6} | {'inside %':>8} {'3 mm %':>7} | jump a frame: {'mean':>8} {'99.9 %':>8} mm"
+    )
     for name in poser:
         depth = metrics.penetration(np.stack(distances[name]), rest_distance)
         jump, spent = 1000 * np.stack(jumps[name]), 1000 * np.array(cost[name])

@@ -42,7 +42,9 @@ def main() -> None:
     if options.json:
         print(json.dumps({"held": held, "motion": motion}, indent=1))
         return
-    print("| held poses | energy | over direct, % of what that saves | of it collision | inside % | deeper than 5 mm, % of poses | worst mm |")
+    print(
+        "| held poses | energy | over direct, % of what that saves | of it collision | inside % | deeper than 5 mm, % of poses | worst mm |"
+    )
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     first = next(iter(held))
     for name, report in held.items():

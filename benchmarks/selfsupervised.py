@@ -24,10 +24,11 @@ from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.lessons import MomentLesson, normalise
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
-from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary
+from neuralocks_core.training.selfsupervised import paper_boundary
 
 OURS, PAPER = SelfSupervisedOptions(), SelfSupervisedOptions.paper()
 ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {

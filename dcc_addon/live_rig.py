@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
 
-
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 

@@ -36,9 +36,7 @@ def resample(groom: Groom, vertices: int) -> tuple[np.ndarray, np.ndarray]:
     key = groom.strand_of_point + np.minimum(share, 1.0)
     wanted = np.linspace(0.0, 1.0, vertices)
     last = groom.starts + groom.counts - 2
-    after = np.searchsorted(key, (strands[:, None] + wanted).ravel(), side="right").reshape(
-        len(strands), vertices
-    )
+    after = np.searchsorted(key, (strands[:, None] + wanted).ravel(), side="right").reshape(len(strands), vertices)
     before = np.clip(after - 1, groom.starts[strands, None], last[strands, None])
     span = share[before + 1] - share[before]
     weight = np.clip((wanted - share[before]) / np.where(span > 0, span, 1.0), 0.0, 1.0)[..., None]
@@ -64,9 +62,7 @@ def arc_lengths(groom: Groom) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(arc, 0.0), length
 
 
-def _keep_uniform(
-    groom: Groom, own: np.ndarray, share: np.ndarray, valid: np.ndarray, sampled: np.ndarray
-) -> None:
+def _keep_uniform(groom: Groom, own: np.ndarray, share: np.ndarray, valid: np.ndarray, sampled: np.ndarray) -> None:
     """Put a strand's own points where they differ from the samples by rounding only."""
     vertices = sampled.shape[1]
     candidates = np.flatnonzero(valid & (groom.counts == vertices))

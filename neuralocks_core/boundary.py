@@ -56,7 +56,9 @@ class BoundarySpec:
                 "model: its history has an impossible time step or bin; get an undamaged copy of the model"
             )
         if not 0 <= self.taper <= 1 or not isinstance(self.chest, bool):
-            raise NeuralocksError("model: its history has an impossible taper or chest; get an undamaged copy of the model")
+            raise NeuralocksError(
+                "model: its history has an impossible taper or chest; get an undamaged copy of the model"
+            )
         if self.linear not in ("gravity", "velocity", "none") or not set(self.pose_joints) <= set(SEMANTIC):
             raise NeuralocksError(
                 "model: it reads something of the body that this version does not know; update neuralocks"
@@ -69,17 +71,13 @@ class BoundarySpec:
         if not isinstance(values, dict):
             raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")
         if unknown := set(values) - known:
-            raise NeuralocksError(
-                f"model: its boundary history has '{min(unknown)}', unknown here; update neuralocks"
-            )
+            raise NeuralocksError(f"model: its boundary history has '{min(unknown)}', unknown here; update neuralocks")
         try:
             return cls(**values)
         except NeuralocksError:
             raise
         except (TypeError, ValueError, OverflowError) as error:
-            raise NeuralocksError(
-                f"model: unreadable boundary history ({error}); get an undamaged copy"
-            ) from None
+            raise NeuralocksError(f"model: unreadable boundary history ({error}); get an undamaged copy") from None
 
     def to_json(self) -> dict:
         """Plain values for the model file."""
@@ -101,10 +99,7 @@ class BoundarySpec:
             "history": self.per_bin * len(self.bins),
         }
         ends = np.cumsum(list(sizes.values()))
-        return {
-            name: slice(int(end) - size, int(end))
-            for (name, size), end in zip(sizes.items(), ends, strict=True)
-        }
+        return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
     @property
     def size(self) -> int:
@@ -149,9 +144,7 @@ class BoundarySampler:
         quaternions = rotation.to_quaternion(rotations)
         flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
         quaternions[1:] *= flips[..., None]
-        values = np.concatenate(
-            [joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1
-        )
+        values = np.concatenate([joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
         self._start, self._end = times[0], times[-1]
         if len(times) == 1:
             self._spline = lambda t: np.broadcast_to(values[0], (len(t), values.shape[1])).copy()
@@ -216,10 +209,7 @@ class BoundarySampler:
             base = self.clip.wrapped(times)
             laps = np.round((times - base) / max(self.clip.end - self.clip.start, 1e-9))
             values = self._spline(base)
-            drift = (
-                self.clip.joints[-1, self.character.head, :3, 3]
-                - self.clip.joints[0, self.character.head, :3, 3]
-            )
+            drift = self.clip.joints[-1, self.character.head, :3, 3] - self.clip.joints[0, self.character.head, :3, 3]
             position = values[:, :3] + laps[:, None] * drift
         else:
             base = np.clip(times, self._start, self._end)
@@ -248,9 +238,7 @@ class BoundarySampler:
             columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, spin), self.SPIN_LIMIT))
         rows = np.concatenate(columns, axis=-1)
         ends = np.cumsum(spec.bins)
-        means = (
-            np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
-        )
+        means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
         return (means * self._taper[:, None]).reshape(len(rows), -1)
 
 
@@ -294,6 +282,4 @@ def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     drift = np.zeros((clip.joints.shape[1], 4, 4))
     drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
     times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])
-    return times, np.concatenate(
-        [clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift]
-    )
+    return times, np.concatenate([clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift])

@@ -34,16 +34,10 @@ class Skeleton:
             raise NeuralocksError("skeleton: it has no joints; choose a skeleton with a head joint")
         if len(set(self.names)) != count:
             raise NeuralocksError("skeleton: two joints have the same path; make joint paths unique")
-        if (
-            self.parents.shape != (count,)
-            or (self.parents >= np.arange(count)).any()
-            or self.parents.min() < -1
-        ):
+        if self.parents.shape != (count,) or (self.parents >= np.arange(count)).any() or self.parents.min() < -1:
             raise NeuralocksError("skeleton: a joint comes before its parent; order the joints root first")
         if self.bind.shape != (count, 4, 4) or not np.isfinite(self.bind).all():
-            raise NeuralocksError(
-                f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose"
-            )
+            raise NeuralocksError(f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose")
 
 
 def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
@@ -81,9 +75,7 @@ class Body:
         """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
         if weights is None or not len(self.shapes) or not len(weights):
             return self.points
-        return self.points + np.einsum(
-            "b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values()))
-        )
+        return self.points + np.einsum("b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values())))
 
     def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
         """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""
@@ -124,8 +116,7 @@ class Character:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie.
-        """
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
         bind = self.skeleton.bind[:, :3, 3]
         for part in ("upper_arm", "shoulder", "upper_leg", "eye"):
             left, right = self.humanoid.get(f"left_{part}"), self.humanoid.get(f"right_{part}")
@@ -173,11 +164,7 @@ class Character:
 
     def posed_body(self, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray | None:
         """World points (V, 3) of the body for one pose, joints (J, 4, 4)."""
-        return (
-            None
-            if self.body is None
-            else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
-        )
+        return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
 
     def head_mask(self) -> np.ndarray | None:
         """Which body vertices (V,) move mainly with the head or what hangs below it."""

@@ -42,9 +42,7 @@ class Collider:
         samples, self._owner, self._reach = _spread(a[kept], b[kept], c[kept])
         self._tree = cKDTree(samples)
 
-    def distance(
-        self, points: np.ndarray, limit: float = 0.03, proven: bool = True
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def distance(self, points: np.ndarray, limit: float = 0.03, proven: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest.
 
         Args:
@@ -128,8 +126,9 @@ def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarr
     3). Ericson, Real-Time Collision Detection, section 5.1.5, by Voronoi regions.
     """
     ab, ac, ap, bp, cp = b - a, c - a, p - a, p - b, p - c
-    d1, d2, d3, d4, d5, d6 = (np.einsum("...i,...i->...", u, v) for u, v in
-                              ((ab, ap), (ac, ap), (ab, bp), (ac, bp), (ab, cp), (ac, cp)))
+    d1, d2, d3, d4, d5, d6 = (
+        np.einsum("...i,...i->...", u, v) for u, v in ((ab, ap), (ac, ap), (ab, bp), (ac, bp), (ab, cp), (ac, cp))
+    )
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
 
     def ratio(top, bottom):
@@ -178,7 +177,7 @@ def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np
     for m in np.unique(split):
         which = np.flatnonzero(split == m)
         uv = split_triangle(m)
-        at = (a[which, None] + uv[None, :, :1] * (b - a)[which, None] + uv[None, :, 1:] * (c - a)[which, None])
+        at = a[which, None] + uv[None, :, :1] * (b - a)[which, None] + uv[None, :, 1:] * (c - a)[which, None]
         samples.append(at.reshape(-1, 3))
         owner.append(np.repeat(which, len(uv)))
     return np.concatenate(samples), np.concatenate(owner), float(np.max(radius / split))

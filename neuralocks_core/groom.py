@@ -59,9 +59,7 @@ class Groom:
         if len(self.counts) == 0:
             raise self._error("holds no strands", "give a groom with at least one strand")
         if self.counts.min() < 0:
-            raise self._error(
-                f"strand {int(self.counts.argmin())} has a negative vertex count", "repair the groom"
-            )
+            raise self._error(f"strand {int(self.counts.argmin())} has a negative vertex count", "repair the groom")
         total = int(self.counts.sum(dtype=np.int64))
         if total != len(self.points):
             raise self._error(
@@ -72,11 +70,7 @@ class Groom:
             raise self._error("has strands but no points", "give the strands their points")
         self._check_values("points", self.points, LARGEST_COORDINATE, "m")
 
-        widths = (
-            np.full(1, 8e-5, np.float32)
-            if self.widths is None
-            else self._array("widths", self.widths, np.float32)
-        )
+        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
         if widths.ndim != 1 or len(widths) not in {1, len(self.counts), total}:
             raise self._error(
                 f"widths have shape {widths.shape}",
@@ -135,9 +129,7 @@ class Groom:
         chosen = np.arange(self.strand_count)[np.asarray(strands)]
         counts = self.counts[chosen]
         # Index of each kept point: its strand's start, plus its place within the strand.
-        within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(
-            np.cumsum(counts, dtype=np.int64) - counts, counts
-        )
+        within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(np.cumsum(counts, dtype=np.int64) - counts, counts)
         kept = np.repeat(self.starts[chosen], counts) + within
         widths = self.widths
         if len(widths) == len(self.points) and len(self.points) > 1:
@@ -145,8 +137,7 @@ class Groom:
         elif len(widths) == self.strand_count and self.strand_count > 1:
             widths = widths[chosen]
         pick = {
-            f: None if getattr(self, f) is None else getattr(self, f)[chosen]
-            for f in ("root_uv", "guides", "group")
+            f: None if getattr(self, f) is None else getattr(self, f)[chosen] for f in ("root_uv", "guides", "group")
         }
         return replace(self, points=self.points[kept], counts=counts, widths=widths, **pick)
 
@@ -187,6 +178,4 @@ class Groom:
                 f"{field} lie farther than {largest:g} {unit} from the origin, first {where}",
                 "check the unit",
             )
-        raise self._error(
-            f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom"
-        )
+        raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")

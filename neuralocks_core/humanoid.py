@@ -97,9 +97,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
 
     for name, wanted in (by_hand or {}).items():
         if name not in SEMANTIC:
-            raise NeuralocksError(
-                f"joint map: '{name}' is no semantic joint; use one of {', '.join(SEMANTIC)}"
-            )
+            raise NeuralocksError(f"joint map: '{name}' is no semantic joint; use one of {', '.join(SEMANTIC)}")
         put(name, find_joint(names, wanted), "given by hand")
 
     parts = {word for words in PARTS.values() for word in words}
@@ -193,9 +191,7 @@ def _find_head(names, sides, keys, parents, positions):
     hits = [
         i
         for i in range(len(keys))
-        if "head" in keys[i]
-        and not sides[i]
-        and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)
+        if "head" in keys[i] and not sides[i] and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)
     ]
     if hits:
         best = min(hits, key=score)
@@ -237,9 +233,7 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
     put("neck", neck, f"between head and chest, '{_leaf(names[neck])}'" if neck is not None else "")
     if "upper_chest" in joints:
-        below = (
-            head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
-        )
+        below = head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
         if "hips" in joints and joints["hips"] in below:
             below = below[: below.index(joints["hips"])]
         if below:

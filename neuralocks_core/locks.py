@@ -63,15 +63,11 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
     """
     weight = np.ones(len(lock)) if valid is None else np.where(valid, 1.0, 1e-6)
     share = np.bincount(lock, weight)
-    mean = np.stack(
-        [np.bincount(lock, weight * column) for column in np.asarray(values, np.float64).T], axis=1
-    )
+    mean = np.stack([np.bincount(lock, weight * column) for column in np.asarray(values, np.float64).T], axis=1)
     return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)
 
 
-def neighbours(
-    rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5
-) -> np.ndarray:
+def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5) -> np.ndarray:
     """The nearest vertices of other strands at rest, which adhesion keeps near.
 
     Args:

@@ -41,9 +41,7 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
         head = points[mask]
         result[:4] = np.abs(head[:, 0]).max(), head[:, 1].max(), head[:, 2].max(), -head[:, 2].min()
         # The back at shoulder height, where long hair lies.
-        torso = points[
-            ~mask & (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])
-        ]
+        torso = points[~mask & (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])]
         if len(torso):
             result[9] = -torso[:, 2].min()
     return result

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one-file model, `*.neuralocks`: a zip of ONNX graphs and one JSON. Nothing in it is ever executed but the graphs.
-"""
+"""The one-file model, `*.neuralocks`: a zip of ONNX graphs and one JSON. Nothing in it is ever executed but the graphs."""
 
 import json
 import os
@@ -105,9 +104,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         RuntimeError,
         RecursionError,
     ) as error:
-        raise NeuralocksError(
-            f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy"
-        ) from None
+        raise NeuralocksError(f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy") from None
     return ModelFile(path, meta, graphs)
 
 

@@ -40,9 +40,7 @@ class Clip:
         object.__setattr__(self, "shape", shape)
         count = len(self.times)
         if not count:
-            raise NeuralocksError(
-                "animation: it has no samples; animate the skeleton over the frames to bake"
-            )
+            raise NeuralocksError("animation: it has no samples; animate the skeleton over the frames to bake")
         if self.joints.ndim != 4 or self.joints.shape[0] != count or self.joints.shape[2:] != (4, 4):
             raise NeuralocksError(
                 f"animation: {self.joints.shape} transforms for {count} times; give one (J, 4, 4) per time"
@@ -53,11 +51,7 @@ class Clip:
             )
         if (np.diff(self.times) <= 0).any():
             raise NeuralocksError("animation: sample times do not ascend; sort them and remove doubles")
-        bad = (
-            ~np.isfinite(self.joints).all(axis=(1, 2, 3))
-            | ~np.isfinite(shape).all(axis=1)
-            | ~np.isfinite(self.times)
-        )
+        bad = ~np.isfinite(self.joints).all(axis=(1, 2, 3)) | ~np.isfinite(shape).all(axis=1) | ~np.isfinite(self.times)
         if bad.any():
             raise NeuralocksError(
                 f"animation: NaN or infinity at {self.times[bad][0]:.4g} s; repair the animation there"

@@ -102,7 +102,9 @@ class PosedBody:
         marks, cells = marks.take(rows), cells.take(rows)
         close = (marks & HEAD).astype(bool)
         at = np.flatnonzero(close)
-        close[at] = self._near.head.rough(points.take(at, axis=0)) < low.take(at) + np.float32(0.9 * self._near.head.cell)
+        close[at] = self._near.head.rough(points.take(at, axis=0)) < low.take(at) + np.float32(
+            0.9 * self._near.head.cell
+        )
         if self._skin is not None:
             at = np.flatnonzero(marks & SKIN)
             close[at] |= self._skin.rough(points.take(at, axis=0), cells.take(at)) < low.take(at) + np.float32(CURVED)

@@ -163,9 +163,7 @@ class _Film:
         own = self._own(scene.hair(frame))
         centre = head[:3, :3] @ scene.centre + head[:3, 3]
         counts = np.full(len(own), self.detail.vertices)
-        tint, shadow = shading.hair_colours(
-            own.reshape(-1, 3), counts, camera.to_eye, centre, self._axes, scene.look
-        )
+        tint, shadow = shading.hair_colours(own.reshape(-1, 3), counts, camera.to_eye, centre, self._axes, scene.look)
         hair = np.repeat(own, self._copies, axis=0) + self._beside @ head[:3, :3].T
         tint = np.repeat(tint.reshape(own.shape), self._copies, axis=0) * self._tone
         return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
@@ -218,7 +216,7 @@ class _Film:
         # How far the head strays from the smooth path, so that a jump does not leave the picture.
         stray = np.abs(centre - smooth).max()
         high = 0.15 + 0.60 * min(reach, 0.6) + 0.5 * min(stray, 0.3)
-        front = (scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1])
+        front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
         front /= np.linalg.norm(front)
         # Where the face looks on average, so that a shot of somebody's back does not show the back only.
         turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]

@@ -52,8 +52,7 @@ def random_clip(
 
 
 def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: float = 30.0) -> Clip:
-    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
-    """
+    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still."""
     if kind not in KINDS:
         raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(KINDS)}")
     times = np.arange(round(seconds * rate) + 1) / rate

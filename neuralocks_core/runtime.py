@@ -100,9 +100,7 @@ class StrandSession:
         shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
         self.codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
         inputs = strand_inputs(strands, self.codes)
-        self._strand_part = self._by_chunk(
-            lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256
-        )
+        self._strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
         self._anchor = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None
 
@@ -113,9 +111,7 @@ class StrandSession:
         Costs one inference, and nothing when the vector is the one already in use.
         """
         vector, _ = self._without_clumping(vector)
-        if not self.model.anchored or (
-            self._anchored_at is not None and np.array_equal(vector, self._anchored_at)
-        ):
+        if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
             return
         self._anchor[:] = 0
         self._anchor[:] = self._tail("offsets", self.model.frame(vector))
@@ -160,9 +156,7 @@ class StrandSession:
 
     def _tail(self, output, frame, strands: slice = slice(None), out=None, gather=None) -> np.ndarray:
         start, stop, _ = strands.indices(len(self.strands.rest))
-        result = (
-            np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
-        )
+        result = np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
 
         # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the groom's end: the
         # sums in a matrix product may depend on its height, and a bake must not depend on its split.
@@ -239,9 +233,8 @@ def _edges(rest: np.ndarray) -> np.ndarray:
 
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
-    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1.
-    """
+    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1."""
     locks = lock_codes(codes, strands.lock, strands.valid)
-    return np.concatenate(
-        [strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1
-    ).astype(np.float32)
+    return np.concatenate([strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1).astype(
+        np.float32
+    )

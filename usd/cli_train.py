@@ -18,7 +18,9 @@ def train_command(
     motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
     steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")
+    ] = False,
     skeleton: Skeleton = None,
     head: Head = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
@@ -26,7 +28,9 @@ def train_command(
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
     method: Annotated[
         str,
-        typer.Option(help="rollouts: learn from simulations made meanwhile; selfsupervised: the paper's own, from the physics alone."),
+        typer.Option(
+            help="rollouts: learn from simulations made meanwhile; selfsupervised: the paper's own, from the physics alone."
+        ),
     ] = "rollouts",
     paper: Annotated[
         bool, typer.Option("--paper", help="With selfsupervised, the paper's choice wherever it states one.")

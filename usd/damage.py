@@ -20,6 +20,8 @@ def names_damage(function):
         except Tf.ErrorException as error:
             source = getattr(source, "shot", source)
             path = getattr(source, "path", source)
-            raise NeuralocksError(f"{path}: it, or a file it uses, is damaged ({first_line(error)}); export it again") from None
+            raise NeuralocksError(
+                f"{path}: it, or a file it uses, is damaged ({first_line(error)}); export it again"
+            ) from None
 
     return run

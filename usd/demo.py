@@ -51,9 +51,7 @@ def shipped_shot() -> Path:
     raise NeuralocksError("demo: the shipped shot is missing from this installation; install neuralocks again")
 
 
-def demo(
-    out, model=None, *, clip: bool = True, progress: Callable[[int, int, str], None] | None = None
-) -> Demo:
+def demo(out, model=None, *, clip: bool = True, progress: Callable[[int, int, str], None] | None = None) -> Demo:
     """Bake the shipped shot, measure it and draw it.
 
     Args:
@@ -76,9 +74,7 @@ def demo(
         return result
 
     # Without velocities: twice as fast and half as large, and nothing here draws motion blur.
-    result = timed(
-        "bake", lambda: bake(shot, outputs["bake"], model, velocities=False, progress=progress)
-    )
+    result = timed("bake", lambda: bake(shot, outputs["bake"], model, velocities=False, progress=progress))
     baked = read_baked(outputs["bake"])
     card = timed("report card", lambda: evaluate(baked, progress=progress))
     outputs["report card"] = out / "report.json"

@@ -37,4 +37,6 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
 
 
 def _has_strands(stage: Usd.Stage) -> bool:
-    return any(prim.IsA(UsdGeom.BasisCurves) for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
+    return any(
+        prim.IsA(UsdGeom.BasisCurves) for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    )

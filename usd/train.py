@@ -63,8 +63,9 @@ def train(
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
     if settings.get("device") == "cuda" and not torch.cuda.is_available():
         raise NeuralocksError("--device cuda: this machine has no CUDA device; use --device cpu")
+    from neuralocks_core.training.moment_options import SelfSupervisedOptions
     from neuralocks_core.training.regression import RegressionOptions
-    from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary
+    from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands
 
     from .training import training_scene
@@ -113,6 +114,8 @@ def _value(name: str, word: str, default):
                 raise ValueError
             return number
     except (KeyError, ValueError):
-        wanted = "|".join(m.name.lower() for m in type(default)) if isinstance(default, enum.Enum) else f"like {default}"
+        wanted = (
+            "|".join(m.name.lower() for m in type(default)) if isinstance(default, enum.Enum) else f"like {default}"
+        )
         raise NeuralocksError(f"--set {name}={word}: is not a value for it; give {wanted}") from None
     return word

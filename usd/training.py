@@ -78,9 +78,7 @@ def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[Stran
 
 def _library(character: Character, seed: int) -> list[StrandSet]:
     barber = Barber(character)
-    return [
-        _strands(barber.grow(style, MOST_STRANDS, seed + i), character, seed) for i, style in enumerate(STYLES)
-    ]
+    return [_strands(barber.grow(style, MOST_STRANDS, seed + i), character, seed) for i, style in enumerate(STYLES)]
 
 
 def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:

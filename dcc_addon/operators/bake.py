@@ -128,8 +128,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
-    """Bake the moving hair and put the cache back on the hair object, so that it plays and renders without this add-on
-    """
+    """Bake the moving hair and put the cache back on the hair object, so that it plays and renders without this add-on"""
 
     bl_idname = "neuralocks.bake_attach"
     bl_label = "Bake and Attach"

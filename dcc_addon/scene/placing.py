@@ -38,8 +38,7 @@ def _left_out(thing, graph) -> bool:
 
 
 def mute_deformers(hair) -> None:
-    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done that.
-    """
+    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done that."""
     settings = hair.neuralocks_hair
     if settings.muted:
         return

@@ -25,9 +25,7 @@ def read(content: bytes, subject: str) -> RawGroom:
         subject: what messages call it.
     """
     if len(content) < _HEADER.size:
-        raise bad_file(
-            subject, f"has {len(content)} bytes but the header has {_HEADER.size}", "it is truncated"
-        )
+        raise bad_file(subject, f"has {len(content)} bytes but the header has {_HEADER.size}", "it is truncated")
     _, strands, total, flags, segments, thickness, *_ = _HEADER.unpack_from(content)
     if strands == 0 or total == 0:
         raise bad_file(subject, f"holds {strands} strands and {total} points", "export one with hair in it")
@@ -36,18 +34,14 @@ def read(content: bytes, subject: str) -> RawGroom:
     at = _HEADER.size
     if flags & _SEGMENTS:
         if at + 2 * strands > len(content):
-            raise bad_file(
-                subject, f"{strands} strands do not fit its {len(content)} bytes", "it is truncated"
-            )
+            raise bad_file(subject, f"{strands} strands do not fit its {len(content)} bytes", "it is truncated")
         counts = np.frombuffer(content, "<u2", strands, at).astype(np.int32) + 1
         at += 2 * strands
         held = int(counts.sum(dtype=np.int64))
     else:
         held = strands * (segments + 1)
     if held != total:
-        raise bad_file(
-            subject, f"its segments make {held} points but the header says {total}", "it is damaged"
-        )
+        raise bad_file(subject, f"its segments make {held} points but the header says {total}", "it is damaged")
     points = floats(content, at, 3 * total, subject, f"{total} points").reshape(-1, 3)
     if not flags & _SEGMENTS:  # only now, as the points have shown that so many strands fit the file
         counts = np.full(strands, segments + 1, np.int32)

@@ -33,9 +33,7 @@ def read_ct2hair(content: bytes, subject: str) -> RawGroom:
 def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroom:
     words = np.frombuffer(content, "<i4", len(content) // 4)
     if not len(words):
-        raise bad_file(
-            subject, f"has {len(content)} bytes, fewer than its number of strands", "it is truncated"
-        )
+        raise bad_file(subject, f"has {len(content)} bytes, fewer than its number of strands", "it is truncated")
     strands = int(words[0])
     if strands <= 0:
         raise bad_file(subject, f"says that it holds {strands} strands", "export one with hair in it")

@@ -73,9 +73,7 @@ def read_with_notes(
         notes.append(f"{path}: its strand texture coordinates are not finite; left out")
         root_uv = None
     if not (np.abs(points) <= LARGEST_COORDINATE).all():
-        raise bad_file(
-            str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit"
-        )
+        raise bad_file(str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit")
     groom = Groom(path.stem or "groom", points, raw.counts, widths, root_uv)
     still = int((arc_lengths(groom)[1] <= SHORTEST).sum())
     if still:
@@ -91,9 +89,7 @@ def _content(path: Path) -> bytes:
             raise NeuralocksError(f"{path}: {fact}; give a groom file ({' '.join(EXTENSIONS)})")
         size = path.stat().st_size
         if size > LARGEST_FILE:
-            raise bad_file(
-                str(path), f"has {size} bytes, more than the {LARGEST_FILE} that are read", "split it"
-            )
+            raise bad_file(str(path), f"has {size} bytes, more than the {LARGEST_FILE} that are read", "split it")
         return path.read_bytes()
     except (OSError, ValueError, MemoryError) as error:
         if isinstance(error, NeuralocksError):
@@ -116,9 +112,7 @@ def _reader(path: Path, content: bytes):
         return counted.read_ct2hair
     if suffix == ".hair":
         raise bad_file(str(path), "does not begin with HAIR", "give a file in Cem Yuksel's format")
-    raise bad_file(
-        str(path), "is no groom file that is known by its content or name", f"give {' '.join(EXTENSIONS)}"
-    )
+    raise bad_file(str(path), "is no groom file that is known by its content or name", f"give {' '.join(EXTENSIONS)}")
 
 
 def _check_finite(points: np.ndarray, path: Path) -> None:

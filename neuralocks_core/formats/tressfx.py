@@ -33,17 +33,13 @@ def read(content: bytes, subject: str) -> RawGroom:
     if len(content) < header:
         raise bad_file(subject, f"has {len(content)} bytes but the header has {header}", "it is truncated")
     if strands == 0 or vertices == 0:
-        raise bad_file(
-            subject, f"holds {strands} strands of {vertices} vertices", "export one with hair in it"
-        )
+        raise bad_file(subject, f"holds {strands} strands of {vertices} vertices", "export one with hair in it")
 
     components = 3 if version == 3 else 4
     (offset,) = struct.unpack_from("<I", content, 144 if version == 3 else 12)
     offset = _outside_header(offset or header, header, subject, "positions")
     total = strands * vertices
-    points = floats(
-        content, offset, total * components, subject, f"positions of {strands} x {vertices} vertices"
-    )
+    points = floats(content, offset, total * components, subject, f"positions of {strands} x {vertices} vertices")
     points = points.reshape(total, components)[:, :3]
 
     root_uv = widths = None
@@ -51,9 +47,7 @@ def read(content: bytes, subject: str) -> RawGroom:
         uv_at, _, thickness_at = struct.unpack_from("<III", content, 16)
         if uv_at:
             _outside_header(uv_at, header, subject, "strand texture coordinates")
-            root_uv = floats(content, uv_at, 2 * strands, subject, "strand texture coordinates").reshape(
-                -1, 2
-            )
+            root_uv = floats(content, uv_at, 2 * strands, subject, "strand texture coordinates").reshape(-1, 2)
         if thickness_at:
             _outside_header(thickness_at, header, subject, "strand thickness")
             widths = floats(content, thickness_at, strands, subject, "strand thickness")
@@ -62,7 +56,5 @@ def read(content: bytes, subject: str) -> RawGroom:
 
 def _outside_header(offset: int, header: int, subject: str, what: str) -> int:
     if offset < header:
-        raise bad_file(
-            subject, f"{what} are said to lie at byte {offset}, inside the header", "it is damaged"
-        )
+        raise bad_file(subject, f"{what} are said to lie at byte {offset}, inside the header", "it is damaged")
     return offset

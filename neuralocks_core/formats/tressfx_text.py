@@ -35,23 +35,17 @@ def read(content: bytes, subject: str) -> RawGroom:
             points.extend(_numbers(words, subject, number))
             left -= 1
         elif left:
-            raise bad_file(
-                subject, f"line {number} is not x y z; strand {len(counts) - 1} lacks {left} vertices"
-            )
+            raise bad_file(subject, f"line {number} is not x y z; strand {len(counts) - 1} lacks {left} vertices")
         elif words[0] == b"strand" and len(words) >= 4 and words[2] == b"numVerts":
             left = _count(words[3], subject, number)
             counts.append(left)
-            coordinate = (
-                words[5].split() + words[6].split() if len(words) == 7 and words[4] == b"texcoord" else []
-            )
+            coordinate = words[5].split() + words[6].split() if len(words) == 7 and words[4] == b"texcoord" else []
             uv.extend(_numbers(coordinate, subject, number) if len(coordinate) == 2 else (np.nan, np.nan))
         else:
             raise bad_file(subject, f"line {number} is neither a strand nor x y z")
         number, line = next(lines, (number, b""))
     if left:
-        raise bad_file(
-            subject, f"ends {left} vertices before strand {len(counts) - 1} does", "it is truncated"
-        )
+        raise bad_file(subject, f"ends {left} vertices before strand {len(counts) - 1} does", "it is truncated")
     if not counts:
         raise bad_file(subject, "holds no strands", "export one with hair in it")
 

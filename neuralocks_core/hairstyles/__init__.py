@@ -79,9 +79,7 @@ def grow(
     )
 
 
-def _site(
-    style: loose.Loose | tied.Tied, scalp: Scalp, count: int, random: np.random.Generator, size: float
-) -> Site:
+def _site(style: loose.Loose | tied.Tied, scalp: Scalp, count: int, random: np.random.Generator, size: float) -> Site:
     roots = scalp.roots(count, random)
     density = getattr(style, "density", None)
     if density is not None:

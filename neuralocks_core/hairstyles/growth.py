@@ -106,9 +106,7 @@ def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int)
         target = _past_shoulders(target, at, front, near, scalp)
         direction = unit(direction + rate * (target - direction))
         # Skin is soft-edged at the root, where the strand leaves it.
-        margin = plan.margin * size * smooth(grown / (0.045 * size)) + 0.0015 * size * smooth(
-            grown / (0.01 * size)
-        )
+        margin = plan.margin * size * smooth(grown / (0.045 * size)) + 0.0015 * size * smooth(grown / (0.01 * size))
         ahead = at + step[:, None] * direction
         ahead = _beside_face(ahead, plan.side, grown / size, scalp)
         for _ in range(2):

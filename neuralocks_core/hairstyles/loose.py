@@ -54,9 +54,7 @@ def _falling(
     comb = site.along_scalp(comb + 0.10 * (site.of_clump[:, :3] - 0.5))
     keeps = np.where(np.abs(x) < 0.02, np.sign(to_side), np.sign(x + 1e-6))
     keeps = np.where((z > 0.2) & (y > 0.2), np.sign(to_side), keeps)
-    fall = DOWN + np.stack(
-        [-0.03 * np.sign(to_side) * smooth(z + 0.3), 0 * x, -0.12 * np.ones(count)], axis=1
-    )
+    fall = DOWN + np.stack([-0.03 * np.sign(to_side) * smooth(z + 0.3), 0 * x, -0.12 * np.ones(count)], axis=1)
     # Hair from above lies over hair from below.
     layer = 0.15 + 0.65 * smooth((y + 0.7) / 1.6) + 0.2 * site.own[:, 3]
     return Plan(
@@ -79,9 +77,7 @@ def _parting(seen: np.ndarray, parting: float) -> np.ndarray:
 
 def _sides(parting: float) -> Callable[[np.ndarray], np.ndarray]:
     """Zones left and right of a parting, one zone behind it."""
-    return lambda seen: np.where(
-        seen[:, 2] < -0.45, 0.0, np.where(seen[:, 0] > _parting(seen, parting), 1.0, -1.0)
-    )
+    return lambda seen: np.where(seen[:, 2] < -0.45, 0.0, np.where(seen[:, 0] > _parting(seen, parting), 1.0, -1.0))
 
 
 def _long_straight(site: Site) -> Plan:
@@ -113,9 +109,7 @@ def _fringe(site: Site) -> Plan:
     plan.cut = -1.95 - 0.2 * site.of_clump[:, 0] - 0.1 * site.own[:, 1]
     x, y, z = site.seen.T
     front = _bangs(site.seen)
-    forward = site.along_scalp(
-        np.stack([0.25 * x, 0 * x, 1 + 0 * x], axis=1) + 0.06 * (site.of_clump[:, :3] - 0.5)
-    )
+    forward = site.along_scalp(np.stack([0.25 * x, 0 * x, 1 + 0 * x], axis=1) + 0.06 * (site.of_clump[:, :3] - 0.5))
     bangs = dict(
         length=0.17,
         comb=forward,
@@ -197,11 +191,7 @@ def _mohawk(site: Site) -> Plan:
     crest = smooth((0.30 - np.abs(x)) / 0.06)
     fan = np.stack([-0.9 * x, np.ones(len(x)), 0.55 * z + 0.1], axis=1)
     stray = 0.28 * (site.of_clump[:, :3] - 0.5) + 0.05 * (site.own[:, :3] - 0.5)
-    length = (
-        0.095
-        * (0.8 + 0.15 * site.of_clump[:, 3] + 0.12 * site.own[:, 0])
-        * (0.7 + 0.3 * smooth((y + 0.2) / 0.8))
-    )
+    length = 0.095 * (0.8 + 0.15 * site.of_clump[:, 3] + 0.12 * site.own[:, 0]) * (0.7 + 0.3 * smooth((y + 0.2) / 0.8))
     stubble = unit(site.roots.normal + 0.6 * site.along_scalp([0.0, -0.5, -1.0]))
     tall = crest[:, None] > 0.5
     direction = np.where(tall, unit(unit(fan) + 0.8 * site.roots.normal * [0.2, 1, 1] + stray), stubble)
@@ -232,9 +222,7 @@ STYLES = {
     ),
     "coils": Loose(
         _coils,
-        Shape(
-            96, clump_spacing=0.009, clumping=0.9, curl=0.0035, pitch=0.0095, curl_from=0.015, frizz=0.0007
-        ),
+        Shape(96, clump_spacing=0.009, clumping=0.9, curl=0.0035, pitch=0.0095, curl_from=0.015, frizz=0.0007),
         zone=_sides(0.0),
     ),
     "afro": Loose(

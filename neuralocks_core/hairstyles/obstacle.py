@@ -82,12 +82,7 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     many times faster; grown hair keeps some millimetres away.
     """
     points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
-    if (
-        not len(triangles)
-        or triangles.min() < 0
-        or triangles.max() >= len(points)
-        or not np.isfinite(points).all()
-    ):
+    if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
         raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     face = np.cross(b - a, c - a)
@@ -113,9 +108,7 @@ def _stand_in(points: np.ndarray, scalp: Scalp) -> np.ndarray:
     own = scalp.points[np.unique(scalp.triangles)] - scalp.head_centre
     # Semi-axes that put the scalp's points on the ellipsoid in the least-squares sense.
     inverse = np.linalg.lstsq(own**2, np.ones(len(own)), rcond=None)[0]
-    axes = np.where(inverse > 0, 1 / np.sqrt(np.maximum(inverse, 1e-9)), radius).clip(
-        0.7 * radius, 1.4 * radius
-    )
+    axes = np.where(inverse > 0, 1 / np.sqrt(np.maximum(inverse, 1e-9)), radius).clip(0.7 * radius, 1.4 * radius)
     scaled = np.linalg.norm(p / axes, axis=1)
     head = scaled * (scaled - 1) / np.maximum(np.linalg.norm(p / axes**2, axis=1), 1e-9)
     head = np.where(scaled < 0.3, -0.7 * radius, head)

@@ -42,18 +42,14 @@ class Scalp:
         if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
             raise NeuralocksError("scalp: is not points (V, 3) and triangles (F, 3); give a triangle mesh")
         if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
-            raise NeuralocksError(
-                "scalp: has no triangles or names points that are not there; mark the scalp again"
-            )
+            raise NeuralocksError("scalp: has no triangles or names points that are not there; mark the scalp again")
         if not np.isfinite(points[triangles]).all() or centre.shape != (3,) or not np.isfinite(centre).all():
             raise NeuralocksError("scalp: its points or its centre are not finite; repair the mesh")
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "triangles", triangles.astype(np.int64))
         object.__setattr__(self, "head_centre", centre)
         if not self.area > 1e-6:
-            raise NeuralocksError(
-                f"scalp: its area is {self.area:g} m^2; mark a larger one or check the unit"
-            )
+            raise NeuralocksError(f"scalp: its area is {self.area:g} m^2; mark a larger one or check the unit")
 
     @property
     def area(self) -> float:

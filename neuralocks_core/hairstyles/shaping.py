@@ -104,9 +104,7 @@ def _clumped(points: np.ndarray, site: Site, strength: float, size: float) -> np
 def _rounded(points: np.ndarray, place: np.ndarray) -> np.ndarray:
     """`at_vertices`, without the corners: averaged over half a vertex to both sides."""
     last = points.shape[1] - 1
-    return sum(
-        at_vertices(points, np.clip(place + shift, 0, last)) for shift in (-0.4, 0.0, 0.4)
-    ) / np.float32(3)
+    return sum(at_vertices(points, np.clip(place + shift, 0, last)) for shift in (-0.4, 0.0, 0.4)) / np.float32(3)
 
 
 def _frame(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -129,9 +127,7 @@ def _wander(own: np.ndarray, arc: np.ndarray) -> np.ndarray:
     wander = np.empty((*arc.shape, 3), np.float32)
     for axis in range(3):
         slow, fast = 2 * np.pi * own[:, axis : axis + 1], 2 * np.pi * own[:, axis + 1 : axis + 2]
-        wander[..., axis] = np.sin(arc * (55 + 12 * slow) + 7 * fast) + 0.5 * np.sin(
-            arc * (160 + 20 * fast) + 9 * slow
-        )
+        wander[..., axis] = np.sin(arc * (55 + 12 * slow) + 7 * fast) + 0.5 * np.sin(arc * (160 + 20 * fast) + 9 * slow)
     return wander
 
 

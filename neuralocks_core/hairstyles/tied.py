@@ -94,9 +94,7 @@ def _over_head(site: Site, ring: np.ndarray, scalp: Scalp, obstacle: Obstacle) -
     return points
 
 
-def _spine(
-    knot: Knot, scalp: Scalp, obstacle: Obstacle, first: np.ndarray, length: float, turn: float, keep: float
-):
+def _spine(knot: Knot, scalp: Scalp, obstacle: Obstacle, first: np.ndarray, length: float, turn: float, keep: float):
     """One hanging line (_TAIL, 3) [m] from the tie, and two unit vectors across it at each point."""
     size = scalp.radius / 0.1
     step = length * size / (_TAIL - 1)

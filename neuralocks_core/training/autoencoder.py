@@ -78,9 +78,7 @@ def train_autoencoder(
         step += 1
         done = step / steps if steps else (time.monotonic() - start) / seconds
         if progress and step % 200 == 0:
-            progress(
-                int(1000 * min(done, 1.0)), 1000, f"strand codes: error {1e3 * loss.item() ** 0.5:.1f} mm"
-            )
+            progress(int(1000 * min(done, 1.0)), 1000, f"strand codes: error {1e3 * loss.item() ** 0.5:.1f} mm")
     return model.eval().requires_grad_(False)
 
 

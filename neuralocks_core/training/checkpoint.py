@@ -43,9 +43,7 @@ def save(
     os.replace(temporary, path)
 
 
-def load(
-    path: Path, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()
-) -> dict:
+def load(path: Path, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()) -> dict:
     """Fill modules (and optimisers) from a checkpoint; returns its JSON values.
 
     Raises:

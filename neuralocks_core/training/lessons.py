@@ -14,11 +14,12 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import strand_inputs
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.farm import RolloutFarm
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MOMENTS, MomentPool
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, train_on_moments
+from neuralocks_core.training.selfsupervised import train_on_moments
 
 FIRST = 24
 """Clips to wait for before the network starts: enough to normalise its inputs by."""

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -16,11 +15,9 @@ from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
 from neuralocks_core.physics.inertia import inertia
 from neuralocks_core.physics.rods import Rods
 from neuralocks_core.physics.self_collision import self_collision
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import Hair, Moment, nearest_planes
 from neuralocks_core.training.networks import StrandNet, deform
-
-if TYPE_CHECKING:
-    from neuralocks_core.training.selfsupervised import SelfSupervisedOptions
 
 
 def moment_losses(

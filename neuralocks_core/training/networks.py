@@ -176,9 +176,7 @@ class LowRank(nn.Module):
         return self.back(self.to_terms(x) * weights)
 
 
-def deform(
-    offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None, output: str = "direction"
-) -> Tensor:
+def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None, output: str = "direction") -> Tensor:
     """Displacement of the vertices that the network's offsets stand for.
 
     `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch cannot happen

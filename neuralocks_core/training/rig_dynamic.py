@@ -74,7 +74,9 @@ def train_dynamic(
         clip = torch.as_tensor(rng.integers(0, inputs.shape[0], batch))
         frame = torch.as_tensor(rng.integers(1, inputs.shape[1], batch))
         both = torch.cat([inputs[clip, frame], inputs[clip, frame - 1]])
-        now, before = (held.energy.pose(net(both))[2] - torch.cat([wanted[clip, frame], wanted[clip, frame - 1]])).chunk(2)
+        now, before = (
+            held.energy.pose(net(both))[2] - torch.cat([wanted[clip, frame], wanted[clip, frame - 1]])
+        ).chunk(2)
         result = {
             "place": now.square().sum(-1).mean(),
             "motion": _VELOCITY * (now - before).square().sum(-1).mean(),

@@ -194,8 +194,7 @@ class RolloutMaker:
         return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
-        """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood.
-        """
+        """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood."""
         groom, usable = self.scene.grooms[which], self._usable[which]
         chosen: list[int] = []
         while len(chosen) < min(self.scene.strands, len(usable)):

@@ -23,10 +23,10 @@ from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.lessons import lesson, normalise, wait
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.selfsupervised import SelfSupervisedOptions
 
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""

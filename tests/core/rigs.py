@@ -7,9 +7,7 @@ from neuralocks_core.motion import Clip
 
 NAMES = ("hips", "hips/spine", "hips/spine/neck", "hips/spine/neck/head", "hips/spine/arm_L", "hips/spine/arm_R")
 PARENTS = (-1, 0, 1, 2, 1, 1)
-POSITIONS = np.array(
-    [[0, 1.0, 0], [0, 1.2, 0], [0, 1.5, 0], [0, 1.6, 0], [0.2, 1.4, 0], [-0.2, 1.4, 0]], dtype=float
-)
+POSITIONS = np.array([[0, 1.0, 0], [0, 1.2, 0], [0, 1.5, 0], [0, 1.6, 0], [0.2, 1.4, 0], [-0.2, 1.4, 0]], dtype=float)
 HEAD = 3
 
 

@@ -36,7 +36,9 @@ def test_constant_speed_is_no_motion():
 def test_spin_is_read_in_head_axes():
     turn = np.stack([np.zeros(90), 2.0 * np.arange(90) / 30, np.zeros(90)], axis=-1)
     clip = moved(np.arange(90) / 30, None, lambda t: rotation.from_vector(turn))
-    assert history(BoundarySampler(SPEC, person(), clip).vectors([2.0]))[0, 0, 3:6] == pytest.approx([0, 2, 0], abs=1e-4)
+    assert history(BoundarySampler(SPEC, person(), clip).vectors([2.0]))[0, 0, 3:6] == pytest.approx(
+        [0, 2, 0], abs=1e-4
+    )
 
 
 @pytest.mark.parametrize("rate", [24, 25, 60])
@@ -62,7 +64,9 @@ def test_a_rig_turned_or_with_other_joint_axes_reads_the_same():
     orient = np.tile(np.eye(4), (6, 1, 1))
     orient[:, :3, :3] = rotation.from_vector(np.random.default_rng(0).normal(size=(6, 3)))
     character = person()
-    oriented = type(character)(type(character.skeleton)(character.skeleton.names, character.skeleton.parents, bind() @ orient))
+    oriented = type(character)(
+        type(character.skeleton)(character.skeleton.names, character.skeleton.parents, bind() @ orient)
+    )
     assert BoundarySampler(SPEC, oriented, Clip(times, plain.joints @ orient)).vectors([1.0]) == pytest.approx(
         expected, abs=1e-5
     )

@@ -66,12 +66,15 @@ def test_closest_point_covers_all_seven_features():
     np.testing.assert_allclose(place, trimesh.triangles.closest_point(tri, points), atol=1e-12)
 
 
-@pytest.mark.parametrize("points, triangles, said", [
-    (np.full((3, 3), np.nan), [[0, 1, 2]], "not finite"),
-    (np.eye(3), [[0, 1, 7]], "not there"),
-    (np.zeros((3, 3)), [[0, 1, 2]], "no triangle"),
-    (np.eye(3), np.zeros((0, 3)), "no triangle"),
-])
+@pytest.mark.parametrize(
+    "points, triangles, said",
+    [
+        (np.full((3, 3), np.nan), [[0, 1, 2]], "not finite"),
+        (np.eye(3), [[0, 1, 7]], "not there"),
+        (np.zeros((3, 3)), [[0, 1, 2]], "no triangle"),
+        (np.eye(3), np.zeros((0, 3)), "no triangle"),
+    ],
+)
 def test_bad_meshes_are_named(points, triangles, said):
     with pytest.raises(NeuralocksError, match=said):
         Collider(points, triangles)

@@ -22,8 +22,15 @@ RIGS = {
     "MotionBuilder": (
         "Hips\n LeftUpLeg\n RightUpLeg\n LowerBack\n  Spine1\n   Neck\n    Neck1\n     Head\n      HeadTop_End\n"
         "   LeftShoulder\n    LeftArm\n     LeftForeArm\n   RightShoulder\n    RightArm",
-        {"head": "Head", "neck": "Neck", "upper_chest": "Spine1", "left_shoulder": "LeftShoulder",
-         "left_upper_arm": "LeftArm", "left_lower_arm": "LeftForeArm", "hips": "Hips"},
+        {
+            "head": "Head",
+            "neck": "Neck",
+            "upper_chest": "Spine1",
+            "left_shoulder": "LeftShoulder",
+            "left_upper_arm": "LeftArm",
+            "left_lower_arm": "LeftForeArm",
+            "hips": "Hips",
+        },
     ),
     "3ds Max": (
         "Hips\n Chest\n  Chest2\n   LeftCollar\n    LeftShoulder\n     LeftElbow\n   RightCollar\n    RightShoulder\n"
@@ -53,27 +60,49 @@ RIGS = {
         "    hero_rig_Character1_Neck\n     hero_rig_Character1_Head\n    hero_rig_Character1_LeftShoulder\n"
         "     hero_rig_Character1_LeftArm\n      hero_rig_Character1_LeftForeArm\n       hero_rig_Character1_LeftHand\n"
         "    hero_rig_Character1_RightShoulder\n     hero_rig_Character1_RightArm",
-        {"head": "hero_rig_Character1_Head", "left_shoulder": "hero_rig_Character1_LeftShoulder",
-         "left_upper_arm": "hero_rig_Character1_LeftArm", "left_lower_arm": "hero_rig_Character1_LeftForeArm",
-         "right_upper_arm": "hero_rig_Character1_RightArm", "upper_chest": "hero_rig_Character1_Spine1"},
+        {
+            "head": "hero_rig_Character1_Head",
+            "left_shoulder": "hero_rig_Character1_LeftShoulder",
+            "left_upper_arm": "hero_rig_Character1_LeftArm",
+            "left_lower_arm": "hero_rig_Character1_LeftForeArm",
+            "right_upper_arm": "hero_rig_Character1_RightArm",
+            "upper_chest": "hero_rig_Character1_Spine1",
+        },
     ),
     "AutoRig Pro": (
         "root_x\n spine_01_x\n  spine_03_x\n   neck_x\n    head_x\n   shoulder_l\n    arm_stretch_l\n     forearm_stretch_l\n"
         "   shoulder_r\n    arm_stretch_r",
-        {"head": "head_x", "neck": "neck_x", "left_shoulder": "shoulder_l", "left_upper_arm": "arm_stretch_l",
-         "left_lower_arm": "forearm_stretch_l", "right_upper_arm": "arm_stretch_r"},
+        {
+            "head": "head_x",
+            "neck": "neck_x",
+            "left_shoulder": "shoulder_l",
+            "left_upper_arm": "arm_stretch_l",
+            "left_lower_arm": "forearm_stretch_l",
+            "right_upper_arm": "arm_stretch_r",
+        },
     ),
     "an avatar through glTF": (
         "Armature_rootJoint\n pelvis_Armature\n  chest_Armature\n   neck_Armature\n    head_Armature\n"
         "   shoulder_l_Armature\n    upper_arm_l_Armature\n   shoulder_r_Armature\n    upper_arm_r_Armature",
-        {"head": "head_Armature", "left_shoulder": "shoulder_l_Armature", "left_upper_arm": "upper_arm_l_Armature",
-         "right_upper_arm": "upper_arm_r_Armature", "upper_chest": "chest_Armature"},
+        {
+            "head": "head_Armature",
+            "left_shoulder": "shoulder_l_Armature",
+            "left_upper_arm": "upper_arm_l_Armature",
+            "right_upper_arm": "upper_arm_r_Armature",
+            "upper_chest": "chest_Armature",
+        },
     ),
     "Daz": (
         "hip\n abdomenLower\n  chestUpper\n   lCollar\n    lShldrBend\n     lShldrTwist\n      lForearmBend\n"
         "   rCollar\n    rShldrBend\n   neckLower\n    neckUpper\n     head",
-        {"head": "head", "upper_chest": "chestUpper", "left_shoulder": "lCollar", "left_upper_arm": "lShldrBend",
-         "left_lower_arm": "lForearmBend", "neck": "neckLower"},
+        {
+            "head": "head",
+            "upper_chest": "chestUpper",
+            "left_shoulder": "lCollar",
+            "left_upper_arm": "lShldrBend",
+            "left_lower_arm": "lForearmBend",
+            "neck": "neckLower",
+        },
     ),
     "Rigify": (
         "DEF-spine\n DEF-spine.001\n  DEF-spine.002\n   DEF-spine.003\n    DEF-spine.004\n     DEF-spine.005\n"
@@ -83,8 +112,17 @@ RIGS = {
     "MikuMikuDance": (
         "センター\n 上半身\n  上半身2\n   首\n    頭\n     左目\n     左髪1\n   左肩\n    左腕\n     左ひじ\n      左手首\n"
         "   右肩\n    右腕\n     右ひじ\n 下半身\n  左足\n   左ひざ\n    左足首\n  右足",
-        {"head": "頭", "neck": "首", "upper_chest": "上半身2", "left_shoulder": "左肩", "right_upper_arm": "右腕",
-         "left_hand": "左手首", "left_upper_leg": "左足", "left_foot": "左足首", "left_eye": "左目"},
+        {
+            "head": "頭",
+            "neck": "首",
+            "upper_chest": "上半身2",
+            "left_shoulder": "左肩",
+            "right_upper_arm": "右腕",
+            "left_hand": "左手首",
+            "left_upper_leg": "左足",
+            "left_foot": "左足首",
+            "left_eye": "左目",
+        },
     ),
 }
 
@@ -99,7 +137,10 @@ def test_finds_the_joints_of_common_rigs(name):
 
 def test_tails_that_hang_from_the_neck_are_no_head():
     """Whatever the order, where the head itself is named in another language."""
-    for outline in ("hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf", "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL"):
+    for outline in (
+        "hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf",
+        "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL",
+    ):
         paths, parents = rig(outline)
         heights = {"hips": 1.0, "neck": 1.45, "Kopf": 1.55}
         places = np.array([(0, heights.get(p.rpartition("/")[2], 1.4), 0) for p in paths])

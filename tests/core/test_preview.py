@@ -35,8 +35,16 @@ def scene(frames=4, strands=300):
         return lambda i: points @ head[i, :3, :3].T + head[i, :3, 3]
 
     return preview.Scene(
-        np.arange(frames) / 24, head, np.eye(3), CENTRE, np.full(strands, 10), rest, posed(rest),
-        np.array(ball.faces), posed(body), body,
+        np.arange(frames) / 24,
+        head,
+        np.eye(3),
+        CENTRE,
+        np.full(strands, 10),
+        rest,
+        posed(rest),
+        np.array(ball.faces),
+        posed(body),
+        body,
     )
 
 

@@ -48,9 +48,7 @@ def test_samples_divide_the_arc_evenly():
     for s in np.flatnonzero(strands.valid)[::9]:
         own = groom.points[groom.starts[s] : groom.starts[s] + groom.counts[s]].astype(float)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(own, axis=0), axis=1))])
-        expected = np.stack(
-            [np.interp(np.linspace(0, arc[-1], K), arc, own[:, axis]) for axis in range(3)], axis=1
-        )
+        expected = np.stack([np.interp(np.linspace(0, arc[-1], K), arc, own[:, axis]) for axis in range(3)], axis=1)
         expected = centre_lines(expected[None])[0]
         np.testing.assert_allclose(strands.rest[s], expected - ORIGIN, atol=1e-6)
 
@@ -59,8 +57,7 @@ def test_strands_without_length_get_a_harmless_stand_in():
     groom = ragged_groom()
     strands = strand_set(groom, ORIGIN, CENTRE)
     distinct = [
-        len(np.unique(groom.points[a : a + n], axis=0)) > 1
-        for a, n in zip(groom.starts, groom.counts, strict=True)
+        len(np.unique(groom.points[a : a + n], axis=0)) > 1 for a, n in zip(groom.starts, groom.counts, strict=True)
     ]
     np.testing.assert_array_equal(strands.valid, distinct)
     assert 20 < (~strands.valid).sum() < 60
@@ -182,7 +179,9 @@ def test_any_strand_keeps_its_lengths_and_its_root():
     assert together.tobytes() == alone.tobytes()
     assert np.array_equal(together[starts], moved[starts])
     inner = np.setdiff1d(np.arange(len(rest) - 1), starts[1:] - 1)
-    lengths = [np.linalg.norm(np.diff(points.astype(float), axis=0), axis=1)[inner] for points in (rest, rest + together)]
+    lengths = [
+        np.linalg.norm(np.diff(points.astype(float), axis=0), axis=1)[inner] for points in (rest, rest + together)
+    ]
     np.testing.assert_allclose(*lengths, atol=1e-6)
 
 
@@ -220,13 +219,9 @@ def test_root_frames_take_the_normal_up():
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal[:2] = [[0, -1, 0], [0, 1, 0]]
     frames = root_frames(normal)
-    np.testing.assert_allclose(
-        frames @ frames.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (500, 3, 3)), atol=1e-9
-    )
+    np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (500, 3, 3)), atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(frames), 1.0, atol=1e-9)
-    np.testing.assert_allclose(
-        np.einsum("sij,sj->si", frames, normal), np.tile([0, 1.0, 0], (500, 1)), atol=1e-9
-    )
+    np.testing.assert_allclose(np.einsum("sij,sj->si", frames, normal), np.tile([0, 1.0, 0], (500, 1)), atol=1e-9)
     # Smallest: the angle is the one between the normal and +Y.
     np.testing.assert_allclose(Rotation.from_matrix(frames).magnitude(), np.arccos(normal[:, 1]), atol=1e-6)
 

@@ -235,7 +235,9 @@ def test_a_body_that_is_inside_out_is_turned_round(tmp_path, model):
     right = bake(write_shot(tmp_path, name="as_made"), tmp_path / "right.usdc", model, frames=[5])
     wrong = bake(edited(tmp_path, turned_round), tmp_path / "wrong.usdc", model, frames=[5])
     assert not any("inside out" in note for note in right.notes) and any("inside out" in note for note in wrong.notes)
-    points = [np.asarray(Sdf.Layer.FindOrOpen(str(r.path)).QueryTimeSample(f"{HAIR}.points", 5.0)) for r in (right, wrong)]
+    points = [
+        np.asarray(Sdf.Layer.FindOrOpen(str(r.path)).QueryTimeSample(f"{HAIR}.points", 5.0)) for r in (right, wrong)
+    ]
     assert np.abs(points[0] - points[1]).max() < 2e-3
 
 

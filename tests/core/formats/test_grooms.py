@@ -106,12 +106,8 @@ def test_strands_without_length_are_reported(folder):
 
 
 def test_units_of_the_formats(folder):
-    assert np.ptp(formats.read(put(folder, "a.data", FILES["a.data"])).points) == pytest.approx(
-        np.ptp(POINTS)
-    )
-    assert np.ptp(formats.read(put(folder, "a.bin", FILES["a.bin"])).points) == pytest.approx(
-        np.ptp(POINTS) / 1000
-    )
+    assert np.ptp(formats.read(put(folder, "a.data", FILES["a.data"])).points) == pytest.approx(np.ptp(POINTS))
+    assert np.ptp(formats.read(put(folder, "a.bin", FILES["a.bin"])).points) == pytest.approx(np.ptp(POINTS) / 1000)
     for unit in (1.0, 0.01, 0.001):  # a scalp 20 cm wide in any unit
         scaled = tressfx_text(POINTS / np.ptp(POINTS) * 0.2 / unit)
         groom, notes = formats.read_with_notes(put(folder, "text.tfx", scaled))
@@ -248,9 +244,7 @@ def test_arbitrary_bytes(folder, name, content):
 
 @given(
     name=st.sampled_from(list(FILES)),
-    edits=st.lists(
-        st.tuples(st.integers(0, 10_000), st.binary(min_size=1, max_size=4)), min_size=1, max_size=4
-    ),
+    edits=st.lists(st.tuples(st.integers(0, 10_000), st.binary(min_size=1, max_size=4)), min_size=1, max_size=4),
     keep=st.integers(1, 400),
 )
 @settings(max_examples=400, deadline=None)

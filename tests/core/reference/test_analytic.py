@@ -29,9 +29,7 @@ def still(frames=1):
 
 def settled(rest, **options):
     material = {"bend": options.pop("bend"), "damping": 0.0}
-    result = simulate(
-        rest, still(), material=material, rest_support=False, iterations=100, tolerance=1e-8, **options
-    )
+    result = simulate(rest, still(), material=material, rest_support=False, iterations=100, tolerance=1e-8, **options)
     assert result.residual[0] < 1e-4
     return result.points[0, 0].astype(float)
 
@@ -71,9 +69,7 @@ def test_large_droop_of_a_cantilever_is_the_elastica():
     assert answer.success
     tip = settled(straight([0, 0, 1]), bend=bend)[-1]
     # the BVP walks to the half-edge grid; the strand's own clamp is half an edge long
-    np.testing.assert_allclose(
-        [tip[2] - EDGE / 2, -tip[1]], [answer.y[2, -1], answer.y[3, -1]], atol=0.005 * LENGTH
-    )
+    np.testing.assert_allclose([tip[2] - EDGE / 2, -tip[1]], [answer.y[2, -1], answer.y[3, -1]], atol=0.005 * LENGTH)
 
 
 def test_a_chain_without_stiffness_hangs_from_its_clamp():
@@ -101,9 +97,7 @@ def first_mode(amplitude):
 def swing(damping, substeps):
     rest, start, period = first_mode(0.01)
     material = {"bend": 0.0, "damping": damping}
-    result = simulate(
-        rest, still(91), material=material, start=start, substeps=substeps, iterations=30, tolerance=1e-6
-    )
+    result = simulate(rest, still(91), material=material, start=start, substeps=substeps, iterations=30, tolerance=1e-6)
     tip = result.points[:, 0, -1, 0].astype(float)
     cross = np.flatnonzero(np.diff(np.sign(tip)))
     at = cross + tip[cross] / (tip[cross] - tip[cross + 1])

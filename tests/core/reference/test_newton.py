@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("warp", reason="the reference needs warp")
-newton = pytest.importorskip(
-    "newton", reason="the comparison needs newton: pip install 'neuralocks[compare]'"
-)
+newton = pytest.importorskip("newton", reason="the comparison needs newton: pip install 'neuralocks[compare]'")
 if not os.environ.get("NEURALOCKS_COMPARE"):
     pytest.skip("newton's kernels take minutes to compile: set NEURALOCKS_COMPARE=1", allow_module_level=True)
 import warp as wp
@@ -73,10 +71,7 @@ def newton_tips(rest, bend, shift, substeps=20, iterations=8, damping=0.0):
             now, then = then, now
         last = now.body_q.numpy()[bodies[-1]].astype(float)
         x, y, z, w = last[3:]
-        tips.append(
-            last[:3]
-            + EDGE / 2 * np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-        )
+        tips.append(last[:3] + EDGE / 2 * np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]))
     return np.array(tips)
 
 

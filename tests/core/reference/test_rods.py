@@ -163,10 +163,7 @@ def test_ties_hold_neighbours_together():
     rest[1] = rest[0] + [0.003, 0, 0]
     head = shaken(30, 1.0)
     material = {"bend": np.array([1e-3, 2e-4]), "clumping": 240.0}
-    apart = [
-        simulate(rest, head, material=material, neighbours=ties).points
-        for ties in (None, np.array([[1], [0]]))
-    ]
+    apart = [simulate(rest, head, material=material, neighbours=ties).points for ties in (None, np.array([[1], [0]]))]
     drift = [np.abs((p[:, 0] - p[:, 1]) - (rest[0] - rest[1])).max() for p in apart]
     assert drift[1] < 0.6 * drift[0]
 

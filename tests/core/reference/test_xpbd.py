@@ -17,8 +17,7 @@ def test_small_steps_and_newton_agree():
     newton = simulate(rest, head, substeps=8, tolerance=1e-5).points
     moved = np.linalg.norm(newton - rest, axis=-1).mean()
     error = [
-        np.linalg.norm(simulate_xpbd(rest, head, substeps=n).points - newton, axis=-1).mean() / moved
-        for n in (15, 50)
+        np.linalg.norm(simulate_xpbd(rest, head, substeps=n).points - newton, axis=-1).mean() / moved for n in (15, 50)
     ]
     assert error[1] < 0.1 < error[0]
 

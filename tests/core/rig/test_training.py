@@ -153,7 +153,9 @@ def test_hair_over_the_faces_of_a_coarse_body_is_not_thrown_off():
     body, ball = rig.character.body, trimesh.creation.icosphere(1, 0.12)
     points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
     joints = np.repeat([body.joint_indices[0], body.joint_indices[-1]], len(ball.vertices), axis=0)
-    body = Body(points, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]), joints, np.ones_like(joints, float))
+    body = Body(
+        points, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]), joints, np.ones_like(joints, float)
+    )
     rig = replace(rig, character=replace(rig.character, body=body))
     over = ball.triangles_center + 0.004 * ball.face_normals + [0, 0.07, 0.02]
     rig = replace(rig, points=over, weights=np.eye(1, len(rig.chains) + 1).repeat(len(over), 0))

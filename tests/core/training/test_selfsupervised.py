@@ -13,10 +13,11 @@ from neuralocks_core.normals import vertex_normals
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.runtime import strand_inputs
 from neuralocks_core.training.moment_losses import moment_losses
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MomentPool, nearest_planes
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.selfsupervised import SelfSupervisedOptions, paper_boundary, train_on_moments
+from neuralocks_core.training.selfsupervised import paper_boundary, train_on_moments
 from tests.core.rigs import HEAD, bind, person
 from tests.core.training.test_train import straight_hair
 
