@@ -20,6 +20,7 @@ test: lint tests
 
 lint: $(VENV)/installed-test
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check -q .
 
 tests: $(VENV)/installed-test blender
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -q
