@@ -16,7 +16,7 @@ from neuralocks_core.training.descent import Schedule, descend
 from neuralocks_core.training.rig_energy import RigMaterial
 from neuralocks_core.training.rig_held import HeldPoses
 from neuralocks_core.training.rig_network import TinyNet
-from neuralocks_core.training.rig_report import static_report
+from neuralocks_core.training.rig_report import static_report, within
 
 _POOL = 512
 """Poses to draw from."""
@@ -64,7 +64,7 @@ def train_static(
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=4e-3, warm_up=50)
     for state in descend([torch.optim.Adam(net.parameters())], losses, schedule):
-        say(int(1000 * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
+        say(int(850 * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
     training = {
         "method": "quasi-static, self-supervised",
         "steps": state.step,
@@ -76,5 +76,5 @@ def train_static(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        model.report.update(static_report(model, rig, material, report_poses, seed + 1, say))
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, 850, 1000, 1000)))
     return model

@@ -19,7 +19,7 @@ from neuralocks_core.training.rig_energy import RigMaterial
 from neuralocks_core.training.rig_held import HeldPoses
 from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig_network import TinyNet
-from neuralocks_core.training.rig_report import static_report
+from neuralocks_core.training.rig_report import static_report, within
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
@@ -90,7 +90,7 @@ def train_dynamic(
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=1e-3)
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=4e-3, warm_up=50)
     for state in descend([optimiser], losses, schedule):
-        say(200 + int(750 * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
+        say(200 + int(550 * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
         "method": "dynamic, regression on simulated chains",
         "steps": state.step,
@@ -104,9 +104,9 @@ def train_dynamic(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        say(950, 1000, "comparing on held-out motion")
-        model.report.update(static_report(model, rig, material, report_poses, seed + 1, optimised=16))
-        model.report.update(motion_report(rig, material, {"dynamic network": model}))
+        held_poses, in_motion = within(say, 750, 880, 1000), within(say, 880, 1000, 1000)
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses, optimised=16))
+        model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
     return model
 
 

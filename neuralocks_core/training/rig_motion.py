@@ -40,8 +40,15 @@ def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, rate: f
     return np.stack(features), solver.simulate(np.stack(heads), 1 / rate, body)
 
 
-def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigModel], kinds=KINDS) -> dict:
+def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigModel], kinds=KINDS, progress=None) -> dict:
     """Held-out scripted clips: models and spring bones against the simulation, and hair carried rigidly.
+
+    Args:
+        rig: what the models were trained for.
+        material: constants of the simulation.
+        models: by the name that they have in the report.
+        kinds: which clips.
+        progress: called with (done, total, message).
 
     Returns:
         `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1);
@@ -52,6 +59,8 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         `rates`: rms difference at shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm];
         `teleport`: see `_teleports`; `cost`: see `_network_cost`.
     """
+    say = progress or (lambda done, total, message: None)
+    say(0, 4, "simulating held-out motion")
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)
     true = _ends(rig, truth)
@@ -59,6 +68,7 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
     times = motions[0].start + np.arange(true.shape[1]) / RATE
     joints = np.stack([m.at(times) for m in motions])
     heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
+    say(1, 4, "moving spring bones, for comparison")
     fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
     springs = [spring_bones(rig.chains, heads, 1 / RATE, fit) for fit in fits]
     best = int(np.argmin([np.square(_ends(rig, s) - true).sum(-1).mean() for s in springs]))
@@ -78,11 +88,13 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         result["motion_ratio"][name] = round(float(ratio), 3)
     if rig.character.body is not None and len(rig.points):
         outside = rest_distances(rig, rig.points) > 0
+        say(2, 4, "measuring what lies in the body in motion")
         few = joints[:, ::8].reshape(-1, *joints.shape[2:])
         for name, turns in {"simulation": truth, **candidates}.items():
             matrices = quaternion_matrices(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
             points = skin(rig.chains, *pose_chains(rig.chains, matrices), rig.points[outside], rig.weights[outside])
             result["motion_depth"][name] = depths(posed_distances(rig, few, points))
+    say(3, 4, "comparing frame rates and teleports")
     result["spring_settings"] = asdict(fits[best])
     result["rates"] = _rates(rig, models, fits[best])
     result["teleport"] = _teleports(rig, models, fits[best])

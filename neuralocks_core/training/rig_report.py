@@ -69,6 +69,11 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
     return report
 
 
+def within(say, begin: int, end: int, whole: int):
+    """A progress callback for the part of a longer work of `whole` steps that goes from `begin` to `end`."""
+    return lambda done, total, message: say(begin + (end - begin) * done // total, whole, message)
+
+
 def depths(distance: np.ndarray) -> dict:
     """Shares and depths in the body of signed distances (B, V) [m]."""
     share = 100 / max(distance.size, 1)

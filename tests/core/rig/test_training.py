@@ -21,6 +21,8 @@ from neuralocks_core.rig.kinematics import (  # noqa: E402
     skin,
 )
 from neuralocks_core.rig.rigging import HairRig  # noqa: E402
+from neuralocks_core.training.rig import train_static  # noqa: E402
+from neuralocks_core.training.rig_dynamic import train_dynamic  # noqa: E402
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns  # noqa: E402
 from neuralocks_core.training.rig_motion import SPRINGS, motion_report  # noqa: E402
 from neuralocks_core.training.rig_poses import PosePool, posed_distances, rest_distances  # noqa: E402
@@ -204,3 +206,14 @@ def test_a_teleport_and_other_frame_rates():
     assert report["rates"]["network"]["24 fps"] < 0.5 < report["rates"][SPRINGS]["24 fps"]
     assert report["cost"]["network"]["bytes_carried_on"] == 0
     assert set(report["motion_error"]) > {"network", SPRINGS}
+
+
+def test_progress_goes_on_through_the_report():
+    """Of both trainings: never backwards, to the end of the bar, and what the report is at is told."""
+    rig, _ = with_balls()
+    for train, options in ((train_static, {}), (train_dynamic, {"clips": 2, "clip_seconds": 0.5})):
+        told = []
+        model = train(rig, steps=2, report_poses=4, progress=lambda *state, told=told: told.append(state), **options)
+        shares = [done / total for done, total, _ in told]
+        assert shares == sorted(shares) and shares[-1] > 0.95
+        assert len([message for done, _, message in told if done >= 850]) >= 3 and model.report
