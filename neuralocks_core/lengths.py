@@ -75,7 +75,7 @@ def _kept(rest: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> np.ndarray
 
 
 def _measure(edges: np.ndarray, lengths: np.ndarray, room: _Room) -> None:
-    """Squared lengths of edges, and the factors that give them the wanted ones (squared, too)."""
+    """Into `room`: squared lengths of edges, and the factors that give them the lengths whose squares are `lengths`."""
     np.maximum(_dot(edges, edges, room.squared, room.spare), TINY, out=room.squared)
     np.sqrt(np.divide(lengths, room.squared, out=room.scale), out=room.scale)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from neuralocks_core.character import Body, Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.pieces import connected_pieces
 
 DEFAULT_PHENOTYPE = {"gender": 1.0, "age": 2 / 3, "muscle": 0.5, "weight": 0.45, "height": 0.5, "proportions": 0.6}
 """A young adult woman; anny's parameters lie in 0..1 (gender 1 is female, age 2/3 is 25 years)."""
@@ -125,18 +126,9 @@ class _Rest:
         self.bones[:, :3, 3] = self.heads
 
 
-def _parts(count, faces):
-    """Connected part of each of `count` points, (V,) int."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 3]]])
-    return connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count)), directed=False)[1]
-
-
 def _without_tongue(points, faces):
     """Vertex indices kept and quads renumbered: all but the mouth's loose inside, which hair never sees."""
-    part = _parts(len(points), faces)
+    part = connected_pieces(faces, len(points))
     sizes = np.bincount(part)
     # The skin is the largest part; eyes lie off the middle plane, the tongue on it.
     centre = np.bincount(part, weights=points[:, 0]) / sizes
@@ -210,7 +202,7 @@ def _colors(body, faces, labels):
     share = np.sum(body.joint_weights * bare[body.joint_indices], axis=1)
     share = np.clip((share - 0.4) / 0.2, 0, 1)[:, None]
     colors = share * [0.58, 0.38, 0.29] + (1 - share) * [0.09, 0.1, 0.12]
-    part = _parts(len(body.points), faces)
+    part = connected_pieces(faces, len(body.points))
     for eye in np.flatnonzero(np.bincount(part) < len(part) / 2):
         mine = np.flatnonzero(part == eye)
         pole = body.points[mine[body.points[mine, 2].argmax()]]

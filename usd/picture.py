@@ -3,12 +3,11 @@
 
 from pathlib import Path
 
-from pxr import Usd, UsdGeom
-
 from neuralocks_core import preview as drawing
 
 from .baked import Baked, read_baked
-from .border import Border, open_stage
+from .border import open_stage
+from .curves import find_curves
 from .damage import names_damage
 from .rig_picture import rigged_scene
 from .rig_stage import read_rigged_hair
@@ -28,15 +27,10 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
     Raises:
         NeuralocksError: the file is no bake, or the picture cannot be made.
     """
-    if isinstance(baked, Baked) or grooms or _has_strands(stage := open_stage(baked)):
+    if isinstance(baked, Baked) or find_curves(open_stage(baked), grooms):
         baked = baked if isinstance(baked, Baked) else read_baked(baked, grooms, skeleton, head)
         scene, rate = baked.scene(), baked.shot.border.rate
     else:
-        scene, rate = rigged_scene(read_rigged_hair(baked, skeleton=skeleton, head=head)), Border.of(stage).rate
+        rigged = read_rigged_hair(baked, skeleton=skeleton, head=head)
+        scene, rate = rigged_scene(rigged), rigged.border.rate
     return drawing.render(scene, path, size=size, rate=min(rate, 30.0), progress=progress)
-
-
-def _has_strands(stage: Usd.Stage) -> bool:
-    return any(
-        prim.IsA(UsdGeom.BasisCurves) for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
-    )

@@ -26,7 +26,6 @@ class Placement:
             walk = walk.GetParent()
         self.samples = sorted(set(self.samples))
         # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
-        # A single sample is not varying, and yet no default.
         self._still = None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
 
     def at(self, time_code: float) -> np.ndarray:

@@ -238,6 +238,19 @@ def test_a_picture_of_mesh_hair(tmp_path):
     assert (panels[0] != panels[4]).mean() > 0.02
 
 
+def test_joints_without_a_mesh_have_no_picture(tmp_path):
+    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+    from usd.picture import preview
+
+    path = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(path))
+    stage.RemovePrim("/Who/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="no mesh"):
+        preview(path, tmp_path / "hair.png")
+    assert not (tmp_path / "hair.png").exists()
+
+
 def test_a_vrm_avatar_through_blender(tmp_path):
     """Its seven hair chains of one joint and an end are found, as its spring-bone groups name them."""
     avatar = EXAMPLE.parents[2] / "shared" / "data" / "rigged" / "godette.vrm"
