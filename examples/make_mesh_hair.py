@@ -18,7 +18,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.collider import Collider
-from neuralocks_core.normals import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.puppet import Puppet
 from neuralocks_core.rotation import to_quaternion
 from usd.border import Border, open_stage, row_matrix

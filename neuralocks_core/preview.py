@@ -14,7 +14,7 @@ from neuralocks_core import shading
 from neuralocks_core.canvas import Camera, open_canvas
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
-from neuralocks_core.normals import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 
 SUFFIXES = (".png", ".mp4", ".gif")
 

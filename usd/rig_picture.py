@@ -4,7 +4,7 @@
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.pieces import connected_pieces
+from neuralocks_core.mesh import connected_pieces
 from neuralocks_core.preview import Scene
 
 from .border import transformed

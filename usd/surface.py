@@ -8,7 +8,7 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.character import Body
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.winding import inside_out
+from neuralocks_core.mesh import inside_out
 
 from .border import column_matrix, transformed
 from .joints import JointSource

@@ -10,7 +10,7 @@ from neuralocks_core.character import Body, Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.humanoid import find_humanoid
-from neuralocks_core.winding import inside_out
+from neuralocks_core.mesh import inside_out
 
 from . import names
 from .axes import to_core, transformed

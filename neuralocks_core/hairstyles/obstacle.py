@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import NeuralocksError
-from ..normals import vertex_normals
+from ..mesh import vertex_normals
 from .scalp import Scalp
 
 _CELL = 0.08

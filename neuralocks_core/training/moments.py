@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from neuralocks_core.locks import lock_mates, neighbours
-from neuralocks_core.normals import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.physics.body_collision import MARGIN
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.collider import Collider
-from neuralocks_core.normals import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector

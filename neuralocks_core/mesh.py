@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the faces of a mesh tell: normals at its vertices, which vertices hang together, and which side is out."""
+
+import numpy as np
+
+INSIDE_OUT = -0.3
+"""Of the volumes that triangles span with the middle of the mesh, sum over sum of sizes: 1 for a ball, 0.5 for a person
+with arms spread, near 0 for hair cards and cloth, whose sides say nothing. Below this the mesh is inside out."""
+
+
+def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (V, 3) of points (V, 3), outward as the triangles (F, 3) are by the right-hand rule.
+
+    Each is the mean of the faces around, weighted by their area; zero where there is none.
+    """
+    a, b, c = (np.asarray(points, float)[corner] for corner in triangles.T)
+    face, corners = np.cross(b - a, c - a), triangles.T.ravel()
+    total = np.stack([np.bincount(corners, np.tile(part, 3), len(points)) for part in face.T], axis=1)
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+
+
+def connected_pieces(faces: np.ndarray, count: int) -> np.ndarray:
+    """Number of the piece that each of `count` vertices is in (V,) int; faces (F, n) have n corners each."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    first, second = faces[:, :-1].ravel(), faces[:, 1:].ravel()
+    links = coo_array((np.ones(len(first), bool), (first, second)), (count, count))
+    return connected_components(links, directed=False)[1]
+
+
+def inside_out(points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether the triangles (F, 3) of a mesh's points (V, 3) face inward.
+
+    Files exist whose every triangle does, and hair would be pushed into such a body.
+    """
+    if not len(triangles):
+        return False
+    around = np.asarray(points, float)
+    around = around - around[triangles].mean(axis=(0, 1))
+    a, b, c = (around[triangles[:, corner]] for corner in range(3))
+    volumes = np.einsum("fi,fi->f", a, np.cross(b, c))
+    return bool(volumes.sum() < INSIDE_OUT * np.abs(volumes).sum())
