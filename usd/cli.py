@@ -43,12 +43,12 @@ def import_command(
 ) -> None:
     """Write a hair file as a USD groom."""
     from .groom import import_groom
-    from .inspect import _groom
+    from .inspect import groom_facts
 
     grooms, notes = import_groom(file, out, unit, up)
     note(notes)
     if as_json:
-        print_json({"path": str(out), "grooms": [_groom(g) for g in grooms], "notes": notes})
+        print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
     else:
         for groom in grooms:
             typer.echo(f"{out}: {groom.strand_count} strands, {len(groom.points)} vertices of {groom.name}")

@@ -15,10 +15,11 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
+from .notes import composition_notes, groom_notes, head_width, rig_notes
 from .placement import Placement
 from .rig_source import read_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
-from .stage import _composition, _groom_notes, _rig_notes, find_skeletons, frame_range, head_width
+from .stage import find_skeletons, frame_range
 
 
 def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:
@@ -48,14 +49,14 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     from neuralocks_core import formats
 
     groom, notes = formats.read_with_notes(path)
-    return {"file": str(path), "kind": "hair", "grooms": [_groom(groom)], "stops": [], "spoils": notes}
+    return {"file": str(path), "kind": "hair", "grooms": [groom_facts(groom)], "stops": [], "spoils": notes}
 
 
 @names_damage
 def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     stage = open_stage(path)
     stops: list[str] = []
-    spoils = [f"{path.name}: {_composition(error)}" for error in stage.GetCompositionErrors()]
+    spoils = composition_notes(stage, path)
     border = Border.of(stage)
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
@@ -68,7 +69,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
             stops.append(str(error))
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
-        spoils += rig.notes + _rig_notes(rig)
+        spoils += rig.notes + rig_notes(rig)
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
@@ -139,24 +140,21 @@ def _curves(prim, rigs, border, head, spoils, stops) -> dict:
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
     to_bind, joint = border.to_core @ placement.reference, {}
-    item = None
     if rigs:
         try:
             found = attach(prim, rigs, placement, head, spoils)
             to_bind = found.to_bind
             joint = {"joint": rig_joint(found), "carried by": found.how}
-            item = found
         except NeuralocksError as error:
             stops.append(str(error))
     groom = read_groom(prim, to_bind, spoils)
-    if item is not None:
-        from .stage import StageGroom
-
-        spoils += _groom_notes(StageGroom(str(prim.GetPath()), prim, groom, item, placement))
-    return facts | joint | _groom(groom)
+    if joint:
+        spoils += groom_notes(facts["path"], groom)
+    return facts | joint | groom_facts(groom)
 
 
-def _groom(groom: Groom) -> dict:
+def groom_facts(groom: Groom) -> dict:
+    """Counts and lengths of a groom's strands [m], as plain values."""
     step = np.linalg.norm(np.diff(groom.points.astype(float), axis=0), axis=1)
     inside = groom.strand_of_point[1:] == groom.strand_of_point[:-1]
     lengths = np.bincount(groom.strand_of_point[1:][inside], step[inside], groom.strand_count)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdSkel
 
-from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
@@ -15,11 +14,9 @@ from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
+from .notes import composition_notes, groom_notes, rig_notes
 from .placement import Placement
 from .rig_source import StageRig, read_rig
-
-HEAD_WIDTHS = (0.08, 0.6)
-"""Between these a head's width is believed [m]; others hint at a wrong metersPerUnit."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     path = Path(path)
     stage = open_stage(path)
     border = Border.of(stage)
-    notes = [f"{path.name}: {_composition(error)}" for error in stage.GetCompositionErrors()]
+    notes = composition_notes(stage, path)
     curves = find_curves(stage, grooms)
     if not curves:
         raise NeuralocksError(
@@ -101,12 +98,12 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         attachment = attach(prim, rigs, placement, head, notes)
         groom = read_groom(prim, attachment.to_bind, notes)
         found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
-        notes += _groom_notes(found[-1])
+        notes += groom_notes(found[-1].path, groom)
     carrying = {id(g.attachment.rig) for g in found}
     used = tuple(rig for rig in rigs if id(rig) in carrying)
     for rig in used:
         _check_animated([rig], path)
-        notes += rig.notes + _rig_notes(rig)
+        notes += rig.notes + rig_notes(rig)
     first, last = frame_range(stage, used)
     return Shot(path, stage, border, used, tuple(found), first, last, tuple(dict.fromkeys(notes)))
 
@@ -178,53 +175,3 @@ def _why(rig: StageRig) -> str:
         if rig.source.notes and not rig.source.animated
         else ""
     )
-
-
-def _rig_notes(rig: StageRig) -> list[str]:
-    notes = []
-    if len(rig.time_codes) == 1:
-        notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
-    missing = [name for name in POSE_JOINTS if name not in rig.character.humanoid]
-    if missing:
-        notes.append(
-            f"{rig.path}: no joint found for {', '.join(missing)}; "
-            "the next one towards the trunk serves, or name it with --joint"
-        )
-    width = head_width(rig)
-    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
-        notes.append(
-            f"{rig.path}: the head is {width:.3g} m wide; "
-            f"check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
-        )
-    return notes
-
-
-def head_width(rig: StageRig) -> float | None:
-    """Width of the head's skin in bind pose [m], if the rig has a head and skin on it."""
-    if "head" not in rig.character.humanoid or (mask := rig.character.head_mask()) is None or mask.sum() < 20:
-        return None
-    points = rig.character.body.points[mask] @ rig.character.facing.T
-    return float(np.ptp(points[:, 0]))
-
-
-def _groom_notes(item: StageGroom) -> list[str]:
-    groom, notes = item.groom, []
-    filled = np.flatnonzero(groom.counts > 0)
-    spread = np.zeros(groom.strand_count, np.float32)
-    low = np.minimum.reduceat(groom.points, groom.starts[filled])
-    high = np.maximum.reduceat(groom.points, groom.starts[filled])
-    spread[filled] = (high - low).max(axis=1)
-    still = int((spread <= 1e-7).sum())
-    if still:
-        notes.append(
-            f"{item.path}: {still} of {groom.strand_count} strands have no two distinct points; "
-            "they follow the head rigidly"
-        )
-    longest = float(spread.max())
-    if longest > 2.5 or longest < 0.002:
-        notes.append(f"{item.path}: the longest strand reaches {longest:.3g} m; check the stage's metersPerUnit")
-    return notes
-
-
-def _composition(error) -> str:
-    return " ".join(str(error).split())[:200]

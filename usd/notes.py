@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user should know about a shot though it stops no bake, one line each: prim or file, fact, and what to check."""
+
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd
+
+from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.groom import Groom
+
+from .rig_source import StageRig
+
+HEAD_WIDTHS = (0.08, 0.6)
+"""Between these a head's width is believed [m]; others hint at a wrong metersPerUnit."""
+
+
+def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
+    """What USD could not compose, missing layers say."""
+    return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+
+
+def rig_notes(rig: StageRig) -> list[str]:
+    """Held poses, joints that no name told, heads of an unlikely size."""
+    notes = []
+    if len(rig.time_codes) == 1:
+        notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
+    missing = [name for name in POSE_JOINTS if name not in rig.character.humanoid]
+    if missing:
+        notes.append(
+            f"{rig.path}: no joint found for {', '.join(missing)}; "
+            "the next one towards the trunk serves, or name it with --joint"
+        )
+    width = head_width(rig)
+    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+        notes.append(
+            f"{rig.path}: the head is {width:.3g} m wide; "
+            f"check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
+        )
+    return notes
+
+
+def head_width(rig: StageRig) -> float | None:
+    """Width of the head's skin in bind pose [m], if the rig has a head and skin on it."""
+    if "head" not in rig.character.humanoid or (mask := rig.character.head_mask()) is None or mask.sum() < 20:
+        return None
+    points = rig.character.body.points[mask] @ rig.character.facing.T
+    return float(np.ptp(points[:, 0]))
+
+
+def groom_notes(path: str, groom: Groom) -> list[str]:
+    """Strands of no length, and lengths that no hair has; `path` is the groom's prim."""
+    notes = []
+    filled = np.flatnonzero(groom.counts > 0)
+    spread = np.zeros(groom.strand_count, np.float32)
+    low = np.minimum.reduceat(groom.points, groom.starts[filled])
+    high = np.maximum.reduceat(groom.points, groom.starts[filled])
+    spread[filled] = (high - low).max(axis=1)
+    still = int((spread <= 1e-7).sum())
+    if still:
+        notes.append(
+            f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"
+        )
+    longest = float(spread.max())
+    if longest > 2.5 or longest < 0.002:
+        notes.append(f"{path}: the longest strand reaches {longest:.3g} m; check the stage's metersPerUnit")
+    return notes
