@@ -111,6 +111,15 @@ class BoundarySpec:
         """How many earlier steps of `dt` the history covers."""
         return sum(self.bins)
 
+    @property
+    def bin_weights(self) -> np.ndarray:
+        """Weight of each history bin (n,): 1, falling as a cosine to 0 over the last `taper` of the history."""
+        if not self.bins:
+            return np.zeros(0)
+        middle = np.cumsum(self.bins) - np.asarray(self.bins) / 2
+        into = np.clip((middle / self.steps - (1 - self.taper)) / max(self.taper, 1e-9), 0, 1)
+        return 0.5 + 0.5 * np.cos(np.pi * into)
+
 
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
@@ -152,7 +161,7 @@ class BoundarySampler:
         else:
             self._spline = CubicSpline(times, values, bc_type="natural")
             self._speeds = self._spline(times[[0, -1]], 1)[:, :3]
-        self._taper = _taper(spec)
+        self._bin_weights = spec.bin_weights
         self._shape_cache: dict[bytes, np.ndarray] = {}
 
     def vectors(
@@ -239,7 +248,7 @@ class BoundarySampler:
         rows = np.concatenate(columns, axis=-1)
         ends = np.cumsum(spec.bins)
         means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
-        return (means * self._taper[:, None]).reshape(len(rows), -1)
+        return (means * self._bin_weights[:, None]).reshape(len(rows), -1)
 
 
 def _stance(character: Character, name: str) -> np.ndarray:
@@ -260,15 +269,6 @@ def _stance(character: Character, name: str) -> np.ndarray:
 def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors * np.minimum(1.0, limit / np.maximum(length, 1e-9))
-
-
-def _taper(spec: BoundarySpec) -> np.ndarray:
-    """Weight of each bin: 1, falling as a cosine to 0 over the last `taper` of the history."""
-    if not spec.bins:
-        return np.zeros(0)
-    middle = np.cumsum(spec.bins) - np.asarray(spec.bins) / 2
-    into = np.clip((middle / spec.steps - (1 - spec.taper)) / max(spec.taper, 1e-9), 0, 1)
-    return 0.5 + 0.5 * np.cos(np.pi * into)
 
 
 def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "BINS": len(spec.bins),
         "STEPS": spec.steps,
         "BINSTEPS": ", ".join(str(b) for b in spec.bins),
-        "TAPER": ", ".join(_float(v) for v in _taper(spec)),
+        "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
         "DT": repr(float(spec.dt)),
     }
     return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
@@ -102,12 +102,6 @@ def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str
     if hidden:
         lines.append(f"  for (j = 0; j < {columns}; ++j) h{index}[j] = h{index}[j] > 0.0f ? h{index}[j] : 0.0f;")
     return "\n".join(lines)
-
-
-def _taper(spec) -> np.ndarray:
-    from neuralocks_core.boundary import _taper
-
-    return _taper(spec)
 
 
 def _example(model: RigModel, header: str, prefix: str) -> str:

@@ -24,6 +24,14 @@ def from_quaternion(quaternions: np.ndarray) -> np.ndarray:
     return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
+def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) wxyz of the rotation b and then a, of quaternions (..., 4) of any length."""
+    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    result = np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    return result / np.linalg.norm(result, axis=-1, keepdims=True)
+
+
 def to_vector(matrices: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3)."""
     matrices = np.asarray(matrices, float)

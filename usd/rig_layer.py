@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
-from neuralocks_core.rotation import rotation_part, to_quaternion
+from neuralocks_core.rotation import quaternion_product, rotation_part, to_quaternion
 
 from .joints import JointSource
 from .override import write_header
@@ -63,7 +63,8 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     attribute = own.GetRotationsAttr() if own else None
     for code, turn in zip(codes, turns):
         values = _joined(attribute, code, rest["rotations"])
-        for place, q in zip(places, _product(bind, turn)):
+        # The second factors keep w > 0, so no sign flips between samples.
+        for place, q in zip(places, quaternion_product(bind, turn)):
             values[place] = Gf.Quatf(*map(float, q))
         layer.SetTimeSample(spec.path, float(code), Vt.QuatfArray(values))
     if source.animation is not None:
@@ -117,15 +118,6 @@ def _joined(attribute, code, rest: list) -> list:
         values = attribute.Get(Usd.TimeCode.EarliestTime())
     values = list(values) if values is not None else []
     return values + rest[len(values) :]
-
-
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Quaternion products (N, 4) wxyz. The second factors keep w > 0, so no sign flips between samples."""
-    aw, av, bw, bv = a[:, :1], a[:, 1:], b[:, :1], b[:, 1:]
-    product = np.concatenate(
-        [aw * bw - np.sum(av * bv, axis=1, keepdims=True), aw * bv + bw * av + np.cross(av, bv)], axis=1
-    )
-    return product / np.linalg.norm(product, axis=1, keepdims=True)
 
 
 def _blend_shapes(layer, prim, animation) -> None:

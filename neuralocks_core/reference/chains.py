@@ -16,6 +16,7 @@ import numpy as np
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices
+from neuralocks_core.rotation import quaternion_product
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,8 @@ class ChainSolver:
             size = np.linalg.norm(change, axis=-1, keepdims=True)
             change *= np.minimum(1, 0.6 / np.maximum(size, 1e-12))
             local = np.einsum("cnji,cnj->cni", carriers, change)
-            turns = _normalised(_product(_small(local), turns))
+            turns = quaternion_product(_small(local), turns)
+            turns = np.where(turns[..., :1] < 0, -turns, turns)
         return turns, bone_ends(chains, *pose_chains(chains, quaternion_matrices(turns)))
 
     def _limits(self, body):
@@ -194,15 +196,3 @@ def _small(vector):
     """Quaternions of rotation vectors (..., 3) [rad]."""
     angle = np.linalg.norm(vector, axis=-1, keepdims=True)
     return np.concatenate([np.cos(angle / 2), vector * 0.5 * np.sinc(angle / (2 * np.pi))], axis=-1)
-
-
-def _product(a, b):
-    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    return np.concatenate(
-        [aw * bw - np.sum(av * bv, axis=-1, keepdims=True), aw * bv + bw * av + np.cross(av, bv)], axis=-1
-    )
-
-
-def _normalised(q):
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(q[..., :1] < 0, -q, q)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.reference.chains import _normalised, _product
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import quaternion_matrices
 
@@ -86,4 +85,4 @@ def _from_to(a, b):
     opposite = half[:, 0] < 1e-6
     side = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
     half[opposite] = np.concatenate([[0.0], side])
-    return _normalised(_product(half, np.array([1.0, 0.0, 0.0, 0.0])))
+    return half / np.linalg.norm(half, axis=-1, keepdims=True)
