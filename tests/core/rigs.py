@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A small humanoid for tests: six joints, and motions whose answers are known."""
 
 import numpy as np

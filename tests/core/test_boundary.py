@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The boundary history sees what matters and nothing else."""
 
 import numpy as np

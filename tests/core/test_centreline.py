@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coils finer than the network's vertices become the line they wind around; everything else stays."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Semantic joints are found on the rigs that people have."""
 
 import numpy as np

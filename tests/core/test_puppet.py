@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hand-written motion: bodies in the air fall freely, arms turn about what they hang from."""
 
 import numpy as np

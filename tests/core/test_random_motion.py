@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motion that is made up is repeatable, human in size, and starts still."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motion capture on the shipped body looks right: upright, on its feet, the same left and right."""
 
 from functools import cache

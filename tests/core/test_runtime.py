@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The one-file model and its inference: exact splitting, no dependence on chunks, clear refusals."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The body is a standard UsdSkel character, and its animation comes back as written."""
 
 from pathlib import Path

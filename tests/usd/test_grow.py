@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hairstyles on a USD character: they sit on its head, and training can read them back."""
 
 from pathlib import Path

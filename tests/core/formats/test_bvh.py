@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """BVH files give the motion they hold, and hostile ones one clear line."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Training on rollouts: repeatable material, hair that learns to move, runs that survive a kill."""
 
 import numpy as np
