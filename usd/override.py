@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, Vt
+from pxr import Sdf, Tf, Usd, UsdUtils, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
@@ -105,16 +105,10 @@ class OverrideWriter:
 
 
 def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
-    """Sublayer the shot by a path relative to `out`, and repeat its units, rates, range and default prim."""
-    source = os.path.realpath(shot)
-    try:
-        relative = os.path.relpath(source, os.path.realpath(out.parent)).replace(os.sep, "/")
-    except ValueError:  # another drive
-        relative = source.replace(os.sep, "/")
-    if not relative.startswith((".", "/")) and ":" not in relative:
-        relative = f"./{relative}"
-    layer.subLayerPaths.append(relative)
+    """Sublayer the shot by a path relative to `out`, and repeat what USD reads of a stage's first layer only."""
     root = layer.pseudoRoot
+    _repeat_metadata(stage.GetRootLayer(), layer, out)
+    layer.subLayerPaths.append(_relative(shot, out.parent))
     root.SetInfo("metersPerUnit", border.metres_per_unit)
     root.SetInfo("upAxis", border.up_axis)
     layer.timeCodesPerSecond = border.rate
@@ -126,6 +120,49 @@ def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path,
     if not default:
         default = next(iter(stage.GetPseudoRoot().GetChildren()))
     layer.defaultPrim = default.GetName()
+
+
+LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
+"""Metadata that is said of one layer, or that USD reads of sublayers, too."""
+
+
+def _repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path) -> None:
+    """Units, rates, range, default prim, render settings, and the variables without which references find nothing."""
+    for name in source.pseudoRoot.ListInfoKeys():
+        if name not in LAYERS_OWN:
+            layer.pseudoRoot.SetInfo(name, source.pseudoRoot.GetInfo(name))
+
+    def placed(asset: str) -> str:
+        return _relative(source.ComputeAbsolutePath(asset), out.parent) if asset.startswith(("./", "../")) else asset
+
+    UsdUtils.ModifyAssetPaths(layer, placed)
+
+
+def _relative(file, folder: Path) -> str:
+    """Path of a file relative to a folder, by the names it was given.
+
+    What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
+    folder's own path has a link, `..` must lead to the file both from there and from behind the link.
+    """
+    behind = os.path.realpath(folder)
+    try:
+        ways = [
+            os.path.relpath(os.path.abspath(file), os.path.abspath(folder)),
+            os.path.relpath(os.path.realpath(file), behind),
+        ]
+    except ValueError:  # another drive
+        return os.path.realpath(file).replace(os.sep, "/")
+    leading = (way for way in ways if all(_same(f"{start}/{way}", file) for start in (os.path.abspath(folder), behind)))
+    relative = next(leading, ways[0]).replace(os.sep, "/")
+    return relative if relative.startswith("../") else f"./{relative}"
+
+
+def _same(path: str, file) -> bool:
+    """Whether a path, read as USD does, without a look at links before `..`, is the file."""
+    try:
+        return os.path.samefile(os.path.normpath(path), file)
+    except OSError:
+        return False
 
 
 def to_text(crate: Path, text: Path, out: Path) -> None:

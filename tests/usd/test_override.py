@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The top of an override layer: opened instead of the shot, it must show all of it."""
+
+import os
+
+import pytest
+from pxr import Sdf, Usd
+
+from usd.border import Border
+from usd.override import write_header
+
+SHOT = """#usda 1.0
+(
+    colorConfiguration = @./show.ocio@
+    customLayerData = { asset plate = @../plates/a.exr@ }
+    defaultPrim = "Hero"
+    expressionVariables = { string CHARACTER = "hero" }
+    metersPerUnit = 0.01
+    owner = "layout"
+    renderSettingsPrimPath = "/Render/main"
+    upAxis = "Z"
+)
+def "Hero" (references = @`"./${CHARACTER}.usda"`@)
+{
+}
+"""
+
+
+def _header(shot, out):
+    stage = Usd.Stage.Open(str(shot))
+    layer = Sdf.Layer.CreateNew(str(out))
+    write_header(layer, stage, Border.of(stage), shot, out, [1.0])
+    layer.Save()
+    return layer
+
+
+@pytest.fixture
+def shot(tmp_path):
+    """A shot that says at its top what its references need."""
+    folder = tmp_path / "show" / "shots"
+    folder.mkdir(parents=True)
+    (folder / "hero.usda").write_text('#usda 1.0\n(defaultPrim = "Hero")\ndef Xform "Hero" {\n  def "Hair" {\n}\n}\n')
+    (folder / "shot.usda").write_text(SHOT)
+    return folder / "shot.usda"
+
+
+def test_what_usd_reads_of_the_first_layer_only_is_repeated(shot, tmp_path):
+    (tmp_path / "cache").mkdir()
+    layer = _header(shot, tmp_path / "cache" / "hair.usda")
+    stage = Usd.Stage.Open(layer)
+    assert stage.GetPrimAtPath("/Hero/Hair") and not stage.GetCompositionErrors()
+    assert stage.GetMetadata("renderSettingsPrimPath") == "/Render/main"
+    assert layer.colorConfiguration.path == "../show/shots/show.ocio"
+    assert layer.customLayerData["plate"].path == "../show/plates/a.exr"
+    assert not layer.owner and list(layer.subLayerPaths) == ["../show/shots/shot.usda"]
+
+
+def test_a_shot_behind_a_link_is_named_as_it_was_given(shot, tmp_path):
+    # A store of files by content: names without meaning and ending, and nothing beside them.
+    (tmp_path / "store").mkdir()
+    os.rename(shot, tmp_path / "store" / "5f3a")
+    shot.symlink_to(tmp_path / "store" / "5f3a")
+    stage = Usd.Stage.Open(_header(shot, shot.parent / "hair.usda"))
+    assert stage.GetPrimAtPath("/Hero/Hair")
+
+
+def test_an_output_folder_behind_a_link_leads_to_the_shot_from_the_name_it_was_given(shot, tmp_path):
+    real = tmp_path / "disk" / "deep" / "cache"
+    real.mkdir(parents=True)
+    (tmp_path / "cache").symlink_to(real)
+    _header(shot, tmp_path / "cache" / "hair.usda")
+    assert Usd.Stage.Open(str(tmp_path / "cache" / "hair.usda")).GetPrimAtPath("/Hero/Hair")
