@@ -112,13 +112,13 @@ class Inputs:
 
 def shipped(model):
     """Strands of the shipped groom, and the boundary vector of the middle of the shipped shot."""
-    from neuralocks_core.strands import strand_set
+    from neuralocks_core.strands import strands_on
     from usd.demo import shipped_shot
     from usd.stage import read_shot
 
     item = read_shot(shipped_shot()).grooms[0]
     character, clip = item.attachment.character, item.attachment.rig.clip
-    strands = strand_set(item.groom, character.canonical_to_bind[:3, 3], character.head_centre, character.facing)
+    strands = strands_on(character, item.groom)
     return strands, model.sampler(character, clip).vectors([(clip.start + clip.end) / 2])[0]
 
 

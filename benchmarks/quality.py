@@ -96,7 +96,7 @@ class Bench:
 def on_head(path: str, character, scalp: np.ndarray):
     """A hair file's strands on a character's head, Y up and facing Z; `scalp` (n, 3) are canonical roots of grown hair."""
     from neuralocks_core.formats.reading import read
-    from neuralocks_core.strands import strand_set
+    from neuralocks_core.strands import strands_on
 
     groom = read(path)
     (centre, radius), (middle, wanted) = (
@@ -106,7 +106,7 @@ def on_head(path: str, character, scalp: np.ndarray):
     points = (groom.points - centre) * (wanted / radius) + middle
     to_bind = character.canonical_to_bind
     groom = replace(groom, points=(points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32))
-    return strand_set(groom, to_bind[:3, 3], character.head_centre, character.facing)
+    return strands_on(character, groom)
 
 
 def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,18 +13,21 @@ from .centreline import centre_lines
 from .groom import Groom
 from .locks import lock_of_roots
 
+if TYPE_CHECKING:
+    from .character import Character
+
 K = 24
 """Vertices of a network strand, root first (72 network outputs are 24 x 3)."""
 
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""
 
-__all__ = ["K", "StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set"]
+__all__ = ["K", "StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "strands_on"]
 
 
 @dataclass(frozen=True, eq=False)
 class StrandSet:
-    """What inference and training read of a groom; see `strand_set`."""
+    """What inference and training read of a groom; see `strands_on`."""
 
     rest: np.ndarray
     """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; of curls finer than that,
@@ -66,6 +70,18 @@ class StrandSet:
             self.head_centre,
             self.facing,
         )
+
+
+def strands_on(character: Character, groom: Groom, *, locks: int | None = None) -> StrandSet:
+    """The groom as the network sees it on a character's head: `strand_set` with where that lies.
+
+    Args:
+        character: whose head carries the hair.
+        groom: in bind-world metres.
+        locks: number of locks; chosen from the distribution of the roots if left out.
+    """
+    origin = character.canonical_to_bind[:3, 3]
+    return strand_set(groom, origin, character.head_centre, character.facing, locks=locks)
 
 
 def strand_set(

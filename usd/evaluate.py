@@ -13,7 +13,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
-from neuralocks_core.strands import K, StrandSet, strand_set
+from neuralocks_core.strands import K, StrandSet, strands_on
 
 from .baked import Baked, read_baked
 from .damage import names_damage
@@ -79,13 +79,12 @@ class _Subject:
     def __init__(self, baked: Baked, item: StageGroom, say):
         self.baked, self.item, self.say = baked, item, say
         self.character, groom = item.attachment.character, item.groom
-        canonical = self.character.canonical_to_bind
-        every = strand_set(groom, canonical[:3, 3], self.character.head_centre, self.character.facing)
+        every = strands_on(self.character, groom)
         self.chosen = comparison.whole_locks(every, STRANDS)
         self.strands: StrandSet = every.subset(self.chosen)
         self.valid = int(every.valid.sum())
         self._within(groom)
-        rest = (groom.points.astype(float) - canonical[:3, 3]) @ self.character.facing.T
+        rest = self.character.canonical(groom.points.astype(float))
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
         self.moved = np.zeros((total, count, K, 3), np.float32)

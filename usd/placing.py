@@ -11,7 +11,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.locks import lock_of_roots
 from neuralocks_core.rotation import sizes
-from neuralocks_core.strands import StrandSet, strand_set
+from neuralocks_core.strands import StrandSet, strands_on
 
 from .curves import rest_points
 from .stage import StageGroom
@@ -131,11 +131,10 @@ def _parts(groom: Groom) -> list[Groom]:
 
 
 def _strands(parts: list[Groom], character: Character) -> StrandSet:
-    """What `strand_set` gives for the whole groom, made part by part."""
-    place = character.canonical_to_bind[:3, 3], character.head_centre, character.facing
+    """What `strands_on` gives for the whole groom, made part by part."""
     if len(parts) == 1:
-        return strand_set(parts[0], *place)
-    sets = [strand_set(part, *place, locks=1) for part in parts]
+        return strands_on(character, parts[0])
+    sets = [strands_on(character, part, locks=1) for part in parts]
     fields = ("rest", "valid", "uv", "root_frame", "length")
     joined = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
     return replace(sets[0], lock=lock_of_roots(joined["rest"][:, 0]), **joined)

@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
-from neuralocks_core.strands import StrandSet, strand_set
+from neuralocks_core.strands import StrandSet, strands_on
 from neuralocks_core.training.rollouts import TrainingScene
 
 from .attach import attach
@@ -82,7 +82,7 @@ def _library(character: Character, seed: int) -> list[StrandSet]:
 
 
 def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
-    strands = strand_set(groom, character.canonical_to_bind[:3, 3], character.head_centre, character.facing)
+    strands = strands_on(character, groom)
     if len(strands.rest) <= MOST_STRANDS:
         return strands
     # Whole locks, so that neighbours stay neighbours.

@@ -10,7 +10,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.resolve import Resolver
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strands import strand_set
+from neuralocks_core.strands import strands_on
 
 from .history import SampledBoundary
 
@@ -36,8 +36,7 @@ class LiveHair:
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model
-        origin = character.skeleton.bind[character.head, :3, 3]
-        self._strands = strand_set(groom, origin, character.head_centre, character.facing)
+        self._strands = strands_on(character, groom)
         say(0.4)
         self._carrier = Carrier(groom, self._strands)
         say(0.6)

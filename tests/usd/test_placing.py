@@ -4,7 +4,7 @@
 import numpy as np
 
 import usd.placing as placing
-from neuralocks_core.strands import strand_set
+from neuralocks_core.strands import strands_on
 from usd.stage import read_shot
 
 from .shots import Recipe, write_shot
@@ -13,8 +13,7 @@ from .shots import Recipe, write_shot
 def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch):
     item = read_shot(write_shot(tmp_path, Recipe(strands=300, vertices=10, bound="mesh"))).grooms[0]
     character = item.attachment.character
-    place = character.canonical_to_bind[:3, 3], character.head_centre, character.facing
-    whole = strand_set(item.groom, *place)
+    whole = strands_on(character, item.groom)
     # As hair moves: each strand its own way, more towards the tip.
     along = np.linspace(0, 1, whole.rest.shape[1], dtype=np.float32)[:, None]
     moved = np.random.default_rng(0).normal(0, 0.02, (len(whole.rest), 1, 3)).astype(np.float32) * along
