@@ -39,6 +39,22 @@ class Skeleton:
         if self.bind.shape != (count, 4, 4) or not np.isfinite(self.bind).all():
             raise NeuralocksError(f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose")
 
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """Joints that hang directly from each joint."""
+        result = [[] for _ in self.names]
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                result[parent].append(joint)
+        return result
+
+    def below(self, joint: int) -> np.ndarray:
+        """Which joints (J,) bool are this one or hang below it."""
+        result = [False] * len(self.names)
+        for other, parent in enumerate(self.parents.tolist()):
+            result[other] = other == joint or (parent >= 0 and result[parent])
+        return np.array(result)
+
 
 def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
     """Signed sizes (n,) at which some samples of an animation show what a joint carries, 1 as in the bind pose.
@@ -170,10 +186,7 @@ class Character:
         """Which body vertices (V,) move mainly with the head or what hangs below it."""
         if self.body is None:
             return None
-        below = np.zeros(len(self.skeleton.names), bool)
-        below[self.head] = True
-        for joint, parent in enumerate(self.skeleton.parents):
-            below[joint] |= parent >= 0 and below[parent]
+        below = self.skeleton.below(self.head)
         return np.sum(self.body.joint_weights * below[self.body.joint_indices], axis=1) > 0.5
 
     @cached_property

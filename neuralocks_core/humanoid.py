@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.joint_words import sides_and_keys
+from neuralocks_core.joint_names import leaf, sides_and_keys
 
 PARTS = {
     "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder"),
@@ -101,10 +101,10 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
         put(name, find_joint(names, wanted), "given by hand")
 
     parts = {word for words in PARTS.values() for word in words}
-    sides, keys = zip(*sides_and_keys([_leaf(name) for name in names], parts), strict=True)
+    sides, keys = zip(*sides_and_keys([leaf(name) for name in names], parts), strict=True)
     for side in ("left", "right"):
         for part, joint in _limbs(side, sides, keys, parents).items():
-            put(f"{side}_{part}", joint, f"by name '{_leaf(names[joint])}'")
+            put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
     put("head", *_find_head(names, sides, keys, parents, positions))
     if "head" not in joints:
         raise NeuralocksError("skeleton: no joint is named like a head; name it with --head JOINT")
@@ -120,20 +120,16 @@ def find_joint(names, wanted: str) -> int:
         NeuralocksError: there is none, or several.
     """
     hits = [i for i, name in enumerate(names) if name == wanted] or [
-        i for i, name in enumerate(names) if _leaf(name) == wanted
+        i for i, name in enumerate(names) if leaf(name) == wanted
     ]
     if len(hits) != 1:
         fact = (
             "several joints have that name; give its full path"
             if hits
-            else f"no such joint; it has {', '.join(map(_leaf, names[:12]))} ..."
+            else f"no such joint; it has {', '.join(map(leaf, names[:12]))} ..."
         )
         raise NeuralocksError(f"joint '{wanted}': {fact}")
     return hits[0]
-
-
-def _leaf(name: str) -> str:
-    return name.rsplit("/", 1)[-1]
 
 
 def _depth(joint: int, parents) -> int:
@@ -195,19 +191,19 @@ def _find_head(names, sides, keys, parents, positions):
     ]
     if hits:
         best = min(hits, key=score)
-        return best, f"by name '{_leaf(names[best])}'"
+        return best, f"by name '{leaf(names[best])}'"
     necks = [i for i in range(len(keys)) if "neck" in keys[i] and not sides[i]]
     if necks:
         neck = max(necks, key=lambda i: _depth(i, parents))
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
-            return min(children, key=beside_head), f"child of the neck '{_leaf(names[neck])}'"
+            return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
     # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the
     # head.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
         best = max(spine, key=lambda i: _depth(i, parents))
-        return best, f"last joint of the spine '{_leaf(names[best])}'"
+        return best, f"last joint of the spine '{leaf(names[best])}'"
     return None, ""
 
 
@@ -231,7 +227,7 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
         between = between[: between.index(joints["upper_chest"])]
     named = [joint for joint in between if "neck" in keys[joint]]
     neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
-    put("neck", neck, f"between head and chest, '{_leaf(names[neck])}'" if neck is not None else "")
+    put("neck", neck, f"between head and chest, '{leaf(names[neck])}'" if neck is not None else "")
     if "upper_chest" in joints:
         below = head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
         if "hips" in joints and joints["hips"] in below:

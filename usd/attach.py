@@ -176,13 +176,11 @@ def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarr
 
 def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
     """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
-    names, parents = rig.source.names, rig.source.parents
+    names = rig.source.names
     best = int(shares.argmax())
     head = rig.character.humanoid.get("head")
     if head is not None and best != head:
-        below = np.zeros(len(names), bool)
-        for joint in range(len(names)):
-            below[joint] = joint == head or (parents[joint] >= 0 and below[parents[joint]])
+        below = rig.character.skeleton.below(head)
         single = shares[best] > (0.95 if exact else 0.8)
         if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
             return head, f"joint '{names[head]}'"

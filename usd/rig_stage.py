@@ -9,8 +9,8 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import SkinnedMesh
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from .border import Border, open_stage, transformed
 from .damage import names_damage

@@ -2,9 +2,10 @@
 """Rigged mesh hair: joint chains below the head, and the tiny network that turns them (paper section 4.4)."""
 
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import SkinnedMesh, find_chains, split_meshes
+from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 __all__ = [
     "HairChains",
@@ -15,5 +16,4 @@ __all__ = [
     "assemble_rig",
     "find_chains",
     "rig_spec",
-    "split_meshes",
 ]

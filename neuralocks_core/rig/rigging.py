@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Body, Character, Skeleton
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import SkinnedMesh, find_chains, split_meshes
+from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
+from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,10 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
     chains = find_chains(character, meshes, patterns)
     skeleton = character.skeleton
     count = len(skeleton.names)
-    moving = np.zeros(count, bool)
-    moving[chains.joints] = True
-    for joint in range(count):
-        moving[joint] |= skeleton.parents[joint] >= 0 and moving[skeleton.parents[joint]]
+    moving = np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
     body_triangles, points, weights, triangles = [], [], [], []
     start, taken = 0, 0
-    for mesh, (body, moved) in zip(meshes, split_meshes(meshes, skeleton.parents, character.head, moving)):
+    for mesh, (body, moved) in zip(meshes, _parted(meshes, skeleton, character.head, moving)):
         body_triangles.append(body + start)
         start += len(mesh.points)
         if not moved.any():
@@ -64,3 +62,23 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
         np.concatenate(weights) if weights else np.zeros((0, len(chains) + 1)),
         np.concatenate(triangles) if triangles else np.zeros((0, 3), int),
     )
+
+
+def _parted(meshes: list[SkinnedMesh], skeleton: Skeleton, head: int, moving: np.ndarray):
+    """Which triangles are body and which vertices are hair.
+
+    A mesh that moving joints drive and nothing outside the head's subtree does is hair as a whole, with the cap
+    that is tied to the head; in one that is both, triangles that a moving joint touches are hair.
+
+    Returns:
+        for each mesh (triangles of the body (F', 3), mask of hair vertices that move (V,)).
+    """
+    below = skeleton.below(head)
+    result = []
+    for mesh in meshes:
+        moved = mesh.weight_on(moving) > LEAST_WEIGHT
+        if moved.any() and not (mesh.driven_by(len(below)) & ~below).any() and moved.mean() > 0.2:
+            result.append((np.zeros((0, 3), int), moved))
+        else:
+            result.append((mesh.triangles[~moved[mesh.triangles].any(axis=1)], moved))
+    return result

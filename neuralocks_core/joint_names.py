@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words of joint names: which side a joint is on, and what is left once namespaces and rig prefixes are gone."""
+"""What joint names say: which side a joint is on, and which part it is once namespaces and rig prefixes are gone."""
 
 import re
 from collections import Counter
@@ -50,6 +50,11 @@ SHARED = 0.9
 """Share of the joints that begin with a namespace; exporters put a root of their own above them."""
 
 
+def leaf(path: str) -> str:
+    """A joint's own name: the last part of its path."""
+    return path.rsplit("/", 1)[-1]
+
+
 def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
     """('left' | 'right' | '', words in one, in lower case, without numbers, sides and prefixes) of each joint.
 
@@ -60,13 +65,13 @@ def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
     return [_side_and_key(words) for words in _without_namespace([_words(name) for name in names], parts)]
 
 
-def _words(leaf: str) -> list[str]:
+def _words(name: str) -> list[str]:
     """Words of a joint's own name in lower case, without numbers."""
-    leaf = leaf.rsplit(":", 1)[-1]
-    if not leaf.isascii():
+    name = name.rsplit(":", 1)[-1]
+    if not name.isascii():
         for word, part in _JAPANESE.items():
-            leaf = leaf.replace(word, part)
-    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", leaf)
+            name = name.replace(word, part)
+    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", name)
     return [word.lower() for word in words if not word.isdigit()]
 
 

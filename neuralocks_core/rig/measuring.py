@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair joints measured: which of them move, where their bones end, and how they lie in the bind pose."""
+
+import numpy as np
+
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.joint_names import leaf
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+from neuralocks_core.rotation import rotation_part
+
+NO_BONE = 1e-5
+"""Shorter bones [m] have no direction."""
+
+
+def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedMesh] | None) -> HairChains:
+    """The chains that begin at these joints.
+
+    Args:
+        character: whose skeleton they are in.
+        tops: first joints of the subtrees, ascending.
+        meshes: the skinned meshes, which tell where free ends lie.
+
+    Raises:
+        NeuralocksError: no joint moves, a bone has no length, two joints share a name, or one is mirrored or unevenly
+            scaled.
+    """
+    skeleton = character.skeleton
+    places = character.canonical(skeleton.bind[:, :3, 3])
+    rows, free = _moving(character, tops, meshes, places)
+    if not rows:
+        raise NeuralocksError(
+            f"skeleton: hair joint '{leaf(skeleton.names[tops[0]])}' drives no vertices and has no child; "
+            "skin the hair to its joints or choose others with --chains"
+        )
+    bone_joint, bone_end, bones = _bones(skeleton, rows, free, places)
+    joints = np.array(list(rows), int)
+    names = [leaf(skeleton.names[j]) for j in joints]
+    double = next((n for n in names if names.count(n) > 1), None)
+    if double:
+        raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give them names of their own")
+    parents = np.array([rows.get(int(skeleton.parents[j]), -1) if j not in tops else -1 for j in joints], int)
+    chain = np.zeros(len(joints), int)
+    for row, parent in enumerate(parents):
+        chain[row] = chain[parent] if parent >= 0 else (parents[:row] < 0).sum()
+    _check_scale(skeleton, joints)
+    axes = character.bind_to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
+    return HairChains(names, joints, parents, chain, places[joints], axes, bone_joint, bone_end, bones)
+
+
+def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict]:
+    """Joints that move -> their row among the hair joints, and -> the free end of their bone (3,) [m], if they have one."""
+    skeleton = character.skeleton
+    order = np.flatnonzero(np.any([skeleton.below(top) for top in tops], axis=0)).tolist()
+    carries = _carrying(skeleton, order, meshes)
+    rows, free = {}, {}
+    for joint in order:
+        last = not skeleton.children[joint]
+        end = _free_end(character, joint, joint in tops, meshes, places) if last else None
+        if not last and joint in carries or end is not None:
+            rows[joint] = len(rows)
+            free[joint] = end
+    return rows, free
+
+
+def _bones(skeleton: Skeleton, rows: dict, free: dict, places: np.ndarray) -> tuple[list, list, np.ndarray]:
+    """Each bone's joint and the one at its end (-1: none that moves), as rows, and its vector (M, 3) [m]."""
+    bone_joint, bone_end, bones = [], [], []
+    for joint, row in rows.items():
+        children = skeleton.children[joint]
+        for end, place in [(rows.get(child, -1), places[child]) for child in children] or [(-1, free[joint])]:
+            if np.linalg.norm(place - places[joint]) < NO_BONE:
+                child = next((leaf(skeleton.names[c]) for c in children), "its end")
+                raise NeuralocksError(
+                    f"skeleton: hair bone '{leaf(skeleton.names[joint])}' has no length ('{child}' lies at the same place); "
+                    "move or remove one of the two, or leave the chain out with --chains"
+                )
+            bone_joint.append(row)
+            bone_end.append(end)
+            bones.append(place - places[joint])
+    return bone_joint, bone_end, np.array(bones)
+
+
+def _carrying(skeleton: Skeleton, order: list[int], meshes: list[SkinnedMesh] | None) -> set[int]:
+    """Those of these joints that drive skin or have skin further down: end joints may have ends of their own, which
+    exporters add. All of them where none drives any, as in a rig that nobody has skinned yet.
+    """
+    parents = skeleton.parents
+    used = np.zeros(len(parents), bool)
+    for mesh in meshes or ():
+        used |= mesh.driven_by(len(parents))
+    carries = set()
+    for joint in order:
+        up = joint if used[joint] else -1
+        while up >= 0 and up not in carries:
+            carries.add(up)
+            up = int(parents[up])
+    return carries if carries else set(order)
+
+
+def _free_end(character: Character, joint: int, is_top: bool, meshes, places: np.ndarray) -> np.ndarray | None:
+    """Where the bone of a last joint ends (3,) [m]: as far as its skin reaches. None if it drives nothing, that is, if
+    it is an end marker.
+
+    Args:
+        is_top: a chain of this joint alone, which points where its skin does; others go on as the bone before.
+        places: of all joints in canonical space, (J, 3) [m].
+    """
+    parent = int(character.skeleton.parents[joint])
+    points = [
+        mesh.points[np.sum(mesh.joint_weights * (mesh.joint_indices == joint), axis=1) > 0.3] for mesh in meshes or ()
+    ]
+    points = np.concatenate(points) if points else np.zeros((0, 3))
+    if not len(points):
+        return None
+    reach = character.canonical(points) - places[joint]
+    along = reach.mean(axis=0) if is_top else places[joint] - places[parent]
+    size = np.linalg.norm(along)
+    if size < NO_BONE:
+        return None
+    along = along / size
+    length = float((reach @ along).max())
+    # Skin that hardly passes the joint belongs to the bone before it: the joint is that bone's end.
+    if length < (0.01 if is_top else 0.2 * size):
+        return None
+    return places[joint] + length * along
+
+
+def _check_scale(skeleton: Skeleton, joints: np.ndarray) -> None:
+    for joint in joints:
+        linear = skeleton.bind[joint, :3, :3]
+        name, scale = leaf(skeleton.names[joint]), np.linalg.norm(linear, axis=0)
+        if np.linalg.det(linear) < 0:
+            raise NeuralocksError(
+                f"hair joint '{name}': mirrored in bind pose (negative scale); apply the scale in the rig"
+            )
+        if scale.min() < 1e-9 or scale.max() > 1.01 * scale.min():
+            raise NeuralocksError(
+                f"hair joint '{name}': unevenly scaled in bind pose {np.round(scale, 3)}; apply the scale in the rig"
+            )
