@@ -6,6 +6,7 @@ import json
 import math
 import os
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,9 @@ LABELS = {
     "tip_correlation": ("tip curve correlation", "", ""),
 }
 """Name of a measure -> what a person reads, unit, remark."""
+
+PLOTS = (".png", ".svg", ".pdf")
+"""Endings of files that `Card.plot` writes."""
 
 
 @dataclass(frozen=True)
@@ -79,15 +83,16 @@ class Card:
     def plot(self, path: str | os.PathLike) -> Path:
         """Draw the tip curves, one row a groom: sideways, up and forward over time.
 
+        Args:
+            path: the file to write; its ending, one of PLOTS, chooses the kind.
+
         Raises:
-            NeuralocksError: matplotlib is missing or the file cannot be written.
+            NeuralocksError: as `check_plot` does, or the file cannot be written.
         """
-        path = Path(path)
-        try:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-            from matplotlib.figure import Figure
-        except ImportError:
-            raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[preview]'") from None
+        path = check_plot(path)
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
         rows = max(len(self.curves), 1)
         figure = Figure(figsize=(12, 2.9 * rows), layout="constrained")
         FigureCanvasAgg(figure)
@@ -108,7 +113,7 @@ class Card:
                 panel.set_ylabel("cm against the head")
             row[0].legend(fontsize=8)
         with atomic_write(path) as part:
-            figure.savefig(part, dpi=110, format=path.suffix.lstrip(".") or "png")
+            figure.savefig(part, dpi=110, format=path.suffix.lower()[1:])
         return path
 
     def _measures(self, name, values):
@@ -136,6 +141,20 @@ class Card:
                 cells = [_number(values[key]) if key in values else "" for values in rows.values()]
                 table.add_row(f"{label} {unit}".strip(), *cells, remark)
         return table
+
+
+def check_plot(path: str | os.PathLike) -> Path:
+    """The path, if `Card.plot` can draw such a file: asked before a long measurement, not after it.
+
+    Raises:
+        NeuralocksError: its ending is unknown, or matplotlib is missing.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in PLOTS:
+        raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(PLOTS)}")
+    if find_spec("matplotlib") is None:
+        raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[preview]'")
+    return path
 
 
 def _number(value) -> str:

@@ -75,18 +75,27 @@ def inspect_command(
 def evaluate_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     reference: Annotated[bool, typer.Option(help="Compare with the reference solver (minutes).")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Also draw how the tips move, as curves (.png, .svg, .pdf).")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Print a bake's report card."""
+    from neuralocks_core.report import check_plot
+
     from .evaluate import evaluate
     from .progress import progress_bar
 
+    if plot is not None:
+        check_plot(plot)
     with progress_bar("evaluating") as progress:
         card = evaluate(baked, reference=reference, progress=progress)
     if as_json:
         typer.echo(card.to_json())
     else:
         typer.echo(card.text())
+    if plot is not None:
+        card.plot(plot)
 
 
 @command("preview")

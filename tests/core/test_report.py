@@ -39,3 +39,5 @@ def test_plot_is_a_picture_and_never_half_written(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG") and [path] == list(tmp_path.iterdir())
     with pytest.raises(NeuralocksError, match="cannot be written"):
         card().plot(path / "curves.png")
+    with pytest.raises(NeuralocksError, match="end it in .png"):
+        card().plot(tmp_path / "curves.docx")

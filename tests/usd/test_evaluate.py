@@ -8,6 +8,7 @@ import pytest
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
 from usd.baked import read_baked
+from usd.cli import main
 from usd.demo import demo, shipped_shot
 from usd.evaluate import evaluate
 
@@ -44,6 +45,14 @@ def test_resolving_takes_hair_out_of_the_body(tmp_path, model):
         share[resolve] = next(iter(evaluate(out).grooms.values()))["penetration_percent"]
     assert share[False] > 1
     assert share[True] < 0.1 * share[False]
+
+
+def test_the_command_draws_the_curves_of_the_card(rigid, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the extra 'preview' is not installed")
+    with pytest.raises(SystemExit) as ended:
+        main(["evaluate", str(rigid), "--json", "--plot", str(tmp_path / "tips.png")])
+    assert ended.value.code == 0 and json.loads(capsys.readouterr().out)["grooms"]
+    assert (tmp_path / "tips.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_stage_without_samples_is_no_bake():
