@@ -213,8 +213,12 @@ def graph_session(file: model_file.ModelFile, name: str):
     Raises:
         NeuralocksError: it is no graph that onnxruntime can load.
     """
+    # Its official builds report sessions and the models' names to their maker, and keep an identifier in the home folder,
+    # unless this is set before the first import; where that came too late, and on Windows, the call silences what follows.
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
     import onnxruntime
 
+    onnxruntime.disable_telemetry_events()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
     options.log_severity_level = 3

@@ -2,6 +2,7 @@
 """The one-file model and its inference: exact splitting, no dependence on chunks, clear refusals."""
 
 import json
+import os
 import subprocess
 import sys
 import zipfile
@@ -189,3 +190,18 @@ def test_the_runtime_imports_without_torch_usd_or_blender():
         "import neuralocks_core.runtime, neuralocks_core.groom, neuralocks_core.hairstyles, neuralocks_core.formats"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_nothing_is_reported_and_nothing_kept_in_the_home_folder(tmp_path):
+    """Left to itself, onnxruntime tells its maker what was run, from a database and an identifier that it puts there."""
+    code = (
+        "from neuralocks_core import model\n"
+        "from neuralocks_core.runtime import graph_session\n"
+        "graph_session(model.read(model.shipped('strands')), 'tail.onnx')"
+    )
+    silent = ("CI", "GITHUB_ACTIONS", "ORT_DISABLE_TELEMETRY", "ORT_RUNNING_UNIT_TESTS", "XDG_CACHE_HOME")
+    environment = {name: value for name, value in os.environ.items() if name not in silent}
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, env=environment | {"HOME": str(tmp_path)}
+    )
+    assert not done.stderr and list(tmp_path.iterdir()) == []
