@@ -23,6 +23,10 @@ from .surface import SkinnedMesh, bound_skeleton, geom_bind, joint_influences, r
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
+REACH = 1.0
+"""Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
+MOST = 0.75
+"""Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Attachment:
         to_bind: the prim's own space to bind world [m], (4, 4).
         how: the carrying joint and how it was found, in words.
         skinned: whether UsdSkel would deform the prim itself.
+        far: distance of the roots from the joint [m] where neither a binding nor a skin below says that it
+            carries them and they lie out of its reach; else 0.
     """
 
     rig: StageRig
@@ -42,6 +48,7 @@ class Attachment:
     to_bind: np.ndarray
     how: str
     skinned: bool
+    far: float = 0.0
 
 
 def attach(
@@ -65,12 +72,14 @@ def attach(
     if rig is not None:
         points = rest_points(prim)
         indices, weights = joint_influences(prim, len(points), rig.source)
-        joint, why = _carrier(rig, _shares(rig, indices, weights), exact=True)
+        shares = _shares(rig, indices, weights)
+        joint, why = _carrier(rig, shares, exact=True)
+        notes += _spread(rig, path, joint, shares)
         found = Attachment(
             rig, _with_head(rig, joint), rig.to_bind @ geom_bind(prim), f"{why} (its own skel binding)", True
         )
     else:
-        found = _on_mesh(prim, rigs, placement) or _by_name(prim, rigs, placement, head)
+        found = _on_mesh(prim, rigs, placement, notes) or _by_name(prim, rigs, placement, head)
     name = rig_joint(found)
     if head and name.split("/")[-1] != head.split("/")[-1]:
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
@@ -82,7 +91,7 @@ def rig_joint(found: Attachment) -> str:
     return found.rig.source.names[found.character.head]
 
 
-def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement) -> Attachment | None:
+def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, notes: list[str]) -> Attachment | None:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     roots = _some_roots(prim)
     best = None
@@ -97,7 +106,9 @@ def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement) -> Atta
     if best is None or best[0] > NEAR:
         return None
     _, rig, mesh, to_bind, nearest = best
-    joint, why = _carrier(rig, _shares(rig, mesh.indices[nearest], mesh.weights[nearest]))
+    shares = _shares(rig, mesh.indices[nearest], mesh.weights[nearest])
+    joint, why = _carrier(rig, shares)
+    notes += _spread(rig, str(prim.GetPath()), joint, shares)
     return Attachment(
         rig, _with_head(rig, joint), to_bind, f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)", False
     )
@@ -110,32 +121,32 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         raise NeuralocksError(
             f"{path}: no joint of {rigs[0].path} is named like a head; name the joint that carries it with --head JOINT"
         )
-    if len(able) > 1:
-        # The one whose head is nearest to the roots, if that is clear.
-        roots = _some_roots(prim)
-        far = [
-            min(
-                np.median(np.linalg.norm(transformed(roots, w) - r.character.canonical_to_bind[:3, 3], axis=1))
-                for w in _ways(r, None, placement)
-            )
-            for r in able
-        ]
-        order = np.argsort(far)
-        if far[order[0]] > 0.5 * far[order[1]]:
-            names = ", ".join(r.path for r in able[:5])
-            raise NeuralocksError(
-                f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
-            )
-        able = [able[order[0]]]
-    rig = able[0]
-    target = rig.character.canonical_to_bind[:3, 3]
     roots = _some_roots(prim)
-    ways = _ways(rig, None, placement)
-    to_bind = min(
-        ways, key=lambda w: round(float(np.median(np.linalg.norm(transformed(roots, w) - target, axis=1))), 3)
-    )
+
+    def away(rig: StageRig, to_bind: np.ndarray) -> float:
+        head_at = rig.character.canonical_to_bind[:3, 3]
+        return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
+
+    far = [min(away(rig, way) for way in _ways(rig, None, placement)) for rig in able]
+    order = np.argsort(far)
+    rig, nearest = able[order[0]], far[order[0]]
+    out_of_reach = nearest > max(REACH, _trunk(rig))
+    # The one whose head is nearest to the roots, if that is clear.
+    if len(able) > 1 and nearest > 0.5 * far[order[1]] and not out_of_reach:
+        names = ", ".join(r.path for r in able[:5])
+        raise NeuralocksError(
+            f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
+        )
+    to_bind = min(_ways(rig, None, placement), key=lambda way: round(away(rig, way), 3))
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
-    return Attachment(rig, rig.character, to_bind, f"joint '{rig.source.names[rig.character.head]}' ({why})", False)
+    how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
+    return Attachment(rig, rig.character, to_bind, how, False, nearest if out_of_reach else 0.0)
+
+
+def _trunk(rig: StageRig) -> float:
+    """Distance of the carrying joint from the hips [m]."""
+    bind = rig.character.skeleton.bind[:, :3, 3]
+    return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
 
 
 def _ways(rig: StageRig, mesh: SkinnedMesh | None, placement: Placement) -> list[np.ndarray]:
@@ -172,6 +183,32 @@ def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarr
     """Share (J,) of each joint in these influences."""
     shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
     return shares / max(shares.sum(), 1e-12)
+
+
+def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
+    """What to say of hair that one joint cannot carry: fur all over a body."""
+    names = [name.split("/")[-1] for name in rig.source.names]
+    # What hangs below a head is its face; what hangs below a spine is everything.
+    own = _below(rig, joint) if joint == rig.character.humanoid.get("head") else np.arange(len(names)) == joint
+    share = shares[own].sum()
+    if share >= MOST:
+        return []
+    others = [
+        names[other] for other in np.argsort(np.where(own, 0, -shares), kind="stable")[:3] if shares[other] > 0.02
+    ]
+    return [
+        f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
+        f"({', '.join(others)}) will leave the skin: split the groom by joint"
+    ]
+
+
+def _below(rig: StageRig, joint: int) -> np.ndarray:
+    """Which joints (J,) are this one or hang below it."""
+    parents = rig.source.parents
+    below = np.zeros(len(parents), bool)
+    for other in range(len(parents)):
+        below[other] = other == joint or (parents[other] >= 0 and below[parents[other]])
+    return below
 
 
 def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:

@@ -15,7 +15,7 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
-from .notes import composition_notes, groom_notes, head_width, rig_notes
+from .notes import composition_notes, groom_notes, head_width, left_out, rig_notes, too_far
 from .placement import Placement
 from .rig_source import read_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
@@ -61,12 +61,16 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
-    rigs = []
+    rigs, errors = [], []
     for prim in find_skeletons(stage):
         try:
             rigs.append(read_rig(stage, prim, border, head, all_shapes=True, joints=joints))
         except NeuralocksError as error:
-            stops.append(str(error))
+            errors.append(str(error))
+    if rigs:
+        spoils += [left_out(error) for error in errors]
+    else:
+        stops += errors
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
         spoils += rig.notes + rig_notes(rig)
@@ -79,15 +83,17 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         stops.append(
             f"{rigs[0].path}: the skeleton has no animation; bind a SkelAnimation to it (skel:animationSource)"
         )
-    grooms = []
+    grooms, far = [], []
     for prim in find_curves(stage):
         try:
-            grooms.append(_curves(prim, rigs, border, head, spoils, stops))
+            groom = _curves(prim, rigs, border, head, spoils, stops, far)
+            grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))
+    (spoils if grooms else stops).extend(far)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
-    elif not grooms and not any("groom" in s for s in stops):
+    elif not grooms and not far and not any("groom" in s for s in stops):
         stops.append(f"{path.name}: holds no groom (no BasisCurves prim); add one, or import a hair file")
     return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
 
@@ -135,7 +141,8 @@ def _height(rig) -> float | None:
     return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
 
 
-def _curves(prim, rigs, border, head, spoils, stops) -> dict:
+def _curves(prim, rigs, border, head, spoils, stops, far) -> dict | None:
+    """Facts about curves; None for what is not hair, of which `far` is told."""
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
@@ -143,6 +150,9 @@ def _curves(prim, rigs, border, head, spoils, stops) -> dict:
     if rigs:
         try:
             found = attach(prim, rigs, placement, head, spoils)
+            if found.far:
+                far.append(too_far(facts["path"], found))
+                return None
             to_bind = found.to_bind
             joint = {"joint": rig_joint(found), "carried by": found.how}
         except NeuralocksError as error:

@@ -9,6 +9,7 @@ from pxr import Usd
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.groom import Groom
 
+from .attach import Attachment, rig_joint
 from .rig_source import StageRig
 
 HEAD_WIDTHS = (0.08, 0.6)
@@ -18,6 +19,19 @@ HEAD_WIDTHS = (0.08, 0.6)
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose, missing layers say."""
     return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+
+
+def left_out(error) -> str:
+    """What is wrong with a skeleton that is not needed."""
+    return f"{error} (this skeleton is left out)"
+
+
+def too_far(path: str, found: Attachment) -> str:
+    """Why the curves of a prim are not taken for hair."""
+    return (
+        f"{path}: lies {found.far:.3g} m from joint '{rig_joint(found).split('/')[-1]}' of {found.rig.path} and on no "
+        "skin, so it is not taken for hair; if it is, name it with --groom"
+    )
 
 
 def rig_notes(rig: StageRig) -> list[str]:

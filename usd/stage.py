@@ -14,7 +14,7 @@ from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
-from .notes import composition_notes, groom_notes, rig_notes
+from .notes import composition_notes, groom_notes, left_out, rig_notes, too_far
 from .placement import Placement
 from .rig_source import StageRig, read_rig
 
@@ -73,7 +73,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
 
     Args:
         path: a USD file.
-        grooms: prim paths of the grooms wanted; all if left out.
+        grooms: prim paths of the grooms wanted; if left out, all curves that lie on a skin or near a head.
         skeleton: prim path of the skeleton that carries them; found if left out.
         head: joint (path, or its last part) that carries grooms for which no binding says so.
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
@@ -92,13 +92,19 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         )
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs, path)
-    found = []
+    found, far = [], []
     for prim in curves:
         placement = Placement(prim)
         attachment = attach(prim, rigs, placement, head, notes)
+        if attachment.far and not grooms:
+            far.append(too_far(str(prim.GetPath()), attachment))
+            continue
         groom = read_groom(prim, attachment.to_bind, notes)
         found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
         notes += groom_notes(found[-1].path, groom)
+    if not found:
+        raise NeuralocksError(far[0])
+    notes += far
     carrying = {id(g.attachment.rig) for g in found}
     used = tuple(rig for rig in rigs if id(rig) in carrying)
     for rig in used:
@@ -157,7 +163,7 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None)
     if errors and (not rigs or skeleton):
         raise errors[0]
     for error in errors:
-        rigs[0].notes.append(f"{error} (this skeleton is left out)")
+        rigs[0].notes.append(left_out(error))
     return rigs
 
 

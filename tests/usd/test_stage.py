@@ -13,6 +13,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from usd.border import Border
+from usd.inspect import inspect
 from usd.stage import read_rigs, read_shot
 
 from .shots import HEAD, POSITIONS, Recipe, strand_points, write_shot
@@ -101,6 +102,44 @@ def test_each_groom_finds_its_own_character(tmp_path):
     ]
     only = read_shot(tmp_path / "two.usda", skeleton="/B/Model/Rig", grooms=["/B"])
     assert [g.path for g in only.grooms] == ["/B/Model/Hair"]
+
+
+def _curves(stage, path, points):
+    """Curves (n, 2, 3) [m] without a binding."""
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr("linear")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    curves.CreateCurveVertexCountsAttr([2] * len(points))
+
+
+def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    roots = np.random.default_rng(0).uniform(-4, 4, (50, 1, 3)) * [1, 0, 1] + [6, 0, 0]
+    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot = read_shot(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"]
+    assert sum("/Set/Grass" in note and "--groom" in note for note in shot.notes) == 1
+    facts = inspect(path)
+    assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
+    assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
+    assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
+    stage.RemovePrim("/Hero/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
+        read_shot(path)
+    assert len(inspect(path)["stops"]) == 1
+
+
+def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    skin = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr().Get())
+    _curves(stage, "/Hero/Fur", np.stack([skin, skin + [0, 0.02, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    notes = read_shot(stage.GetRootLayer().realPath).notes
+    assert sum("will leave the skin" in note for note in notes) == 1
+    assert any(note.startswith("/Hero/Fur: only 50%") and "(head)" in note for note in notes)
 
 
 def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
