@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bake read back: what a renderer would see of it, in metres."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,15 +86,20 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None) -> Baked:
     """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
 
+    Grooms that have no samples beside some that do are left out, with a note.
+
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
     """
     shot = read_shot(path, grooms, skeleton, head)
-    codes: set[float] = set()
-    for item in shot.grooms:
-        codes.update(UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples())
-    if not codes:
+    sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
+    if not any(sampled.values()):
         raise NeuralocksError(
             f"{path}: its grooms have no animated points; bake it first: neuralocks bake {path} -o OUT.usdc"
         )
-    return Baked(shot, np.array(sorted(codes)))
+    # Exporters key what stands still once: beside moving hair that is no bake.
+    least = min(2, max(len(codes) for codes in sampled.values()))
+    items = tuple(item for item in shot.grooms if len(sampled[item.path]) >= least)
+    left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
+    codes = sorted({code for item in items for code in sampled[item.path]})
+    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left)), np.array(codes))

@@ -4,6 +4,7 @@
 import json
 
 import pytest
+from pxr import Sdf, Usd
 
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
@@ -11,6 +12,8 @@ from usd.baked import read_baked
 from usd.cli import main
 from usd.demo import demo, shipped_shot
 from usd.evaluate import evaluate
+
+from .shots import write_shot
 
 FRAMES = "1:60:4"
 
@@ -68,3 +71,14 @@ def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch):
     done = demo(tmp_path / "out", still_model, clip=False)
     assert all(path.is_file() for path in done.outputs.values())
     assert json.loads(done.outputs["report card"].read_text())["grooms"]
+
+
+def test_only_what_was_baked_is_measured(tmp_path, model):
+    """A beard that the same skeleton still skins: its points stand at rest, and are no bake."""
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
+    stage.GetRootLayer().Save()
+    bake(stage.GetRootLayer().realPath, tmp_path / "hair.usdc", model, ["/Hero/Hair"])
+    card = evaluate(tmp_path / "hair.usdc")
+    assert list(card.grooms) == ["/Hero/Hair"]
+    assert any("/Hero/Beard" in note for note in card.notes)
