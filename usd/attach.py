@@ -193,9 +193,8 @@ def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[st
     share = shares[own].sum()
     if share >= MOST:
         return []
-    others = [
-        names[other] for other in np.argsort(np.where(own, 0, -shares), kind="stable")[:3] if shares[other] > 0.02
-    ]
+    rest = np.where(own, 0, shares)
+    others = [names[other] for other in np.argsort(-rest, kind="stable")[:3] if rest[other] > 0.02]
     return [
         f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
         f"({', '.join(others)}) will leave the skin: split the groom by joint"
