@@ -22,6 +22,22 @@ class Rods:
     bend: array_real
 
 
+@wp.struct
+class Load:
+    """What acts on the strands in one step beside their own bending: springs and the body. Arrays are (K, S).
+
+    turn is the head's; a spring of stiffness `pull` [1/s^2 times mass] draws each vertex to `target`; vertices nearer
+    than `margin` to the body's `plane`, (normal, offset) in the world, are pushed off with stiffness `collision`.
+    """
+
+    turn: wp.quatd
+    target: array_vec
+    pull: array_real
+    plane: wp.array2d(dtype=wp.vec4d)
+    margin: array_real
+    collision: wp.float64
+
+
 @wp.func
 def collision_energy(depth: wp.float64, stiffness: wp.float64):
     """Cubic, linear beyond MARGIN_LINEAR; per unit mass."""
@@ -41,33 +57,28 @@ def bend_scale(open: wp.float64):
 @wp.func
 def energy(
     rods: Rods,
+    load: Load,
     x: array_vec,
+    frame: array_vec,
     c: int,
     s: int,
-    turn: wp.quatd,
-    target: array_vec,
-    pull: array_real,
-    plane: wp.array2d(dtype=wp.vec4d),
-    margin: array_real,
-    collision: wp.float64,
-    frame: array_vec,
 ):
-    """Energy of the strand in column c of x; writes the transported rest bend vectors to `frame`."""
+    """Energy of strand s, in column c of x; writes the transported rest bend vectors to that of `frame`."""
     half = wp.float64(0.5)
     one = wp.float64(1.0)
     vertices = x.shape[0]
-    q = turn
+    q = load.turn
     total = wp.float64(0.0)
     e = wp.normalize(x[1, c] - x[0, c])
     for i in range(1, vertices):
         p = x[i, c]
         if i > 1:
-            gap = p - target[i, s]
-            total += half * pull[i, s] * wp.dot(gap, gap)
-            wall = plane[i, s]
-            depth = margin[i, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
+            gap = p - load.target[i, s]
+            total += half * load.pull[i, s] * wp.dot(gap, gap)
+            wall = load.plane[i, s]
+            depth = load.margin[i, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
             if depth > wp.float64(0.0):
-                total += rods.mass[i, s] * collision_energy(depth, collision)
+                total += rods.mass[i, s] * collision_energy(depth, load.collision)
         if i < vertices - 1:
             after = (x[i + 1, c] - p) / rods.length[i + 1, s]
             open = one + wp.dot(e, after)

@@ -21,7 +21,7 @@ from neuralocks_core.reference.banded_kernels import (
     put,
     take,
 )
-from neuralocks_core.reference.energy_kernels import FOLD, MARGIN_LINEAR, Rods, bend_scale, energy
+from neuralocks_core.reference.energy_kernels import FOLD, MARGIN_LINEAR, Load, Rods, bend_scale, energy
 
 RATE = wp.constant(wp.float64(1.0))
 """Most that a Newton step believes the bend vector to turn with an edge; 1/2 on a straight strand."""
@@ -32,46 +32,44 @@ TWIST_TIE = wp.constant(wp.float64(1e3))
 
 
 @wp.func
-def assemble(
-    rods: Rods,
-    scratch: Scratch,
-    c: int,
-    s: int,
-    target: array_vec,
-    pull: array_real,
-    plane: wp.array2d(dtype=wp.vec4d),
-    margin: array_real,
-    collision: wp.float64,
-):
-    """Exact negative gradient (holonomy included) in `right`, Gauss-Newton Hessian without tension in the blocks."""
+def begin_with_load(rods: Rods, load: Load, scratch: Scratch, c: int, s: int):
+    """Springs and body, one vertex each; overwrites gradient and blocks."""
     zero = wp.float64(0.0)
-    one = wp.float64(1.0)
     two = wp.float64(2.0)
-    half = wp.float64(0.5)
     vertices = scratch.now.shape[0]
     for k in range(2, vertices):
         p = scratch.now[k, c]
-        weight = pull[k, s]
-        g = weight * (p - target[k, s])
-        h = weight
+        weight = load.pull[k, s]
+        g = weight * (p - load.target[k, s])
         block = wp.mat44d()
-        wall = plane[k, s]
-        depth = margin[k, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
+        wall = load.plane[k, s]
+        depth = load.margin[k, s] - (wall[0] * p[0] + wall[1] * p[1] + wall[2] * p[2] - wall[3])
         if depth > zero:
             n = wp.vec3d(wall[0], wall[1], wall[2])
             capped = wp.min(depth, MARGIN_LINEAR)
-            stiff = wp.float64(3.0) * collision * rods.mass[k, s]
+            stiff = wp.float64(3.0) * load.collision * rods.mass[k, s]
             g = g - stiff * capped * capped * n
             n4 = put(n)
             block = wp.outer(two * stiff * capped * n4, n4)
-        block[0, 0] = block[0, 0] + h
-        block[1, 1] = block[1, 1] + h
-        block[2, 2] = block[2, 2] + h
+        block[0, 0] = block[0, 0] + weight
+        block[1, 1] = block[1, 1] + weight
+        block[2, 2] = block[2, 2] + weight
         block[3, 3] = block[3, 3] + wp.float64(1e-12)
         scratch.diagonal[k, c] = block
         scratch.lower1[k, c] = wp.mat44d()
         scratch.lower2[k, c] = wp.mat44d()
         scratch.right[k, c] = -put(g)
+
+
+@wp.func
+def add_bend(rods: Rods, scratch: Scratch, c: int, s: int):
+    """Bending, from the tip to the root; `moment` is the slope of the bends passed when all their frames twist together,
+    which is what turning an edge before them does (holonomy)."""
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    two = wp.float64(2.0)
+    half = wp.float64(0.5)
+    vertices = scratch.now.shape[0]
     moment = zero
     j = vertices - 2
     while j >= 1:
@@ -119,6 +117,13 @@ def assemble(
         hv = (hol - wp.dot(hol, f) * f) / ahead
         add_row(scratch, c, j, -hu, -hv, -one, one, TWIST_TIE * a)
         j -= 1
+
+
+@wp.func
+def assemble(rods: Rods, load: Load, scratch: Scratch, c: int, s: int):
+    """Exact negative gradient (holonomy included) in `right`, Gauss-Newton Hessian without tension in the blocks."""
+    begin_with_load(rods, load, scratch, c, s)
+    add_bend(rods, scratch, c, s)
 
 
 @wp.func
@@ -170,16 +175,11 @@ def turn_edges(rods: Rods, scratch: Scratch, c: int, s: int, size: wp.float64):
 @wp.kernel(enable_backward=False)
 def newton(
     rods: Rods,
+    load: Load,
     scratch: Scratch,
     stride: int,
     x: array_vec,
     tension: array_real,
-    turn: wp.quatd,
-    target: array_vec,
-    pull: array_real,
-    plane: wp.array2d(dtype=wp.vec4d),
-    margin: array_real,
-    collision: wp.float64,
     iterations: int,
     tolerance: wp.float64,
     again: int,
@@ -199,13 +199,13 @@ def newton(
     vertices = x.shape[0]
     for k in range(vertices):
         scratch.now[k, c] = x[k, s]
-    best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+    best = energy(rods, load, scratch.now, scratch.frame, c, s)
     left = wp.float64(0.0)
     go = bool(True)  # noqa: UP018 -- warp takes a plain literal for a constant
     n = int(0)  # noqa: UP018
     fails = int(0)  # noqa: UP018
     while go:
-        assemble(rods, scratch, c, s, target, pull, plane, margin, collision)
+        assemble(rods, load, scratch, c, s)
         left = wp.sqrt(add_tension(rods, scratch, tension, c, s))
         if n >= iterations or left < tolerance:
             go = False
@@ -215,7 +215,7 @@ def newton(
             search = bool(True)  # noqa: UP018
             while search:
                 turn_edges(rods, scratch, c, s, size)
-                value = energy(rods, scratch.trial, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+                value = energy(rods, load, scratch.trial, scratch.frame, c, s)
                 # rounding decides below 1e-13: a converged strand still wants its tension, so equal counts as better
                 if value <= best + wp.float64(1e-13) * wp.abs(best):
                     best = value
@@ -241,7 +241,7 @@ def newton(
                 for k in range(2, vertices):
                     scratch.now[k, c] = scratch.trial[k, c]
             else:
-                best = energy(rods, scratch.now, c, s, turn, target, pull, plane, margin, collision, scratch.frame)
+                best = energy(rods, load, scratch.now, scratch.frame, c, s)
             n += 1
     for k in range(2, vertices):
         x[k, s] = scratch.now[k, c]

@@ -38,7 +38,7 @@ class Stepper:
         self.rod_kernels, self.kernels = rod_kernels, step_kernels
         self.device = wp.get_device(device)
         self.strands, self.vertices = rods.mass.shape
-        self.collision, self.widest, self.tolerance = collision, margin, tolerance
+        self.widest, self.tolerance = margin, tolerance
         self.gravity = wp.vec3d(0.0, -gravity, 0.0)
         self.rest = self._vectors(rods.points)
         self.support = self._vectors(rods.support * (gravity / 9.81))
@@ -56,13 +56,16 @@ class Stepper:
         if not self.clumped:
             self.neighbours = wp.empty((0, self.strands), dtype=wp.int32, device=device)
         shape = (self.vertices, self.strands)
-        self.x, self.last, self.before, self.target = (self._empty(wp.vec3d, shape) for _ in range(4))
-        self.pull, self.tension = (self._empty(wp.float64, shape) for _ in range(2))
-        self.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
+        self.x, self.last, self.before = (self._empty(wp.vec3d, shape) for _ in range(3))
+        self.tension = self._empty(wp.float64, shape)
+        self.load = energy_kernels.Load()
+        self.load.target, self.load.pull = self._empty(wp.vec3d, shape), self._empty(wp.float64, shape)
+        self.load.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
+        self.load.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
+        self.load.collision = collision
         self.seen, self.corner = self._empty(wp.vec3d, shape), self._empty(wp.vec2, shape)
         self.clear = wp.array(np.full(shape, -1e3), dtype=wp.float64, device=device)
         self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=device)
-        self.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
         self.residual = self._empty(wp.float64, (self.strands,))
         self.used, self.wake = (self._empty(wp.int32, (self.strands,)) for _ in range(2))
         self.points = self._empty(wp.vec3, shape[::-1])
@@ -70,13 +73,7 @@ class Stepper:
         # a CPU runs its threads one after the other: one scratch column stays in the cache
         self.stride = 0 if self.device.is_cpu else 1
         column = (self.vertices, self.strands if self.stride else 1)
-        self.scratch = banded_kernels.Scratch()
-        for name in ("now", "trial", "frame"):
-            setattr(self.scratch, name, self._empty(wp.vec3d, column))
-        for name in ("step", "right"):
-            setattr(self.scratch, name, self._empty(wp.vec4d, column))
-        for name in ("diagonal", "lower1", "lower2"):
-            setattr(self.scratch, name, self._empty(wp.mat44d, column))
+        self.scratch = self._columns(banded_kernels.Scratch(), column)
         self.mesh, self.volume = None, None
         if volume > 0:
             from neuralocks_core.reference.volume import Volume
@@ -92,7 +89,7 @@ class Stepper:
         self._pose(np.array([0, 0, 0, 1]), np.zeros(3))
         self._body_in_head, self.drift = np.asarray(bind, float), 0.0
         self._look(self.rest, 1)
-        self._run(self.kernels.rest_margin, (self.rest, self.plane, self.widest, self.margin))
+        self._run(self.kernels.rest_margin, (self.rest, self.load.plane, self.widest, self.load.margin))
 
     def move_body(self, points: np.ndarray) -> None:
         """Set the body's world points (V, 3)."""
@@ -149,7 +146,7 @@ class Stepper:
 
     def read(self, points: np.ndarray, planes: np.ndarray) -> tuple[float, float]:
         """Write (S, K, 3) and (S, K, 4) canonical; return rms residual relative to gravity, and mean Newton steps."""
-        args = (self.turn, self.origin, NEAR, self.x, self.plane, self.points, self.planes)
+        args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()
         planes[:] = self.planes.numpy()
@@ -178,24 +175,23 @@ class Stepper:
         args = (
             self.constants.mass, self.rest, self.support, self.weight, self.damping, self.clumping, self.neighbours,
             self.turn, self.gravity, self.carry, self.carry_origin, inverse_dt, settling,
-            self.x, self.last, self.before, self.target, self.pull,
+            self.x, self.last, self.before, self.load.target, self.load.pull,
         )  # fmt: skip
         self._run(self.kernels.forces, args)
         if self.volume is not None:
-            self.volume.push(self.x, self.target, self.pull)
+            self.volume.push(self.x, self.load.target, self.load.pull)
 
     def _newton(self, iterations: int, again: int) -> None:
         args = [
-            self.constants, self.scratch, self.stride, self.x, self.tension, self.turn, self.target, self.pull,
-            self.plane, self.margin, self.collision, iterations, self.tolerance, again, self.wake, self.residual,
-            self.used,
+            self.constants, self.load, self.scratch, self.stride, self.x, self.tension, iterations, self.tolerance,
+            again, self.wake, self.residual, self.used,
         ]  # fmt: skip
         self.wp.launch(self.rod_kernels.newton, dim=self.strands, inputs=args, device=self.device)
 
     def _look(self, x: object, moved: int) -> None:
         args = (
             self.mesh.id, REACH, moved, self.turn, self.origin, self.drift, x, self.seen, self.clear, self.face,
-            self.corner, self.plane, self.wake,
+            self.corner, self.load.plane, self.wake,
         )  # fmt: skip
         self._run(self.kernels.body_planes, args)
 
@@ -210,7 +206,7 @@ class Stepper:
         return np.array(self.wp.quat_to_matrix(self.turn), np.float64).reshape(3, 3)
 
     def _pose(self, turn: np.ndarray, origin: np.ndarray) -> None:
-        self.turn = self.wp.quatd(*(float(v) for v in turn))
+        self.turn = self.load.turn = self.wp.quatd(*(float(v) for v in turn))
         self.origin = self.wp.vec3d(*(float(v) for v in origin))
 
     def _run(self, kernel: object, args: tuple) -> None:
@@ -223,6 +219,15 @@ class Stepper:
         if not np.isfinite(points).all():
             raise NeuralocksError("body: holds values that are not finite; check its skinning")
         return points
+
+    def _columns(self, scratch: object, shape: tuple) -> object:
+        for name in ("now", "trial", "frame"):
+            setattr(scratch, name, self._empty(self.wp.vec3d, shape))
+        for name in ("step", "right"):
+            setattr(scratch, name, self._empty(self.wp.vec4d, shape))
+        for name in ("diagonal", "lower1", "lower2"):
+            setattr(scratch, name, self._empty(self.wp.mat44d, shape))
+        return scratch
 
     def _empty(self, dtype: object, shape: tuple) -> object:
         return self.wp.zeros(shape, dtype=dtype, device=self.device)

@@ -25,7 +25,7 @@ def hold_length(x: array_vec, inverse_mass: array_real, length: float, k: int, s
 
 @wp.func
 def hold_bend(x: array_vec, inverse_mass: array_real, rest: wp.vec3, compliance: float, i: int, s: int):
-    """Two constraints, u . (bend - rest) = 0 for the directions u across edge i; see `rod_kernels.assemble`."""
+    """Two constraints, u . (bend - rest) = 0 for the directions u across edge i; see `rod_kernels.add_bend`."""
     d = x[i, s] - x[i - 1, s]
     f = x[i + 1, s] - x[i, s]
     back = wp.max(wp.length(d), 1.0e-9)
