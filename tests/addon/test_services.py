@@ -263,6 +263,18 @@ def test_missing_trainer_comes_with_a_remedy(python, words):
     assert words in problem and "pip install 'neuralocks[train]'" in problem
 
 
+def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
+    """Built as `make addon` builds it, with what the tests' environment holds."""
+    with zipfile.ZipFile(build.own_wheel(tmp_path / "own")) as made:
+        listed = set(made.namelist())
+    shipped = {"strands.neuralocks", "rig.neuralocks", "shot/shot.usda"}
+    assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
+    assert {"usd/cli.py", "neuralocks_core/rig/hair.h.in"} <= listed
+    assert {name.split("/licenses/")[1] for name in listed if "/licenses/" in name} == {"LICENSE", "CREDITS.md"}
+    assert {name.split("/")[0].split("-")[0] for name in listed} == {"neuralocks_core", "usd", "neuralocks"}
+    assert not any("__pycache__" in name for name in listed)
+
+
 def test_zips_hold_what_blender_expects(tmp_path):
     """The manifest lists the wheels that are in the zip, and the legacy zip has one folder with the packages in it."""
     import tomllib
