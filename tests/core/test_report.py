@@ -27,6 +27,16 @@ def test_text_holds_every_number_and_note():
     assert "nan" not in text
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8", None])
+def test_text_can_be_written_in_the_code_page_asked_for(encoding):
+    measured = card()
+    measured.grooms["/Hair_髪"] = measured.grooms["/Hair"]
+    text = measured.text(encoding=encoding)
+    text.encode(encoding or "utf-8")
+    assert "3.25" in text and ("髪" in text or "u9aea" in text)
+    assert ("┌" in text) == (encoding not in ("cp1252", "ascii"))
+
+
 def test_json_is_plain_and_says_null_for_what_was_not_measured():
     values = json.loads(card().to_json())
     assert values["grooms"]["/Hair"]["settling_s"] is None
