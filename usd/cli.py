@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line `neuralocks`. Each command imports what it needs when it runs, so that `--help` comes at once."""
 
+import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +32,27 @@ app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export."
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of `neuralocks`."""
+    # Redirected output may be in a code page that lacks a character of a file's name: better shown as its number.
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     app(arguments)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"neuralocks {version('neuralocks')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
 
 
 @command("import")
@@ -93,7 +115,7 @@ def evaluate_command(
     if as_json:
         typer.echo(card.to_json())
     else:
-        typer.echo(card.text())
+        typer.echo(card.text(encoding=sys.stdout.encoding))
     if plot is not None:
         card.plot(plot)
 
@@ -114,13 +136,17 @@ def preview_command(
 
 @command("export")
 def export_command(
-    model: Annotated[Path, typer.Argument(help="A .neuralocks file.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.")],
+    model: Annotated[
+        Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
+    ] = None,
 ) -> None:
     """Unpack a model into plain ONNX files and a description of their inputs."""
+    from neuralocks_core.model import shipped
+
     from .export import export_model
 
-    for path in export_model(model, out):
+    for path in export_model(model or shipped("strands"), out):
         typer.echo(str(path))
 
 
@@ -169,7 +195,7 @@ def demo_command(
         seconds = {name: round(value, 2) for name, value in done.seconds.items()}
         print_json({"shot": str(done.shot), "outputs": outputs, "seconds": seconds, "notes": done.notes})
         return
-    typer.echo(done.card.text())
+    typer.echo(done.card.text(encoding=sys.stdout.encoding))
     for name, path in {"shot": str(done.shot), **outputs}.items():
         took = f" ({done.seconds[name]:.1f} s)" if name in done.seconds else ""
         typer.echo(f"{name}: {path}{took}")

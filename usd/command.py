@@ -4,6 +4,7 @@
 import functools
 import json
 import sys
+from pathlib import Path
 
 import typer
 
@@ -21,6 +22,7 @@ def command_of(app: typer.Typer):
             @functools.wraps(function)
             def run(*args, **kwargs):
                 try:
+                    _check_names(kwargs.values())
                     return function(*args, **kwargs)
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
@@ -37,6 +39,17 @@ def command_of(app: typer.Typer):
         return wrap
 
     return command
+
+
+def _check_names(values) -> None:
+    """Refuse files whose names are no text: USD takes UTF-8 alone, whatever the disk allows."""
+    for value in values:
+        for path in value if isinstance(value, list) else [value]:
+            try:
+                str(path if isinstance(path, Path) else "").encode()
+            except UnicodeEncodeError:
+                name = str(path).encode("utf-8", "backslashreplace").decode()
+                raise NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it") from None
 
 
 def one_line(text) -> None:

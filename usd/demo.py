@@ -86,5 +86,6 @@ def demo(out, model=None, *, clip: bool = True, progress: Callable[[int, int, st
         try:
             outputs[name] = timed(name, lambda file=file: preview(baked, out / file, progress=progress))
         except NeuralocksError as error:
-            notes.append(str(error))
+            if str(error) not in notes:  # without the extra, neither can be made, for one reason
+                notes.append(str(error))
     return Demo(shot, result, card, outputs, seconds, notes)

@@ -147,6 +147,8 @@ def export_onnx(
     from neuralocks_core import model as model_file
     from neuralocks_core.files import atomic_write
 
+    if out.suffix.lower() != ".onnx":
+        raise NeuralocksError(f"{out}: a graph ends in .onnx; choose such a name")
     data = model_file.read(model or model_file.shipped("rig"), "rig").graphs["rig.onnx"]
     with atomic_write(out) as part:
         part.write_bytes(data)

@@ -2,6 +2,7 @@
 """The command line: the same as Python, statuses, one line of error, and a quick start."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,39 @@ def test_errors_are_one_line_and_status_one(tmp_path, model, capsys):
         assert "nope" in captured.err
 
 
+def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys):
+    odd = tmp_path / os.fsdecode(b"sh\xff.usda")
+    try:
+        write_shot(tmp_path).rename(odd)
+    except (OSError, UnicodeError):
+        pytest.skip("this disk takes only text")
+    for words in (
+        ("bake", odd, "-o", tmp_path / "a.usdc", "--model", model),
+        ("inspect", odd),
+        ("train", "--character", odd, "-o", tmp_path / "a.neuralocks"),
+        ("rig", "export-c", "-o", odd.with_suffix(".h")),
+    ):
+        assert status(*words) == 1
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1 and "not UTF-8" in captured.err, captured
+
+
+def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
+    """A redirected stdout is often no UTF-8; the card's frames ended in a traceback there."""
+    shot, baked = write_shot(tmp_path), tmp_path / "髪.usdc"
+    environment = {**os.environ, "PYTHONIOENCODING": "cp1252"}
+    for words in (["bake", shot, "-o", baked, "--model", model], ["evaluate", baked]):
+        command = [sys.executable, "-m", "usd", *map(str, words)]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, env=environment)
+        assert done.returncode == 0, done.stderr.decode()
+    assert "vertices in the body" in done.stdout.decode("cp1252") and b"u2500" not in done.stdout
+
+
+def test_the_version_is_told(capsys):
+    assert status("--version") == 0
+    assert capsys.readouterr().out.split()[0] == "neuralocks"
+
+
 def test_wrong_usage_is_status_two(capsys):
     assert status("bake") == 2
     assert status("bake", "a.usd", "-o", "b.usdc", "--jobs", "many") == 2
@@ -82,6 +116,14 @@ def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
         assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
     assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
     capsys.readouterr()
+
+
+def test_what_is_exported_without_a_name_is_the_shipped_model(tmp_path, capsys):
+    assert status("export", "-o", tmp_path) == 0
+    assert len(capsys.readouterr().out.split()) == 5
+    assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model_file.shipped()).graphs["tail.onnx"]
+    assert status("rig", "export-onnx", "-o", tmp_path / "rig") == 1
+    assert "ends in .onnx" in capsys.readouterr().err and not (tmp_path / "rig").exists()
 
 
 def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
