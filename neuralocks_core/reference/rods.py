@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The trusted simulator: implicit, inextensible rods on the network's own energies."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.reference.headway import headway
+from neuralocks_core.reference.arguments import Progress, check_body, check_material, check_neighbours
+from neuralocks_core.reference.head_motion import head_motion
 from neuralocks_core.reference.rest import GRAVITY, rest_rods
 
-Progress = Callable[[int, int, str], None]
-MATERIAL = {"bend": 1e-3, "weight": 1.0, "damping": 10.0, "clumping": 60.0}
-"""Used where no material is given: bend [m^4/s^2], weight [g], damping [1/s], clumping [1/s^2]."""
 SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
 
@@ -65,7 +63,7 @@ def simulate(
         head: (T, 4, 4) canonical -> world, rigid, one per frame.
         body: (T, V, 3) world points [m] of the body, or None for no contact.
         triangles: (F, 3) of the body, outward (counter-clockwise), closed where hair may touch it.
-        material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `MATERIAL`.
+        material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `Material()`.
         dt: time between frames [s].
         substeps: steps a frame.
         iterations: most Newton steps a step.
@@ -91,7 +89,7 @@ def simulate(
         raise NeuralocksError(f"volume {volume}: must be 0 or above")
     if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
-    way = headway(head, substeps)
+    way = head_motion(head, substeps)
     frames = len(head)
     material = check_material(material, strands)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
@@ -136,59 +134,6 @@ def simulate(
         if progress:
             progress(frame + 1, frames, "simulating")
     return Rollout(points, planes, residual, used)
-
-
-def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
-    """Four (S,) arrays of finite, not negative numbers.
-
-    Raises:
-        NeuralocksError: any other number, or a wrong shape.
-    """
-    found = {}
-    for name, default in MATERIAL.items():
-        if material is None:
-            value = default
-        elif isinstance(material, dict):
-            value = material.get(name, default)
-        else:
-            value = getattr(material, name, default)
-        value = np.asarray(value, np.float64)
-        if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
-            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
-        found[name] = np.broadcast_to(value, (strands,)).copy()
-    return found
-
-
-def check_neighbours(neighbours: np.ndarray | None, strands: int) -> np.ndarray:
-    """(S, N) int32, N may be 0.
-
-    Raises:
-        NeuralocksError: wrong shape or a strand that does not exist.
-    """
-    if neighbours is None:
-        return np.zeros((strands, 0), np.int32)
-    neighbours = np.asarray(neighbours)
-    if neighbours.ndim != 2 or len(neighbours) != strands or neighbours.dtype.kind not in "iu":
-        raise NeuralocksError(f"neighbours: shape {neighbours.shape}; give integers ({strands}, N)")
-    if neighbours.size and (neighbours.max() >= strands or neighbours.min() < -1):
-        raise NeuralocksError(f"neighbours: name strands outside 0..{strands - 1}; use -1 for none")
-    return neighbours.astype(np.int32)
-
-
-def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np.ndarray, np.ndarray]:
-    """First frame's points (V, 3) and the faces (F, 3).
-
-    Raises:
-        NeuralocksError: too few frames, wrong shapes, faces out of range.
-    """
-    if len(body) != frames:
-        raise NeuralocksError(f"body: {len(body)} frames for {frames} of the head; give one for each")
-    first, faces = np.asarray(body[0]), np.asarray(triangles)
-    if first.ndim != 2 or first.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
-        raise NeuralocksError("body: give points (T, V, 3) and triangles (F, 3)")
-    if faces.min() < 0 or faces.max() >= len(first):
-        raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
-    return first, faces
 
 
 def _between(body: Any, step: int, substeps: int) -> np.ndarray:

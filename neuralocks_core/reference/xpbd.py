@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.reference.arguments import Progress, check_body, check_material
 from neuralocks_core.reference.device import start_warp
-from neuralocks_core.reference.headway import headway
-from neuralocks_core.reference.rest import GRAVITY, rest_rods
-from neuralocks_core.reference.rods import Progress, Rollout, check_body, check_material
+from neuralocks_core.reference.head_motion import HeadMotion, head_motion
+from neuralocks_core.reference.rest import GRAVITY, RestRods, rest_rods
+from neuralocks_core.reference.rods import Rollout
 
 REACH = 0.1
 """[m] how far a vertex looks for the body."""
@@ -50,73 +51,110 @@ def simulate_xpbd(
     """
     if not (np.isfinite(dt) and dt > 0) or substeps < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}: must be positive")
-    rods = rest_rods(rest, rest_support=rest_support)
+    rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
     strands, vertices = rods.mass.shape
-    way, frames = headway(head, substeps), len(head)
-    material = check_material(material, strands)
-    wp = start_warp(device)
-    from neuralocks_core.reference import xpbd_kernels as kernels
-
-    def vectors(values):
-        return wp.array(np.ascontiguousarray(np.swapaxes(values, 0, 1), np.float32), dtype=wp.vec3, device=device)
-
-    def reals(values):
-        return wp.array(np.ascontiguousarray(values.T, np.float32), dtype=wp.float32, device=device)
-
-    def numbers(values):
-        return wp.array(values.astype(np.float32), dtype=wp.float32, device=device)
-
-    def run(kernel, dim, *inputs):
-        if strands:
-            wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
-
-    def carry(a, b):
-        """The head's motion from substep a to substep b."""
-        turn = wp.quat(*way.turn[b]) * wp.quat_inverse(wp.quat(*way.turn[a]))
-        return turn, wp.vec3(*way.origin[b]) - wp.quat_rotate(turn, wp.vec3(*way.origin[a]))
-
-    free = (np.arange(vertices) > 1)[None]
-    shape = (vertices, strands)
-    first = head[0, :3, :3].astype(float)
-    length, inverse_mass, curl = reals(rods.length), reals(free / rods.mass), vectors(rods.curl)
-    stiffness = reals(np.maximum(4 * material["bend"][:, None] / rods.mass, 1e-9))
-    home, push = vectors(rods.points), vectors(rods.support / rods.mass[..., None] * (gravity / GRAVITY))
-    weight, damping = numbers(material["weight"]), numbers(material["damping"])
-    x = vectors(rods.points @ first.T + way.origin[0])
-    old = wp.zeros(shape, dtype=wp.vec3, device=device)
-    step = dt / substeps
-    drift = (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3)
-    velocity = vectors(np.broadcast_to(drift, rods.points.shape))
-    plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3], np.float32), dtype=wp.vec4, device=device)
-    limit = reals(np.full((strands, vertices), margin))
+    hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)
+    step, first = dt / substeps, head[0, :3, :3].astype(float)
+    hair.begin(first, (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3))
     if body is not None:
         start, faces = check_body(body, triangles, frames)
-        bind = (start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body)
-        surface = wp.array(bind.astype(np.float32), dtype=wp.vec3, device=device)
-        mesh = wp.Mesh(points=surface, indices=wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device=device))
-        still = (wp.quat_identity(), wp.vec3(), wp.quat_identity(), wp.vec3())
-        run(kernels.look, shape, mesh.id, REACH, *still, home, plane)
-        near = np.swapaxes(plane.numpy(), 0, 1)
-        limit = reals(np.minimum(margin, (near[..., :3] * rods.points).sum(-1) - near[..., 3]))
+        hair.attach_body((start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
-    planes = np.full((frames, strands, vertices, 4), [0, 0, 0, -1e3], np.float32)
+    planes = np.empty((frames, strands, vertices, 4), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
         if body is not None:
-            surface.assign(np.asarray(body[t], np.float32))
-            mesh.refit()
-            pose = wp.quat(*way.turn[b]), wp.vec3(*way.origin[b])
-            run(kernels.look, shape, mesh.id, REACH, *pose, *carry(a, b), x, plane)
+            hair.look(body[t], a, b)
         if t:
-            turns = wp.array(way.turn[a : b + 1].astype(np.float32), dtype=wp.quat, device=device)
-            origins = wp.array(way.origin[a : b + 1].astype(np.float32), dtype=wp.vec3, device=device)
-            run(
-                kernels.frame, strands, length, inverse_mass, stiffness, curl, home, push, weight, damping, turns,
-                origins, wp.vec3(0.0, -gravity, 0.0), step, plane, limit, x, old, velocity,
-            )  # fmt: skip
-        posed = np.swapaxes(x.numpy(), 0, 1) - way.origin[b]
-        points[t] = posed @ np.asarray(head[t], float)[:3, :3]
-        planes[t] = np.swapaxes(plane.numpy(), 0, 1)
+            hair.go(a, b, step)
+        hair.read(head[t], b, points[t], planes[t])
         if progress:
             progress(t + 1, frames, "simulating")
     return Rollout(points, planes, np.full(frames, np.nan), np.full(frames, float(substeps)))
+
+
+class _Hair:
+    """Strands in world space on a device, and the body around them. Arrays there are (K, S)."""
+
+    def __init__(self, rods: RestRods, way: HeadMotion, material: dict, margin: float, gravity: float, device: str):
+        self.wp = wp = start_warp(device)
+        from neuralocks_core.reference import xpbd_kernels
+
+        self.kernels, self.rods, self.way, self.margin, self.device = xpbd_kernels, rods, way, margin, device
+        self.strands, vertices = rods.mass.shape
+        self.shape = (vertices, self.strands)
+        free = (np.arange(vertices) > 1)[None]
+        self.length, self.inverse_mass = self._reals(rods.length), self._reals(free / rods.mass)
+        self.curl, self.home = self._vectors(rods.curl), self._vectors(rods.points)
+        self.push = self._vectors(rods.support / rods.mass[..., None] * (gravity / GRAVITY))
+        self.stiffness = self._reals(np.maximum(4 * material["bend"][:, None] / rods.mass, 1e-9))
+        self.weight, self.damping = self._numbers(material["weight"]), self._numbers(material["damping"])
+        self.gravity = wp.vec3(0.0, -gravity, 0.0)
+        self.old = wp.zeros(self.shape, dtype=wp.vec3, device=device)
+        far = np.full((*self.shape, 4), [0, 0, 0, -1e3], np.float32)
+        self.plane = wp.array(far, dtype=wp.vec4, device=device)
+        self.limit = self._reals(np.full((self.strands, vertices), margin))
+        self.mesh = None
+
+    def begin(self, first: np.ndarray, drift: np.ndarray) -> None:
+        """At rest in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
+        self.x = self._vectors(self.rods.points @ first.T + self.way.origin[0])
+        self.velocity = self._vectors(np.broadcast_to(drift, self.rods.points.shape))
+
+    def attach_body(self, bind: np.ndarray, faces: np.ndarray) -> None:
+        """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
+        wp = self.wp
+        self.surface = wp.array(bind.astype(np.float32), dtype=wp.vec3, device=self.device)
+        indices = wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device=self.device)
+        self.mesh = wp.Mesh(points=self.surface, indices=indices)
+        still = (wp.quat_identity(), wp.vec3(), wp.quat_identity(), wp.vec3())
+        self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *still, self.home, self.plane)
+        near = self._planes()
+        self.limit = self._reals(np.minimum(self.margin, (near[..., :3] * self.rods.points).sum(-1) - near[..., 3]))
+
+    def look(self, body: np.ndarray, a: int, b: int) -> None:
+        """Move the body to points (V, 3), and find what is near when the head has gone from substep a to b."""
+        self.surface.assign(np.asarray(body, np.float32))
+        self.mesh.refit()
+        pose = self.wp.quat(*self.way.turn[b]), self.wp.vec3(*self.way.origin[b])
+        self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *pose, *self._carry(a, b), self.x, self.plane)
+
+    def go(self, a: int, b: int, step: float) -> None:
+        """From substep a to b, each of `step` [s]."""
+        wp = self.wp
+        turns = wp.array(self.way.turn[a : b + 1].astype(np.float32), dtype=wp.quat, device=self.device)
+        origins = wp.array(self.way.origin[a : b + 1].astype(np.float32), dtype=wp.vec3, device=self.device)
+        self._run(
+            self.kernels.frame, self.strands, self.length, self.inverse_mass, self.stiffness, self.curl, self.home,
+            self.push, self.weight, self.damping, turns, origins, self.gravity, step, self.plane, self.limit, self.x,
+            self.old, self.velocity,
+        )  # fmt: skip
+
+    def read(self, head: np.ndarray, b: int, points: np.ndarray, planes: np.ndarray) -> None:
+        """Write (S, K, 3) and (S, K, 4) canonical, for the head (4, 4) of substep b."""
+        posed = np.swapaxes(self.x.numpy(), 0, 1) - self.way.origin[b]
+        points[:] = posed @ np.asarray(head, float)[:3, :3]
+        planes[:] = self._planes()
+
+    def _planes(self) -> np.ndarray:
+        return np.swapaxes(self.plane.numpy(), 0, 1)
+
+    def _carry(self, a: int, b: int):
+        """The head's motion from substep a to substep b."""
+        wp, way = self.wp, self.way
+        turn = wp.quat(*way.turn[b]) * wp.quat_inverse(wp.quat(*way.turn[a]))
+        return turn, wp.vec3(*way.origin[b]) - wp.quat_rotate(turn, wp.vec3(*way.origin[a]))
+
+    def _run(self, kernel: object, dim: int | tuple, *inputs) -> None:
+        if self.strands:
+            self.wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device)
+
+    def _vectors(self, values: np.ndarray) -> object:
+        turned = np.ascontiguousarray(np.swapaxes(values, 0, 1), np.float32)
+        return self.wp.array(turned, dtype=self.wp.vec3, device=self.device)
+
+    def _reals(self, values: np.ndarray) -> object:
+        return self.wp.array(np.ascontiguousarray(values.T, np.float32), dtype=self.wp.float32, device=self.device)
+
+    def _numbers(self, values: np.ndarray) -> object:
+        return self.wp.array(values.astype(np.float32), dtype=self.wp.float32, device=self.device)

@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 
 
 @dataclass(frozen=True)
-class Headway:
+class HeadMotion:
     """Poses at all substeps, T frames with n substeps: N = (T - 1) n + 1."""
 
     turn: np.ndarray
@@ -20,7 +20,7 @@ class Headway:
     """(N, 3) [m]."""
 
 
-def headway(head: np.ndarray, substeps: int) -> Headway:
+def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     """Smooth the head's motion over substeps: rotations by a C2 spline, positions without overshoot.
 
     Args:
@@ -44,7 +44,7 @@ def headway(head: np.ndarray, substeps: int) -> Headway:
     turns, origin = Rotation.from_matrix(head[:, :3, :3]), head[:, :3, 3]
     frames = len(head)
     if substeps == 1 or frames == 1:
-        return Headway(turns.as_quat(), origin.copy())
+        return HeadMotion(turns.as_quat(), origin.copy())
     at = np.arange((frames - 1) * substeps + 1) / substeps
     knots = np.arange(frames)
-    return Headway(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))
+    return HeadMotion(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))

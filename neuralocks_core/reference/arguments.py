@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the simulators are given, checked: a wrong shape or number is named before anything is computed."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import Material
+
+Progress = Callable[[int, int, str], None]
+"""Called with frames done, all frames, message."""
+
+
+def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
+    """bend [m^4/s^2], weight [times gravity], damping [1/s] and clumping [1/s^2], each (S,), finite and not negative.
+
+    Args:
+        material: an object or a mapping of these names, each a number or (S,); what it lacks is `Material`'s default.
+        strands: S.
+
+    Raises:
+        NeuralocksError: any other number, or a wrong shape.
+    """
+    found = {}
+    for name, default in asdict(Material()).items():
+        if material is None:
+            value = default
+        elif isinstance(material, dict):
+            value = material.get(name, default)
+        else:
+            value = getattr(material, name, default)
+        value = np.asarray(value, np.float64)
+        if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
+            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
+        found[name] = np.broadcast_to(value, (strands,)).copy()
+    return found
+
+
+def check_neighbours(neighbours: np.ndarray | None, strands: int) -> np.ndarray:
+    """(S, N) int32, N may be 0.
+
+    Raises:
+        NeuralocksError: wrong shape or a strand that does not exist.
+    """
+    if neighbours is None:
+        return np.zeros((strands, 0), np.int32)
+    neighbours = np.asarray(neighbours)
+    if neighbours.ndim != 2 or len(neighbours) != strands or neighbours.dtype.kind not in "iu":
+        raise NeuralocksError(f"neighbours: shape {neighbours.shape}; give integers ({strands}, N)")
+    if neighbours.size and (neighbours.max() >= strands or neighbours.min() < -1):
+        raise NeuralocksError(f"neighbours: name strands outside 0..{strands - 1}; use -1 for none")
+    return neighbours.astype(np.int32)
+
+
+def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """First frame's points (V, 3) and the faces (F, 3).
+
+    Raises:
+        NeuralocksError: too few frames, wrong shapes, faces out of range.
+    """
+    if len(body) != frames:
+        raise NeuralocksError(f"body: {len(body)} frames for {frames} of the head; give one for each")
+    first, faces = np.asarray(body[0]), np.asarray(triangles)
+    if first.ndim != 2 or first.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+        raise NeuralocksError("body: give points (T, V, 3) and triangles (F, 3)")
+    if faces.min() < 0 or faces.max() >= len(first):
+        raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
+    return first, faces
