@@ -128,7 +128,7 @@ LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "docu
 
 def _repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path) -> None:
     """Units, rates, range, default prim, render settings, and the variables without which references find nothing."""
-    for name in source.pseudoRoot.ListInfoKeys():
+    for name in sorted(source.pseudoRoot.ListInfoKeys()):  # USD gives another order in each process
         if name not in LAYERS_OWN:
             layer.pseudoRoot.SetInfo(name, source.pseudoRoot.GetInfo(name))
 

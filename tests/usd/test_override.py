@@ -2,6 +2,9 @@
 """The top of an override layer: opened instead of the shot, it must show all of it."""
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from pxr import Sdf, Usd
@@ -53,6 +56,17 @@ def test_what_usd_reads_of_the_first_layer_only_is_repeated(shot, tmp_path):
     assert layer.colorConfiguration.path == "../show/shots/show.ocio"
     assert layer.customLayerData["plate"].path == "../show/plates/a.exr"
     assert not layer.owner and list(layer.subLayerPaths) == ["../show/shots/shot.usda"]
+
+
+def test_every_process_writes_the_same_bytes(shot, tmp_path):
+    code = "import sys; from pathlib import Path; from tests.usd.test_override import _header; _header(*map(Path, sys.argv[1:]))"
+    written = []
+    for number in range(3):
+        out = tmp_path / str(number) / "hair.usdc"
+        out.parent.mkdir()
+        subprocess.run([sys.executable, "-c", code, str(shot), str(out)], check=True, cwd=Path(__file__).parents[2])
+        written.append(out.read_bytes())
+    assert written[0] == written[1] == written[2]
 
 
 def test_a_shot_behind_a_link_is_named_as_it_was_given(shot, tmp_path):
