@@ -91,7 +91,7 @@ def bake(
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints)
-    codes = time_codes(frames, shot.first, shot.last, subframes)
+    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {
         "model": _digest(strand_model),

@@ -14,6 +14,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 
 LAYERS = (".usd", ".usda", ".usdc")
+SLOWEST, FASTEST = 12.0, 240.0
+"""Time codes per second between which one time code is a frame; a stage may also count seconds, or milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +26,13 @@ class Border:
         metres_per_unit: length of one stage unit [m].
         up_axis: "Y" or "Z".
         rate: time codes per second.
+        frame: time codes from one frame to the next.
     """
 
     metres_per_unit: float
     up_axis: str
     rate: float
+    frame: float = 1.0
 
     @property
     def to_core(self) -> np.ndarray:
@@ -70,7 +74,8 @@ class Border:
         rate = float(stage.GetTimeCodesPerSecond())
         if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
             raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, 24 say")
-        return cls(unit, up, rate)
+        frame = 1.0 if SLOWEST <= rate <= FASTEST else rate / min(max(stage.GetFramesPerSecond(), SLOWEST), FASTEST)
+        return cls(unit, up, rate, frame)
 
 
 def open_stage(path) -> Usd.Stage:

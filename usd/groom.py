@@ -126,7 +126,7 @@ def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[
     stage = open_stage(source)
     border = Border.of(stage)
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
-    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate)
+    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
     found, notes = [], []
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)

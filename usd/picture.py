@@ -29,8 +29,8 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
     """
     if isinstance(baked, Baked) or find_curves(open_stage(baked), grooms):
         baked = baked if isinstance(baked, Baked) else read_baked(baked, grooms, skeleton, head)
-        scene, rate = baked.scene(), baked.shot.border.rate
+        scene, border = baked.scene(), baked.shot.border
     else:
         rigged = read_rigged_hair(baked, skeleton=skeleton, head=head)
-        scene, rate = rigged_scene(rigged), rigged.border.rate
-    return drawing.render(scene, path, size=size, rate=min(rate, 30.0), progress=progress)
+        scene, border = rigged_scene(rigged), rigged.border
+    return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)

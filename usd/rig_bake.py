@@ -129,7 +129,7 @@ def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
     ranged = stage.HasAuthoredTimeCodeRange()
     first = stage.GetStartTimeCode() if ranged else float(known[0])
     last = stage.GetEndTimeCode() if ranged else float(known[-1])
-    wanted = time_codes(frames, first, max(first, last), subframes)
+    wanted = time_codes(frames, first, max(first, last), subframes, hair.border.frame)
     return sorted(set(wanted) | set(own))
 
 

@@ -107,7 +107,7 @@ def read_rig(
     """
     source = JointSource(prim)
     notes = source.notes
-    time_codes = _time_codes(source)
+    time_codes = _time_codes(source, border.frame)
     posed = source.posed(time_codes)
     meshes = bound_meshes(stage, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
@@ -128,8 +128,13 @@ def read_rig(
     return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes, by_hand)
 
 
-def _time_codes(source: JointSource) -> np.ndarray:
-    """Every whole time code of the shot, or between the first and the last authored sample, and the authored ones."""
+def _time_codes(source: JointSource, frame: float) -> np.ndarray:
+    """Every frame of the shot, or between the first and the last authored sample, and the authored ones.
+
+    Args:
+        source: the skeleton.
+        frame: time codes from one frame to the next; where that is one, frames are whole numbers.
+    """
     samples = source.samples
     if not samples:
         return np.zeros(1)
@@ -138,16 +143,20 @@ def _time_codes(source: JointSource) -> np.ndarray:
     if stage.HasAuthoredTimeCodeRange():
         # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
         start, end = min(stage.GetStartTimeCode(), first), max(stage.GetEndTimeCode(), last)
-        if (end - start + len(samples)) * len(source.names) <= LARGEST_CLIP:
+        if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
             samples = [start, *samples, end]
             first, last = start, end
-    count = last - first + len(samples)
+    count = (last - first) / frame + len(samples)
     if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
         raise NeuralocksError(
             f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
             "remove stray keys"
         )
-    return np.unique(np.concatenate([np.arange(np.ceil(first), np.floor(last) + 1), samples]))
+    begin = np.ceil(first) if frame == 1 else first
+    frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
+    every = np.unique(np.concatenate([frames, samples]))
+    # A frame and a sample at the same time, up to rounding, are one.
+    return every[np.append(True, np.diff(every) > 1e-6 * frame)]
 
 
 def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) -> np.ndarray:

@@ -55,7 +55,7 @@ def simulate(
     if not 0 <= volume < float("inf"):
         raise NeuralocksError(f"--volume {volume}: must be 0 or above")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
-    codes = time_codes(frames, shot.first, shot.last, subframes)
+    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
 
     def poser(item: StageGroom) -> _SimulatedPoser:

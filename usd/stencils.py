@@ -5,11 +5,6 @@ import numpy as np
 
 from .stage import StageGroom
 
-SLOWEST, FASTEST = 12.0, 240.0
-"""Time codes per second between which one time code is a frame; a stage counted in seconds, say, is cut finer."""
-FRAME = 24.0
-"""Frames per second of such a stage."""
-
 
 class Stencils:
     """Which samples of a groom the velocity at each time code is made of.
@@ -34,9 +29,8 @@ class Stencils:
         self.velocities = velocities
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
-        rate = item.attachment.rig.border.rate
-        self._step = 1.0 if SLOWEST <= rate <= FASTEST else rate / FRAME
-        self._rate = rate / self._step
+        border = item.attachment.rig.border
+        self._step, self._rate = border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep the very same number.
         self._known = np.array(codes, float)
         extra = {other for code in codes for other, _ in self.terms(code)} if velocities else set()

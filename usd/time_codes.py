@@ -8,8 +8,8 @@ from neuralocks_core.errors import NeuralocksError
 MOST = 1_000_000
 
 
-def parse_frames(text: str) -> tuple[float, float, float]:
-    """`A:B[:STEP]` or a single `A` as (first, last, step).
+def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
+    """`A:B[:STEP]` or a single `A` as (first, last, step); the step is a frame if left out.
 
     Raises:
         NeuralocksError: it is something else.
@@ -20,19 +20,20 @@ def parse_frames(text: str) -> tuple[float, float, float]:
         parts = []
     if not 1 <= len(parts) <= 3 or not all(math.isfinite(p) for p in parts):
         raise NeuralocksError(f"--frames {text}: is not A:B or A:B:STEP; write for example 1:48")
-    first, last, step = parts[0], parts[1] if len(parts) > 1 else parts[0], parts[2] if len(parts) > 2 else 1.0
+    first, last, step = parts[0], parts[1] if len(parts) > 1 else parts[0], parts[2] if len(parts) > 2 else frame
     if last < first or step <= 0:
         raise NeuralocksError(f"--frames {text}: the range is empty; B must not lie before A, and STEP must be above 0")
     return first, last, step
 
 
-def time_codes(frames, first: float, last: float, subframes: int = 1) -> list[float]:
+def time_codes(frames, first: float, last: float, subframes: int = 1, frame: float = 1.0) -> list[float]:
     """Ascending time codes without doubles.
 
     Args:
         frames: None for the whole range, `A:B[:STEP]`, a tuple (first, last, step), or any iterable of time codes.
         first, last: the shot's range.
         subframes: samples per frame: n adds the n - 1 times at equal steps after each frame, for motion blur.
+        frame: time codes from one frame to the next.
 
     Raises:
         NeuralocksError: no frame, too many, or something that is no time code.
@@ -40,9 +41,11 @@ def time_codes(frames, first: float, last: float, subframes: int = 1) -> list[fl
     if isinstance(subframes, bool) or not isinstance(subframes, int) or not 1 <= subframes <= 64:
         raise NeuralocksError(f"--subframes {subframes}: must be a whole number from 1 to 64")
     if frames is None:
-        frames = (math.ceil(first - 1e-9), max(math.floor(last + 1e-9), math.ceil(first - 1e-9)), 1.0)
+        # Where a time code is a frame, frames are whole numbers; else the shot begins with one.
+        begin = float(math.ceil(first - 1e-9)) if frame == 1 else first
+        frames = (begin, max(last, begin), frame)
     if isinstance(frames, str):
-        frames = parse_frames(frames)
+        frames = parse_frames(frames, frame)
     if isinstance(frames, tuple) and len(frames) == 3:
         begin, end, step = frames
         count = (end - begin) / step + 1e-9  # may overflow to infinity
@@ -51,7 +54,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1) -> list[fl
         count = math.floor(count) + 1
         whole = [begin + i * step for i in range(count)]
     else:
-        whole = [float(frame) for frame in frames]
-    if not whole or not all(math.isfinite(frame) for frame in whole):
+        whole = [float(code) for code in frames]
+    if not whole or not all(math.isfinite(code) for code in whole):
         raise NeuralocksError("frames: none given, or not finite; give at least one time code")
-    return sorted({frame + part / subframes for frame in whole for part in range(subframes)})
+    return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})

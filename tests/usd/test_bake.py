@@ -183,6 +183,34 @@ def test_velocities_are_those_of_the_points(tmp_path, model):
     assert np.linalg.norm(near - middle) < 0.1 * np.linalg.norm(near)
 
 
+@pytest.mark.parametrize("rate", [1.0, 1000.0])
+def test_frames_are_the_shots_where_its_time_codes_are_seconds_or_milliseconds(tmp_path, model, rate):
+    shots = [write_shot(tmp_path, Recipe(rate=24, frames=9), "frames"), tmp_path / "counted.usda"]
+    stage = Usd.Stage.Open(Usd.Stage.Open(str(shots[0])).Flatten())
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetStartTimeCode(rate / 24)
+    stage.SetEndTimeCode(9 * rate / 24)
+    motion = stage.GetPrimAtPath("/Hero/Rig/Motion")
+    for attribute in motion.GetAttributes():
+        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()}
+        if values:
+            attribute.Clear()
+        for code, value in values.items():
+            attribute.Set(value, code * rate / 24)
+    stage.GetRootLayer().Export(str(shots[1]))
+    read = [read_shot(shot).rigs[0].clip for shot in shots]
+    assert len(read[1].times) == 9 and np.allclose(read[0].times, read[1].times)
+    assert np.abs(read[0].joints - read[1].joints).max() < 1e-6
+    bakes = [bake(shot, shot.with_suffix(".usdc"), model, subframes=2) for shot in shots]
+    assert np.allclose(np.array(bakes[1].frames) * 24 / rate, bakes[0].frames)
+    for code, seconds in zip(bakes[0].frames, bakes[1].frames, strict=True):
+        frames, counted = (
+            samples(done.path, "points", "velocities", at=at) for done, at in zip(bakes, (code, seconds))
+        )
+        assert np.abs(frames[0] - counted[0]).max() < 1e-5
+        assert np.abs(frames[1] - counted[1]).max() < 1e-3 * np.abs(frames[1]).max() + 1e-5
+
+
 def test_order_chunks_and_jobs_give_the_same_bytes(tmp_path, model):
     shot = write_shot(tmp_path, Recipe(strands=1500, vertices=9))
     whole = bake(shot, tmp_path / "bake.usdc", model, jobs=2, subframes=2).path.read_bytes()
