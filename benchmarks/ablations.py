@@ -22,7 +22,7 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.lessons import normalise, samples
+from neuralocks_core.training.methods import normalise, samples
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene

@@ -23,7 +23,7 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.lessons import MomentLesson, normalise
+from neuralocks_core.training.methods import MomentMethod, normalise
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RolloutBank
@@ -68,7 +68,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
             maker = RolloutMaker(held_scene)
             held.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files, held.rollouts)]
         start = time.monotonic()
-        teacher = MomentLesson(own, codes, options, None, lambda done, message: None)
+        teacher = MomentMethod(own, codes, options, None, lambda done, message: None)
         torch.manual_seed(options.seed)
         net = StrandNet(own.spec.size, motion=options.motion)
         history = own.spec.slices["history"]

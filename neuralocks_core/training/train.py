@@ -21,8 +21,8 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
-from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.lessons import lesson, normalise, wait
+from neuralocks_core.training.gauge import Gauge, measure
+from neuralocks_core.training.methods import method_of, normalise, wait
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
@@ -93,27 +93,67 @@ def train_strands(
     ):
         coder = _coder(scene, work, options, report)
         codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
-        teacher, held = lesson(scene, codes, options, farm, report), RolloutBank(scene_out, codes)
-        history = scene.spec.slices["history"]
+        method = method_of(scene, codes, options, farm, report)
+        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, resume)
+        gauge = run.train(farm, held_farm, report)
+    card = {
+        "command": command,
+        **run.card(),
+        **_inputs_of(scene, coder),
+        "options": asdict(options, dict_factory=_plain),
+    }
+    description = {
+        "kind": "strands",
+        "boundary": scene.spec.to_json(),
+        "output": options.output,
+        "anchored": method.anchored,
+        "static": options.static,
+        "training": {**card, "curve": run.meta["curve"]},
+        "report": {"held out": gauge.to_json()},
+        "credits": list(credits),
+    }
+    path = model.write(out, description, strand_graphs(coder, run.net, options.output))
+    if not keep_work:
+        _discard(work)
+    return path
+
+
+class _Run:
+    """A network while it learns: its optimisers, learning curve and checkpoint.
+
+    Args:
+        scene: what it learns on.
+        method: how.
+        held: held-out rollouts, which the gauge measures on as they come.
+        saved: the checkpoint's file.
+        resume: begin with what that file holds.
+    """
+
+    def __init__(self, scene: TrainingScene, method, held: RolloutBank, saved: Path, resume: bool):
+        self.scene, self.method, self.held, self.saved = scene, method, held, saved
+        self._options, self._history = method.options, scene.spec.slices["history"]
         with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(options.seed)
-            net = StrandNet(scene.spec.size, teacher.inputs[0].shape[1], motion=options.motion)
-        normalise(net, *teacher.samples(), history, options.static)
-        net.to(options.device)
-        optimisers = options.optimisers(net)
-        meta, modules = {"step": 0, "seconds": 0.0, "curve": []}, {"net": net}
+            torch.manual_seed(self._options.seed)
+            self.net = StrandNet(scene.spec.size, method.inputs[0].shape[1], motion=self._options.motion)
+        normalise(self.net, *method.samples(), self._history, self._options.static)
+        self.net.to(self._options.device)
+        self._optimisers = self._options.optimisers(self.net)
+        self.meta = {"step": 0, "seconds": 0.0, "curve": []}
         if resume:
-            meta = checkpoint.load(saved, modules, optimisers)
+            self.meta = checkpoint.load(saved, {"net": self.net}, self._optimisers)
+
+    def train(self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]) -> Gauge:
+        """Until the budget is used; what the gauge says in the end.
+
+        Raises:
+            NeuralocksError: a process of the solver failed.
+        """
+        options, meta = self._options, self.meta
         # Against today's budget: a finished run goes on when it is given more time.
         spent = meta["step"] / options.steps if options.steps else meta["seconds"] / (60 * options.minutes)
         began, last = time.monotonic() - meta["seconds"], time.monotonic()
         gauge = None
-
-        def look():
-            held.add(held_farm.files())
-            return measure(net, held, options.output, history, teacher.anchored) if held.rollouts else None
-
-        for state in teacher.train(net, optimisers, step=meta["step"], done=min(spent, 1.0)):
+        for state in self.method.train(self.net, self._optimisers, step=meta["step"], done=min(spent, 1.0)):
             if farm.failed() or held_farm.failed():
                 raise NeuralocksError(
                     "training: the solver's process ended early; free some memory and go on with --resume"
@@ -121,40 +161,36 @@ def train_strands(
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
-                last, gauge = now, look()
-                curve = [*meta["curve"], *_told(now - began, gauge)]
-                meta = {"step": state.step, "seconds": now - began, "curve": curve}
-                checkpoint.save(saved, meta, modules, optimisers)
+                last, gauge = now, self._measured(held_farm)
+                self._save(state.step, now - began, gauge)
             losses = " ".join(f"{name} {value:.4f}" for name, value in state.losses.items())
-            report(state.done, f"{state.step} steps, {teacher.told()}; {gauge or losses}")
+            report(state.done, f"{state.step} steps, {self.method.material()}; {gauge or losses}")
         if gauge is None:
             wait(held_farm, HELD_OUT, report)
-            gauge = look()
-    card = {
-        "command": command,
-        "seed": scene.seed,
-        "method": teacher.method,
-        "minutes": round(meta["seconds"] / 60, 1),
-        "steps": meta["step"],
-        **teacher.card(),
-        **_inputs_of(scene, coder),
-        "options": asdict(options, dict_factory=_plain),
-        "curve": meta["curve"],
-    }
-    description = {
-        "kind": "strands",
-        "boundary": scene.spec.to_json(),
-        "output": options.output,
-        "anchored": teacher.anchored,
-        "static": options.static,
-        "training": card,
-        "report": {"held out": gauge.to_json()},
-        "credits": list(credits),
-    }
-    path = model.write(out, description, strand_graphs(coder, net, options.output))
-    if not keep_work:
-        _discard(work)
-    return path
+            gauge = self._measured(held_farm)
+        return gauge
+
+    def card(self) -> dict:
+        """How it was trained, for the model card."""
+        return {
+            "seed": self.scene.seed,
+            "method": self.method.name,
+            "minutes": round(self.meta["seconds"] / 60, 1),
+            "steps": self.meta["step"],
+            **self.method.card(),
+        }
+
+    def _measured(self, held_farm: RolloutFarm) -> Gauge | None:
+        """The gauge on the held-out rollouts that there are by now, None before the first."""
+        self.held.add(held_farm.files())
+        if not self.held.rollouts:
+            return None
+        return measure(self.net, self.held, self._options.output, self._history, self.method.anchored)
+
+    def _save(self, step: int, seconds: float, gauge: Gauge | None) -> None:
+        curve = [*self.meta["curve"], *_told(seconds, gauge)]
+        self.meta = {"step": step, "seconds": seconds, "curve": curve}
+        checkpoint.save(self.saved, self.meta, {"net": self.net}, self._optimisers)
 
 
 class _Reporter:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two ways of training behind one face: rollouts of the solver, and the physics of random moments."""
+"""The two methods of training behind one face: regression on rollouts of the solver, and the physics of random moments."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ FIRST = 24
 """Clips to wait for before the network starts: enough to normalise its inputs by."""
 
 
-def lesson(
+def method_of(
     scene: TrainingScene,
     codes: list[np.ndarray],
     options: RegressionOptions | SelfSupervisedOptions,
     farm: RolloutFarm,
     report: Callable[[float, str], None],
-) -> RolloutLesson | MomentLesson:
-    """What the kind of options asks for."""
-    kind = MomentLesson if isinstance(options, SelfSupervisedOptions) else RolloutLesson
+) -> RolloutMethod | MomentMethod:
+    """The method that the kind of options asks for; see `train.train_strands` for the arguments."""
+    kind = MomentMethod if isinstance(options, SelfSupervisedOptions) else RolloutMethod
     return kind(scene, codes, options, farm, report)
 
 
-class RolloutLesson:
+class RolloutMethod:
     """Regression on rollouts that a farm makes meanwhile; see `regression`."""
 
-    method = "regression on rollouts of the reference solver"
+    name = "regression on rollouts of the reference solver"
 
     def __init__(self, scene, codes, options: RegressionOptions, farm, report):
         self.options, self.farm, self.anchored = options, farm, True
@@ -57,7 +57,7 @@ class RolloutLesson:
         """See `regression.regress`."""
         return regress(self.bank, net, self.options, optimisers, self.farm.files, **since)
 
-    def told(self) -> str:
+    def material(self) -> str:
         """What there is to learn from, in a word."""
         return f"{len(self.bank.rollouts)} rollouts"
 
@@ -67,10 +67,10 @@ class RolloutLesson:
         return {"rollouts": len(self.bank.rollouts), "solver residual": residual}
 
 
-class MomentLesson:
+class MomentMethod:
     """The physics of random moments; see `selfsupervised`."""
 
-    method = "self-supervised on the potentials of random moments"
+    name = "self-supervised on the potentials of random moments"
 
     def __init__(self, scene, codes, options: SelfSupervisedOptions, farm, report):
         self.options, self.anchored = options, options.supported
@@ -96,7 +96,7 @@ class MomentLesson:
         """See `selfsupervised.train_on_moments`."""
         return train_on_moments(self.pool, self.inputs, net, self.options, optimisers, **since)
 
-    def told(self) -> str:
+    def material(self) -> str:
         """What there is to learn from, in a word."""
         return f"{len(self.pool.moments)} moments"
 
