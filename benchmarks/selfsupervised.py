@@ -68,12 +68,12 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
             maker = RolloutMaker(held_scene)
             held.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files, held.rollouts)]
         start = time.monotonic()
-        teacher = MomentMethod(own, codes, options, None, lambda done, message: None)
+        method = MomentMethod(own, codes, options, None, lambda done, message: None)
         torch.manual_seed(options.seed)
         net = StrandNet(own.spec.size, motion=options.motion)
         history = own.spec.slices["history"]
-        normalise(net, *teacher.samples(), history, options.static)
-        for _ in teacher.train(net, options.optimisers(net)):
+        normalise(net, *method.samples(), history, options.static)
+        for _ in method.train(net, options.optimisers(net)):
             pass
         card = measure(net, held, options.output, history, options.supported).to_json()
         cells = " | ".join(f"{card[name]:.3g}" for name in names)
