@@ -8,7 +8,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from .operators.training import job
-from .services.words import for_the_panel
+from .services.panel_errors import for_the_panel
 from .session import session
 
 LOOP_GAP = 2.0

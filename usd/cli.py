@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from .cli_bake import bake_command, simulate_command
+from .cli_rig import app as rig_app
 from .cli_train import train_command
 from .command import command_of, note, print_json
 from .options import AsJson, Head, Joints, Model, Out, Skeleton, numbers, pairs
-from .rig_cli import app as rig_app
 
 app = typer.Typer(
     name="neuralocks",

@@ -9,7 +9,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from ..scene.sampling import stepping
-from ..services.words import for_the_panel
+from ..services.panel_errors import for_the_panel
 from ..session import session
 
 SLICE = 0.06
