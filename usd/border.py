@@ -62,6 +62,10 @@ class Border:
         Raises:
             NeuralocksError: the unit, axis or rate cannot be meant.
         """
+
+        def usual(rate: float) -> bool:
+            return SLOWEST <= rate <= FASTEST
+
         name = stage.GetRootLayer().GetDisplayName()
         unit = float(UsdGeom.GetStageMetersPerUnit(stage))
         if not (math.isfinite(unit) and 1e-7 < unit < 1e7):
@@ -74,7 +78,8 @@ class Border:
         rate = float(stage.GetTimeCodesPerSecond())
         if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
             raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, 24 say")
-        frame = 1.0 if SLOWEST <= rate <= FASTEST else rate / min(max(stage.GetFramesPerSecond(), SLOWEST), FASTEST)
+        shown = stage.GetFramesPerSecond()
+        frame = 1.0 if usual(rate) else rate / (shown if usual(shown) else 24.0)
         return cls(unit, up, rate, frame)
 
 
