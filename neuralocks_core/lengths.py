@@ -3,81 +3,81 @@
 
 from __future__ import annotations
 
-import threading
-
 import numpy as np
 
-KEPT = 65_536
-"""Most vertices for which a thread keeps its memory."""
+from .scratch import Scratch
+
 TINY = np.float32(1e-24)
 """[m^2] Keeps edges of no length finite."""
 
+_scratch = Scratch()
 
-def keep_lengths(rest: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth: np.ndarray) -> None:
+
+def keep_lengths(points: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> None:
     """Change displacements so that no edge is longer or shorter than at rest.
 
     From the root on, each edge keeps about the direction it was moved to, and the hair its way. Where nothing is moved
     nothing changes, bit for bit, and a strand depends on itself alone.
 
+    Coordinates come first and strands last: what is done to one vertex of all strands is one contiguous array.
+
     Args:
-        rest: (P, 3) float32 [m] vertices of consecutive strands.
-        moved: (P, 3) float32 [m] their displacement, changed in place.
-        counts: (N,) vertices of each strand, at least one.
+        points: (3, V, N) float32 [m] vertices at rest of N strands of V vertices.
+        moved: (3, V, N) float32 [m] their displacement, changed in place.
         smooth: (N,) bool, strands whose edges point along their way; those of a coil point all around.
     """
-    if not len(counts):
-        return
-    if (counts == counts[0]).all():
-        shape = len(counts), counts[0], 3
-        moved.reshape(shape)[:] = _kept(rest.reshape(shape), moved.reshape(shape), smooth)
-        return
+    vertices, strands = points.shape[1:]
+    vectors, numbers = (3, max(vertices - 1, 0), strands), (max(vertices - 1, 0), strands)
+    before, edges, drift, other, lengths, squared, scale, along, spare = _scratch.arrays(*[vectors] * 4, *[numbers] * 5)
+    np.subtract(points[:, 1:], points[:, :-1], out=before)
+    np.subtract(moved[:, 1:], moved[:, :-1], out=edges)
+    edges += before
+    _dot(before, before, lengths)
+    _measure(edges, lengths, squared, scale)
+    # Where lengths alone would put each vertex, seen from where it was moved to. Along the hair that does not matter,
+    # to its side it takes the hair off its way, into the head even: so much each edge turns back.
+    np.subtract(scale, np.float32(1.0), out=spare)
+    spare *= smooth
+    np.multiply(edges, spare, out=drift)
+    _add_up(drift, other)
+    _dot(drift, edges, along)
+    along /= squared
+    drift -= np.multiply(edges, along, out=other)
+    edges *= scale
+    edges -= drift
+    edges[:, 1:] += drift[:, :-1]
+    _measure(edges, lengths, squared, scale)
+    edges *= scale
+    edges -= before
+    _add_up(edges, other)
+    np.add(moved[:, :1], edges, out=moved[:, 1:])
+
+
+def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth: np.ndarray) -> None:
+    """`keep_lengths` of strands of any numbers of vertices.
+
+    Args:
+        points: (3, P) float32 [m] vertices at rest of consecutive strands.
+        moved: (3, P) float32 [m] their displacement, changed in place.
+        counts: (N,) vertices of each strand, at least one.
+        smooth: (N,) bool, as above.
+    """
     # Strands of about the same number of vertices together; the last vertex is repeated: an edge of no length.
     starts, alike = np.cumsum(counts) - counts, np.frexp(counts)[1]
     for size in np.unique(alike):
         some = np.flatnonzero(alike == size)
         last = counts[some] - 1
-        place = np.arange(last.max() + 1)
-        grid, own = starts[some, None] + np.minimum(place, last[:, None]), place <= last[:, None]
-        moved[grid[own]] = _kept(rest[grid], moved[grid], smooth[some])[own]
+        place = np.arange(last.max() + 1)[:, None]
+        grid, own = starts[some] + np.minimum(place, last), place <= last
+        kept = moved[:, grid]
+        keep_lengths(points[:, grid], kept, smooth[some])
+        moved[:, grid[own]] = kept[:, own]
 
 
-def _kept(rest: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """(N, V, 3) displacement of N strands of V vertices that keeps their lengths; valid until this thread's next call."""
-    # Coordinates first, strands last: what is done to one vertex of all strands is one contiguous array.
-    room = _scratch.arrays(rest.shape[1], len(rest))
-    points, result = room.points, room.result
-    points[:], result[:] = rest.transpose(2, 1, 0), moved.transpose(2, 1, 0)
-    before, edges, drift = room.before, room.edges, room.drift
-    np.subtract(points[:, 1:], points[:, :-1], out=before)
-    np.subtract(result[:, 1:], result[:, :-1], out=edges)
-    edges += before
-    lengths, squared, scale = room.lengths, room.squared, room.scale
-    _dot(before, before, lengths, room.spare)
-    _measure(edges, lengths, room)
-    # Where lengths alone would put each vertex, seen from where it was moved to. Along the hair that does not matter,
-    # to its side it takes the hair off its way, into the head even: so much each edge turns back.
-    np.subtract(scale, np.float32(1.0), out=room.spare)
-    room.spare *= smooth
-    np.multiply(edges, room.spare, out=drift)
-    _add_up(drift, room.other)
-    along = _dot(drift, edges, room.along, room.spare)
-    along /= squared
-    drift -= np.multiply(edges, along, out=room.other)
-    edges *= scale
-    edges -= drift
-    edges[:, 1:] += drift[:, :-1]
-    _measure(edges, lengths, room)
-    edges *= scale
-    edges -= before
-    _add_up(edges, room.other)
-    np.add(result[:, :1], edges, out=result[:, 1:])
-    return result.transpose(2, 1, 0)
-
-
-def _measure(edges: np.ndarray, lengths: np.ndarray, room: _Room) -> None:
-    """Into `room`: squared lengths of edges, and the factors that give them the lengths whose squares are `lengths`."""
-    np.maximum(_dot(edges, edges, room.squared, room.spare), TINY, out=room.squared)
-    np.sqrt(np.divide(lengths, room.squared, out=room.scale), out=room.scale)
+def _measure(edges: np.ndarray, lengths: np.ndarray, squared: np.ndarray, scale: np.ndarray) -> None:
+    """Squared lengths of edges, and the factors that give them the lengths whose squares are `lengths`."""
+    np.maximum(_dot(edges, edges, squared), TINY, out=squared)
+    np.sqrt(np.divide(lengths, squared, out=scale), out=scale)
 
 
 def _add_up(edges: np.ndarray, spare: np.ndarray) -> None:
@@ -91,49 +91,6 @@ def _add_up(edges: np.ndarray, spare: np.ndarray) -> None:
         reach *= 2
 
 
-def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray, spare: np.ndarray) -> np.ndarray:
+def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> np.ndarray:
     """(V, N) products of vectors whose coordinates come first."""
-    np.multiply(a[0], b[0], out=out)
-    for left, right in zip(a[1:], b[1:]):
-        out += np.multiply(left, right, out=spare)
-    return out
-
-
-class _Room:
-    """Arrays for N strands of V vertices, cut from one piece of memory."""
-
-    SIZE = 23
-    """Numbers a vertex."""
-
-    def __init__(self, memory: np.ndarray, vertices: int, strands: int) -> None:
-        self.vertices, self.strands = vertices, strands
-        self._memory, self._taken = memory, 0
-        self.points, self.result = (self._cut(3, vertices) for _ in range(2))
-        self.before, self.edges, self.drift, self.other = (self._cut(3, vertices - 1) for _ in range(4))
-        self.lengths, self.squared, self.scale, self.along, self.spare = (
-            self._cut(1, vertices - 1)[0] for _ in range(5)
-        )
-
-    def _cut(self, coordinates: int, vertices: int) -> np.ndarray:
-        begin = self._taken
-        self._taken += coordinates * vertices * self.strands
-        return self._memory[begin : self._taken].reshape(coordinates, vertices, self.strands)
-
-
-class _Scratch(threading.local):
-    """The last room of each thread, for a groom's chunks are alike: memory that is asked for anew each time costs more
-    than what is computed in it.
-    """
-
-    room: _Room | None = None
-
-    def arrays(self, vertices: int, strands: int) -> _Room:
-        """Room for so many; what is in it is anything."""
-        room = self.room
-        if room is None or (room.vertices, room.strands) != (vertices, strands):
-            room = _Room(np.empty(_Room.SIZE * vertices * strands, np.float32), vertices, strands)
-            self.room = room if vertices * strands <= KEPT else None
-        return room
-
-
-_scratch = _Scratch()
+    return np.einsum("cvn,cvn->vn", a, b, out=out)

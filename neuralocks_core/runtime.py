@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
+from threading import Lock
 
 import numpy as np
 
@@ -77,8 +78,7 @@ class StrandModel:
 
     def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
         """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds `start` on."""
-        chunks = [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
-        for _ in self.map(function, chunks):
+        for _ in self.map(function, chunks(count, start)):
             pass
 
     def map(self, function: Callable, items) -> Iterable:
@@ -103,6 +103,7 @@ class StrandSession:
         self._strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
         self._anchor = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None
+        self._turn = Lock()
 
     def anchor(self, vector: np.ndarray) -> None:
         """Measure an anchored model's answers from this boundary vector: the bind pose, held, with the
@@ -172,7 +173,7 @@ class StrandSession:
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
-        computed it and still has it in its cache.
+        computed it and still has it in its cache, one at a time.
         """
         (frame, gather), valid = self._frame(vector), self.strands.valid
 
@@ -182,7 +183,9 @@ class StrandSession:
                 gather(values, chunk)
             if not valid[chunk].all():
                 values[~valid[chunk]] = 0
-            function(chunk, values.reshape(-1, K, 3))
+            # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
+            with self._turn:
+                function(chunk, values.reshape(-1, K, 3))
 
         self.model.by_chunk(work, len(self.strands.rest))
 
@@ -205,6 +208,11 @@ class StrandSession:
 
         self.model.by_chunk(work, len(result))
         return result
+
+
+def chunks(count: int, start: int = 0) -> list[slice]:
+    """The chunks of `count` strands, from the one that holds `start` on."""
+    return [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
 
 
 def graph_session(file: model_file.ModelFile, name: str):

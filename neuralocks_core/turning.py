@@ -6,6 +6,45 @@ from __future__ import annotations
 import numpy as np
 
 
+class Coils:
+    """Own vertices of strands that are finer than the network's vertices.
+
+    Args:
+        rest: (N, K, 3) [m], the network's vertices.
+        own: (P, 3) [m] own vertices, same axes.
+        strand: (P,) which strand each belongs to.
+        place: (P,) in [0, K - 1], position along it in network segments.
+        fine: (N,) bool, which strands are meant.
+    """
+
+    def __init__(self, rest, own, strand, place, fine) -> None:
+        vertices = rest.shape[1]
+        chosen = fine[strand]
+        own, strand, place = own[chosen], (np.cumsum(fine) - 1)[strand[chosen]], place[chosen]
+        self._rest = np.ascontiguousarray(rest[fine])
+        # How many of them come before a strand of all N, and before each of their own vertices.
+        self._before = np.concatenate([[0], np.cumsum(fine)])
+        self._ends = np.searchsorted(strand, np.arange(len(self._rest) + 1))
+        segment = np.clip(place.astype(np.int32), 0, vertices - 2)
+        share = np.clip(place - segment, 0.0, 1.0)[:, None]
+        flat, at = self._rest.reshape(-1, 3).astype(np.float64), strand * vertices + segment
+        self._residual = (own - (flat[at] * (1.0 - share) + flat[at + 1] * share)).astype(np.float32)
+        self._share, self._segment = share.astype(np.float32), at.astype(np.int32)
+
+    def moved(self, displacement: np.ndarray, start: int) -> np.ndarray:
+        """Displacement (P', 3) [m] of their own vertices.
+
+        Args:
+            displacement: (n, K, 3) [m] of the network's vertices of the next n of them.
+            start: the strand of all N from which on they are counted.
+        """
+        first = self._before[start]
+        last = first + len(displacement)
+        own = slice(self._ends[first], self._ends[last])
+        segment = self._segment[own] - np.int32(first * displacement.shape[1])
+        return turned(self._rest[first:last], displacement, segment, self._share[own], self._residual[own])
+
+
 def turned(
     rest: np.ndarray, displacement: np.ndarray, segment: np.ndarray, weight: np.ndarray, residual: np.ndarray
 ) -> np.ndarray:

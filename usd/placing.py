@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from neuralocks_core.carrier import Carrier
+from neuralocks_core.carrier import Carrier, Placing
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.locks import lock_of_roots
@@ -35,7 +35,7 @@ class GroomPlacer:
         carriers: one for every PART strands.
         ends: (S + 1,) first point of each strand, and the number of all.
         same_size: whether every strand has as many points as the network gives it.
-        centre: (3,) float32 [m], the head's own place in bind world.
+        centre: (3,) [m], the head's own place in bind world.
     """
 
     def __init__(self, item: StageGroom):
@@ -47,7 +47,7 @@ class GroomPlacer:
         self.carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
         self.ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
         self.same_size = bool((item.groom.counts == self.strands.rest.shape[1]).all())
-        self.centre = character.canonical_to_bind[:3, 3].astype(np.float32)
+        self.centre = character.canonical_to_bind[:3, 3]
         low, high = item.groom.points.min(axis=0), item.groom.points.max(axis=0)
         self._corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
 
@@ -95,8 +95,7 @@ class Placed:
 
     def __init__(self, placer: GroomPlacer, to_local: np.ndarray, rest: np.ndarray | None, points: np.ndarray):
         self._placer, self._rest = placer, rest
-        self._linear = to_local[:3, :3].astype(np.float32)
-        self._origin = (to_local[:3, :3] @ placer.centre.astype(float) + to_local[:3, 3]).astype(np.float32)
+        self._placing = Placing.of(to_local, placer.centre)
         self.points = points
 
     def put(self, strands: slice, displacement: np.ndarray) -> None:
@@ -106,18 +105,11 @@ class Placed:
             strands: which.
             displacement: (n, 24, 3) float32 [m], canonical.
         """
-        placer = self._placer
+        placer, part = self._placer, strands.start // PART
         here = slice(placer.ends[strands.start], placer.ends[strands.stop])
         within = slice(strands.start % PART, strands.start % PART + strands.stop - strands.start)
-        out = placer.carriers[strands.start // PART].carry(displacement, out=self.points[here], strands=within)
-        if self._rest is not None:
-            # What the network did not move keeps the author's own bits.
-            out -= placer.item.groom.points[here]
-            out[:] = self._rest[here] + out @ self._linear.T
-        else:
-            out -= placer.centre
-            out[:] = out @ self._linear.T
-            out += self._origin
+        onto = None if self._rest is None else self._rest[placer.ends[part * PART] :]
+        placer.carriers[part].carry(displacement, self.points[here], within, self._placing, onto)
 
 
 def _parts(groom: Groom) -> list[Groom]:

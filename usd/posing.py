@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strands import StrandSet
 
 from .memory import give_back
@@ -69,7 +69,8 @@ class GroomPoser:
         moved = self.moved(time_code)
         # Each chunk's points take the place of its displacement where they are as many.
         placed = self._placer.at(time_code, joints, moved.reshape(-1, 3) if self._placer.same_size else None)
-        self._model.by_chunk(lambda strands: placed.put(strands, moved[strands].copy()), len(moved))
+        for strands in chunks(len(moved)):
+            placed.put(strands, moved[strands].copy())
         return placed.points
 
     def moved(self, time_code: float) -> np.ndarray:

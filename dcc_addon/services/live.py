@@ -4,19 +4,15 @@
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.carrier import Carrier
+from neuralocks_core.carrier import Carrier, Placing
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.resolve import Resolver
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strands import strands_on
 
 from .history import SampledBoundary
-
-ROWS = 24_576
-"""Points multiplied by a 3x3 matrix at a time: so few stay on their core instead of waking BLAS threads that wait for
-each other."""
 
 
 class LiveHair:
@@ -50,9 +46,7 @@ class LiveHair:
         self._shown: object = b""
         self._held = b""
         self._ends = np.concatenate([groom.starts, [len(groom.points)]])
-        # About the head's own place, so that coordinates far from the origin cost no digits.
-        self._centre = character.canonical_to_bind[:3, 3].astype(np.float32)
-        self._about_head = groom.points - self._centre
+        self._centre = character.canonical_to_bind[:3, 3]
 
     def follow(self, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
@@ -94,21 +88,16 @@ class LiveHair:
         if wanted == self._shown:
             return self._points
         self._shown = b""  # until it is done
-        linear = np.ascontiguousarray(matrix[:3, :3].T, np.float32)
-        origin = np.empty((min(ROWS, len(self._points)), 3), np.float32)
-        origin[:] = matrix[:3, :3] @ self._centre.astype(float) + matrix[:3, 3]
+        placing = Placing.of(matrix, self._centre)
 
         def place(strands: slice, displacement: np.ndarray) -> None:
-            begin, end = self._ends[strands.start], self._ends[strands.stop]
-            moved = self._carrier.carry(displacement, strands=strands, onto=self._about_head)
-            for low in range(begin, end, ROWS):
-                out = self._points[low : min(low + ROWS, end)]
-                np.matmul(moved[low - begin : low - begin + ROWS], linear, out=out)
-                out += origin[: len(out)]
+            out = self._points[self._ends[strands.start] : self._ends[strands.stop]]
+            self._carrier.carry(displacement, out, strands, placing)
 
         if resolve and self.character.body is not None:
             free = self._free(vector, joints, self._clip.shape_at([time])[0])
-            self.model.by_chunk(lambda strands: place(strands, free[strands]), len(free))
+            for strands in chunks(len(free)):
+                place(strands, free[strands])
         else:
             self._session.each(vector, place)
         self._shown = wanted

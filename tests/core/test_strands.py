@@ -9,7 +9,7 @@ from neuralocks_core.arclength import arc_lengths
 from neuralocks_core.carrier import Carrier
 from neuralocks_core.centreline import centre_lines
 from neuralocks_core.groom import Groom
-from neuralocks_core.lengths import keep_lengths
+from neuralocks_core.lengths import keep_lengths_of_any
 from neuralocks_core.spans import LEFT_OVER
 from neuralocks_core.strands import K, root_frames, root_uv, scalp_local, strand_set
 
@@ -101,7 +101,7 @@ def test_rigid_motion_is_carried_exactly(make):
     # segment, which the network never moves.
     off = np.linalg.norm(carried - expected, axis=1)
     fine = np.concatenate([block._fine for block in carrier._blocks])[groom.strand_of_point]
-    residual = np.concatenate([block._residual for block in carrier._blocks])
+    residual = np.concatenate([block._coils._residual for block in carrier._blocks if block._coils])
     arc, length = arc_lengths(groom)
     further = 0.02 * length[groom.strand_of_point][fine]
     assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(residual, axis=1) + further).all()
@@ -120,7 +120,7 @@ def test_corners_of_a_smooth_groom_turn_with_it():
     groom = Groom("/arcs", (arcs + [0.0, 1.7, 0.05]).reshape(-1, 3), np.full(20, 16))
     strands = strand_set(groom, ORIGIN, CENTRE)
     carrier = Carrier(groom, strands)
-    assert not carrier._blocks[0]._fine.any()
+    assert carrier._blocks[0]._coils is None
     edges = np.diff(strands.rest, axis=1)
     more = np.linspace(0.0, 1.6, K - 1)[None, :] * np.linspace(0.7, 1.3, 20)[:, None]
     more[:, 0] = 0.0
@@ -171,11 +171,11 @@ def test_any_strand_keeps_its_lengths_and_its_root():
     moved = (rng.normal(size=rest.shape) * 0.02).astype(np.float32)
     together, alone = moved.copy(), moved.copy()
     smooth = rng.random(len(counts)) < 0.5
-    keep_lengths(rest, together, counts, smooth)
+    keep_lengths_of_any(rest.T, together.T, counts, smooth)
     starts = np.cumsum(counts) - counts
     for i, (start, count) in enumerate(zip(starts, counts)):
         here = slice(start, start + count)
-        keep_lengths(rest[here], alone[here], counts[i : i + 1], smooth[i : i + 1])
+        keep_lengths_of_any(rest[here].T, alone[here].T, counts[i : i + 1], smooth[i : i + 1])
     assert together.tobytes() == alone.tobytes()
     assert np.array_equal(together[starts], moved[starts])
     inner = np.setdiff1d(np.arange(len(rest) - 1), starts[1:] - 1)

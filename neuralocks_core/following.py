@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a groom's own vertices follow the network's.
+
+Coordinates come first in arrays here, (3, ...): three to a row leave a processor's vectors mostly empty.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import spans
+from .lengths import keep_lengths, keep_lengths_of_any
+from .scratch import Scratch
+from .turning import Coils
+
+WIDEST = spans.NODES + 4
+"""Most network vertices among which the same own vertex of several strands may find its own."""
+
+_scratch, _network = Scratch(), Scratch()
+
+
+class Following:
+    """Displacements of the own vertices of some strands.
+
+    Means of the network's vertices (`spans`), turned with them where strands are finer than these (`turning`), with
+    their lengths kept (`lengths`).
+
+    Args:
+        rest: (N, K, 3) [m], the network's vertices.
+        valid: (N,) bool, strands that move.
+        own: (P, 3) [m] own vertices, same axes.
+        counts: (N,) how many of these each strand has.
+        place: (P,) in [0, K - 1], position along the strand in network segments.
+    """
+
+    def __init__(self, rest, valid, own, counts, place) -> None:
+        strand = np.repeat(np.arange(len(counts)), counts)
+        first, weights, fine = spans.weights(rest, own, strand, place)
+        self._fine = fine & valid
+        self._ends = np.concatenate([[0], np.cumsum(counts)])
+        # As many vertices in each strand, each at about the same place in all of them, is what grooming tools write.
+        grid = first.reshape(len(counts), -1) if counts[0] > 1 and (counts == counts[0]).all() else None
+        self._each = None if grid is None or np.ptp(grid, axis=0).max() > WIDEST - spans.NODES else int(counts[0])
+        self._means = _Varied(first, weights, strand, rest.shape[1]) if self._each is None else _Alike(grid, weights)
+        self._coils = Coils(rest, own, strand, place, self._fine) if self._fine.any() else None
+
+    def columns(self, points: np.ndarray) -> np.ndarray:
+        """The layout in which `moved` works, a view of points (P', 3) of these strands: (3, V, N) of strands of V
+        vertices, else (3, P').
+        """
+        return points.T if self._each is None else points.reshape(-1, self._each, 3).transpose(2, 1, 0)
+
+    def moved(self, displacement: np.ndarray, start: int, points: np.ndarray) -> np.ndarray:
+        """Displacement of own vertices, laid out as `columns` has it; valid until this thread's next call.
+
+        Args:
+            displacement: (n, K, 3) [m] of the network's vertices of the strands from `start` on.
+            points: own vertices of these strands at rest, as `columns` lays them out.
+        """
+        stop = start + len(displacement)
+        fine, ends = self._fine[start:stop], self._ends[start : stop + 1]
+        (result,) = _scratch.arrays(points.shape)
+        if not fine.all():
+            self._means.put(displacement, start, slice(ends[0], ends[-1]), result)
+        counts = np.diff(ends)
+        if fine.any():
+            coils = fine if self._each else np.repeat(fine, counts)
+            result[..., coils] = self.columns(self._coils.moved(displacement[fine], start))
+        if self._each:
+            keep_lengths(points, result, ~fine)
+        else:
+            keep_lengths_of_any(points, result, counts, ~fine)
+        return result
+
+
+class _Alike:
+    """Means in strands of V vertices each.
+
+    Args:
+        first: (N, V) first network vertex that an own vertex is a mean of.
+        weights: (N V, spans.NODES) of it and the next ones.
+    """
+
+    def __init__(self, first: np.ndarray, weights: np.ndarray) -> None:
+        weights = weights.reshape(*first.shape, spans.NODES)
+        self._low = first.min(axis=0)
+        width = int((first - self._low).max()) + spans.NODES
+        self._weights = np.zeros((width, *first.T.shape), np.float32)
+        for node in range(spans.NODES):
+            np.put_along_axis(self._weights, (first - self._low + node).T[None], weights[..., node].T[None], 0)
+
+    def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
+        """Into `result` (3, V, n), of strands from `start` on."""
+        count, vertices = displacement.shape[:2]
+        network, part = _network.arrays((3, vertices, count), result.shape)
+        network[:] = displacement.transpose(2, 1, 0)
+        for node, weight in enumerate(self._weights[:, :, start : start + count]):
+            moved = part if node else result
+            # Beyond the last vertex of the network the weight is zero.
+            network.take(self._low + node, axis=1, out=moved, mode="clip")
+            moved *= weight
+            if node:
+                result += part
+
+
+class _Varied:
+    """Means in strands of any numbers of vertices, at any places.
+
+    Args:
+        first, weights: see `spans.weights`.
+        strand: (P,) which strand each own vertex belongs to.
+        vertices: of the network.
+    """
+
+    def __init__(self, first: np.ndarray, weights: np.ndarray, strand: np.ndarray, vertices: int) -> None:
+        # Numbers within a block are small: two bytes for each of the groom's points instead of four.
+        self._first = (first + strand * vertices).astype(np.uint16)
+        self._weights = np.ascontiguousarray(weights.T)
+
+    def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
+        """Into `result` (3, P'), own vertices `own` of the strands from `start` on."""
+        first, weights = self._first[own].astype(np.intp), self._weights[:, own]
+        first -= start * displacement.shape[1]
+        part, flat = np.empty(len(first), np.float32), displacement.reshape(-1, 3)
+        for axis, moved in enumerate(result):
+            along = np.ascontiguousarray(flat[:, axis])
+            along.take(first, out=moved, mode="clip")
+            moved *= weights[0]
+            for node in range(1, spans.NODES):
+                along[node:].take(first, out=part, mode="clip")
+                part *= weights[node]
+                moved += part
