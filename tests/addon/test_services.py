@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dcc_addon import build
-from dcc_addon.services import axes, bones, card, names, rig, training_job, words
+from dcc_addon.services import axes, bones, card, names, panel_errors, rig, training_job
 from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core import model
@@ -188,10 +188,10 @@ def test_errors_name_what_the_panel_has(tmp_path):
         with pytest.raises(NeuralocksError) as error:
             bones.chains_of(character, patterns)
         assert "--" in str(error.value)
-        assert "--" not in (said := words.for_the_panel(str(error.value))) and "neuralocks " not in said, said
+        assert "--" not in (said := panel_errors.for_the_panel(str(error.value))) and "neuralocks " not in said, said
     with pytest.raises(NeuralocksError) as error:
         model.read(tmp_path / "nowhere.neuralocks", "strands")
-    assert "--" not in words.for_the_panel(str(error.value))
+    assert "--" not in panel_errors.for_the_panel(str(error.value))
 
 
 def test_card_fits_a_sidebar():
