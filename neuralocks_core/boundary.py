@@ -127,6 +127,10 @@ class BoundarySampler:
     Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the accelerations of
     the motion and not those of its polyline. Before the clip the head goes on with its first velocity and does not
     turn; a loop is continued on both sides.
+
+    Attributes:
+        joints: joint indices of the head, the upper chest and the pose joints (n + 2,).
+        stance: what each pose joint's own bind pose is turned by, (n, 3, 3).
     """
 
     GRAVITY_LIMIT = 6.0
@@ -142,14 +146,14 @@ class BoundarySampler:
 
         self.spec, self.character, self.clip = spec, character, clip
         humanoid = character.humanoid
-        self._indices = [
+        self.joints = [
             character.head,
             humanoid.nearest("upper_chest"),
             *(humanoid.nearest(n) for n in spec.pose_joints),
         ]
-        self._stance = np.stack([_stance(character, name) for name in spec.pose_joints])
+        self.stance = np.stack([_stance(character, name) for name in spec.pose_joints])
         times, joints = _extended(clip)
-        rotations = character.relative_rotations(joints, self._indices)
+        rotations = character.relative_rotations(joints, self.joints)
         quaternions = rotation.to_quaternion(rotations)
         flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
         quaternions[1:] *= flips[..., None]
@@ -180,11 +184,11 @@ class BoundarySampler:
         lags = spec.dt * np.arange(spec.steps + 2)
         position, turns = self._sample((times[:, None] - lags).ravel())
         position, turns = position.reshape(len(times), -1, 3), turns.reshape(len(times), len(lags), -1, 3, 3)
-        now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self._indices)
+        now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)
         result = np.zeros((len(times), spec.size), np.float32)
         parts = spec.slices
         head = now[:, 0]
-        relative = np.swapaxes(head[:, None], -1, -2) @ now[:, 2:] @ self._stance
+        relative = np.swapaxes(head[:, None], -1, -2) @ now[:, 2:] @ self.stance
         result[:, parts["pose"]] = relative[..., :2].swapaxes(-1, -2).reshape(len(times), -1)
         static = np.einsum("nji,j->ni", head, GRAVITY / 9.81)
         result[:, parts["gravity"]] = static
@@ -198,7 +202,7 @@ class BoundarySampler:
         """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured from."""
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
-        result[parts["pose"]] = self._stance[..., :2].swapaxes(-1, -2).ravel()
+        result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
         result[parts["gravity"]] = GRAVITY / 9.81
         result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
         result[parts["material"]] = material

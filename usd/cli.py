@@ -12,7 +12,7 @@ from .cli_bake import bake_command, simulate_command
 from .cli_rig import app as rig_app
 from .cli_train import train_command
 from .command import command_of, note, print_json
-from .options import AsJson, Head, Joints, Model, Out, Skeleton, numbers, pairs
+from .options import AsJson, Grooms, Head, Joints, Model, Out, Skeleton, numbers, pairs
 
 app = typer.Typer(
     name="neuralocks",
@@ -140,13 +140,20 @@ def export_command(
     model: Annotated[
         Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
     ] = None,
+    shot: Annotated[
+        Path | None, typer.Option(help="USD stage: also write what no frame changes of each of its grooms.")
+    ] = None,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
 ) -> None:
     """Unpack a model into plain ONNX files and a description of their inputs."""
     from neuralocks_core.model import shipped
 
     from .export import export_model
 
-    for path in export_model(model or shipped("strands"), out):
+    model = model or shipped("strands")
+    for path in export_model(model, out, shot, grooms=groom, skeleton=skeleton, head=head):
         typer.echo(str(path))
 
 

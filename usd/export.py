@@ -25,15 +25,34 @@ STRANDS = {
 }
 
 
-def export_model(model, folder) -> list[Path]:
+BOUNDARY = {
+    "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), (3, 3) without "
+    "scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m",
+    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j",
+    "gravity": "T(R_head(t)) g / 9.81",
+    "shape": "ten lengths of the bind body [m], as in `held`",
+    "material": "logarithms of bend / 0.001, weight, damping / 10; 0",
+    "history": "step k = 0 ... steps - 1 is 9 numbers: f_k, s_k, c_k. With p the head joint's place and t_k = t - k dt: "
+    "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
+    "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
+    "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
+    "its `bin weights`. In a held pose all is 0. A bake reads poses between samples from a natural cubic spline of the place "
+    "and of the quaternion's components; before the first sample the head goes on in a straight line and does not turn",
+}
+"""How each part of the boundary vector is made, for the default kind of history."""
+
+
+def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None) -> list[Path]:
     """Write the graphs and `description.json` of a model file into a folder.
 
     Args:
         model: path of a `.neuralocks` file.
         folder: made if it does not exist; files of the same names are replaced.
+        shot: a USD file; of each of its grooms, what no frame changes (`groom_tables`) is written, too.
+        grooms, skeleton, head: as for `bake`.
 
     Returns:
-        The files written.
+        The files written, `description.json` among them.
 
     Raises:
         NeuralocksError: the model cannot be read or the folder not be written.
@@ -52,12 +71,21 @@ def export_model(model, folder) -> list[Path]:
             "parts": parts,
             "pose joints": spec.pose_joints,
             "shape": MEASURES,
+            "steps": spec.steps,
+            "bin weights": [float(weight) for weight in spec.bin_weights],
+            "how": BOUNDARY,
         }
+    tables = {}
+    if shot is not None:
+        from .groom_tables import ARRAYS, export_grooms
+
+        tables = export_grooms(shot, model, folder, grooms=grooms, skeleton=skeleton, head=head)
+        description["grooms"] = {"arrays": ARRAYS, "files": tables}
     files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
     with ExitStack() as all_or_none:
         for name, data in files.items():
             all_or_none.enter_context(atomic_write(folder / name)).write_bytes(data)
-    return [folder / name for name in files]
+    return [folder / name for name in (*files, *tables)]
 
 
 def _graphs(file: model_file.ModelFile) -> dict:

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The strand network in a runtime of one's own: python examples/strand_runtime.py FOLDER SHOT BAKED
+
+FOLDER is what `neuralocks export -o FOLDER --shot SHOT` wrote, BAKED what `neuralocks bake SHOT -o BAKED --no-resolve`
+did. Nothing of Neuralocks is imported: this is a worked example of `description.json` for whoever writes the same in an
+engine, and prints how far its strands lie from the bake's. The stage must be in metres, Y up, and the groom's strands of
+24 vertices even in arc length, since those of the network are compared.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+from pxr import Usd, UsdGeom, UsdSkel
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+GRAVITY = np.array([0.0, -9.81, 0.0])
+
+
+class Runtime:
+    """One groom: what no frame changes is read once; `strands` makes a frame."""
+
+    def __init__(self, folder: Path, name: str):
+        described = json.loads((folder / "description.json").read_text())
+        self.model, self.parts = described["model"], described["boundary vector"]["parts"]
+        self.weights = np.array(described["boundary vector"]["bin weights"])
+        self.joints = described["grooms"]["files"][name]["joints"]
+        self.fixed = dict(np.load(folder / name))
+        self.frame, self.tail = (onnxruntime.InferenceSession(folder / f"{n}.onnx") for n in ("frame", "tail"))
+
+    def turns(self, rotations: np.ndarray) -> np.ndarray:
+        """(T, n, 3, 3) world rotations of the joints named, since the bind pose."""
+        return rotations @ np.swapaxes(self.fixed["bind"], -1, -2) @ self.fixed["facing"].T
+
+    def vector(self, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """The boundary vector (F,) of the newest of some moments, each the model's dt before the one before it.
+
+        Args:
+            places: (steps + 2, 3) the head joint's, newest first [m].
+            turns: (steps + 2, n, 3, 3) as `turns` gives them; head, upper chest, pose joints.
+        """
+        dt, bins = self.model["boundary"]["dt"], self.model["boundary"]["bins"]
+        result = self.fixed["held"].copy()  # shape and material stay as they are
+        head = turns[0, 0]
+        pose = head.T @ turns[0, 2:] @ self.fixed["stance"]
+        result[slice(*self.parts["pose"])] = pose[:, :, :2].transpose(0, 2, 1).ravel()
+        gravity = head.T @ GRAVITY / 9.81
+        result[slice(*self.parts["gravity"])] = gravity
+        to_head = turns[:-2, 0].transpose(0, 2, 1)
+        push = (places[:-2] - 2 * places[1:-1] + places[2:]) / dt**2
+        steps = [limited((to_head @ (GRAVITY - push)[..., None])[..., 0] / 9.81 - gravity, 6)]
+        for joint in (0, 1):
+            turn = Rotation.from_matrix(turns[:-2, joint] @ turns[1:-1, joint].transpose(0, 2, 1)).as_rotvec()
+            steps.append(limited((to_head @ turn[..., None])[..., 0] / dt, 25))
+        ends = np.cumsum(bins)
+        means = [np.concatenate(steps, 1)[end - size : end].mean(0) for end, size in zip(ends, bins)]
+        result[slice(*self.parts["history"])] = (np.array(means) * self.weights[:, None]).ravel()
+        return result
+
+    def strands(self, vector: np.ndarray, head: np.ndarray) -> np.ndarray:
+        """World points (S, 24, 3) [m] for a boundary vector and the head joint's world transform (4, 4)."""
+        frame = {o.name: v for o, v in zip(self.frame.get_outputs(), self.frame.run(None, {"frame": vector[None]}))}
+        same = {name: self.fixed[name] for name in ("strand_part", "anchor", "edges")}
+        moved = self.tail.run(["displacement"], same | frame)[0].reshape(-1, 24, 3) * self.fixed["valid"][:, None, None]
+        to_world = head @ self.fixed["canonical_to_head"]
+        return (self.fixed["rest"] + moved) @ to_world[:3, :3].T + to_world[:3, 3]
+
+
+def limited(vectors: np.ndarray, longest: float) -> np.ndarray:
+    """Vectors (n, 3), those beyond a length cut to it."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors * np.minimum(1, longest / np.maximum(length, 1e-9))
+
+
+class Motion:
+    """Joints' world transforms at any time, as a bake reads them from a stage; an engine has its own way."""
+
+    def __init__(self, stage: Usd.Stage, joints: list[str]):
+        prim = next(p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton))
+        query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(prim))
+        codes = query.GetAnimQuery().GetJointTransformTimeSamples()
+        pick = [list(query.GetJointOrder()).index(joint) for joint in joints]
+        world = []
+        for code in codes:
+            place = UsdGeom.XformCache(code)
+            local = np.array(query.ComputeJointSkelTransforms(place.GetTime()))[pick]
+            world.append((local @ np.array(place.GetLocalToWorldTransform(prim))).transpose(0, 2, 1))
+        self.times, self.joints = np.array(codes) / stage.GetTimeCodesPerSecond(), np.array(world)
+        rotations = (
+            Rotation.from_matrix(self.joints[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
+        )
+        for last, q in zip(rotations, rotations[1:]):
+            q *= np.where((last * q).sum(-1, keepdims=True) < 0, -1, 1)
+        self._curve = CubicSpline(self.times, self.joints[:, 0, :3, 3], bc_type="natural")
+        self._turn = CubicSpline(self.times, rotations, bc_type="natural")
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; before the clip straight on."""
+        inside = np.maximum(times, self.times[0])
+        places = self._curve(inside) + (times - inside)[:, None] * self._curve(self.times[0], 1)
+        turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()
+        return places, turns.reshape(len(times), -1, 3, 3)
+
+
+def largest_difference(folder: Path, shot: Path, baked: Path) -> float:
+    """How far this runtime's strands lie from a bake's at most [m]."""
+    files = json.loads((folder / "description.json").read_text())["grooms"]["files"]
+    stage, result, worst = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), 0.0
+    for name, facts in files.items():
+        runtime, motion = Runtime(folder, name), Motion(stage, facts["joints"])
+        boundary = runtime.model["boundary"]
+        curves = UsdGeom.BasisCurves(result.GetPrimAtPath(facts["prim"]))
+        for code in curves.GetPointsAttr().GetTimeSamples():
+            now = code / stage.GetTimeCodesPerSecond()
+            places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
+            head = motion.joints[np.abs(motion.times - now).argmin(), 0]
+            ours = runtime.strands(runtime.vector(places, runtime.turns(rotations)), head)
+            to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim()))
+            theirs = np.array(curves.GetPointsAttr().Get(code)) @ to_world[:3, :3] + to_world[3, :3]
+            worst = max(worst, float(np.linalg.norm(ours.reshape(-1, 3) - theirs, axis=1).max()))
+    return worst
+
+
+if __name__ == "__main__":
+    print(f"{largest_difference(*map(Path, sys.argv[1:4])):.2e} m at most from the bake")

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is exported, and what is said about it, is enough to have a bake's hair without this program."""
+
+import json
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, Vt
+
+from examples.strand_runtime import largest_difference
+from neuralocks_core import model as model_file
+from tests.usd.shots import Recipe, strand_points, write_shot
+from usd.bake import bake
+from usd.export import export_model
+
+
+@pytest.fixture
+def shot(tmp_path):
+    """A turned character that was moved away, with straight hair of 24 vertices."""
+    turned = np.array([[0.0, 0, 1, 3], [0, 1, 0, 0.5], [-1, 0, 0, -2], [0, 0, 0, 1]])
+    path = write_shot(tmp_path, Recipe(frames=40, vertices=2, strands=60, place=turned))
+    stage = Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    ends = strand_points(60, 2)
+    points = ends[:, :1] + np.linspace(0, 1, 24)[None, :, None] * np.diff(ends, axis=1)
+    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    curves.GetCurveVertexCountsAttr().Set([24] * 60)
+    stage.Save()
+    return path
+
+
+def test_a_runtime_written_from_the_description_has_the_hair_of_the_bake(tmp_path, shot):
+    model = model_file.shipped("strands")
+    files = export_model(model, tmp_path / "onnx", shot)
+    assert {path.name for path in files} >= {"description.json", "tail.onnx", "Hero_Hair.npz"}
+    bake(shot, tmp_path / "baked.usdc", model, frames="1:40:13", resolve=False)
+    assert largest_difference(tmp_path / "onnx", shot, tmp_path / "baked.usdc") < 1e-5
+
+
+def test_every_array_of_a_groom_is_described(tmp_path, shot):
+    export_model(model_file.shipped("strands"), tmp_path, shot)
+    described = json.loads((tmp_path / "description.json").read_text())["grooms"]
+    with np.load(tmp_path / "Hero_Hair.npz") as arrays:
+        assert set(arrays) == set(described["arrays"])
+        assert all(f"{arrays[name].dtype}" in text or name == "valid" for name, text in described["arrays"].items())
+    facts = described["files"]["Hero_Hair.npz"]
+    assert (facts["prim"], facts["strands"], len(facts["joints"])) == ("/Hero/Hair", 60, 8)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an engine needs of a shot's grooms beside the graphs: everything about each strand that no frame changes.
+
+Locks, scalp frames, resampling and body measures are worked out once, here, so that a runtime elsewhere makes the boundary
+vector, runs two graphs a frame, and gets the very hair that a bake has.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core import model as model_file
+from neuralocks_core.files import atomic_write
+from neuralocks_core.rotation import rotation_part
+from neuralocks_core.runtime import StrandModel, strand_inputs
+from neuralocks_core.strands import StrandSet, scalp_local
+
+from .placing import GroomPlacer
+from .stage import StageGroom, read_shot
+
+ARRAYS = {
+    "rest": "(S, 24, 3) float32, the strands at rest in canonical space [m]: even in arc length of the author's, and where "
+    "these wind finer, the line that they wind around. A bake's points are these strands where a groom is already so; any "
+    "other groom's own points follow them",
+    "valid": "(S,) bool, false where a strand is one point: its displacement is 0",
+    "strand_part": "(S, 256) float32, input of tail.onnx",
+    "anchor": "(S, 72) float32, input of tail.onnx, for the default material and the body shape of the first frame: "
+    "`offsets` of tail.onnx with `anchor` zero and the frame `held`",
+    "edges": "(S, 72) float32, input of tail.onnx",
+    "held": "(F,) float32, boundary vector of the bind pose, held",
+    "facing": "(3, 3) float64, rotation from bind-world to canonical axes",
+    "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint: its world transform times this "
+    "takes strands to the world",
+    "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints named, in their order",
+    "stance": "(p, 3, 3) float64, of the pose joints in their order",
+}
+"""Arrays of a groom's file -> what they are."""
+
+
+def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None) -> dict[str, dict]:
+    """Write `NAME.npz` with ARRAYS of each groom of a shot.
+
+    Args:
+        shot: the USD file.
+        model: path of the strand model.
+        folder: made if it does not exist.
+        grooms, skeleton, head: as for `bake`.
+
+    Returns:
+        File name -> {"prim", "strands", "joints": joint paths of head, upper chest and the pose joints}.
+
+    Raises:
+        NeuralocksError: what stops a bake of the shot, or the folder cannot be written.
+    """
+    runner = StrandModel(model_file.read(model, "strands"))
+    read, written = read_shot(shot, grooms, skeleton, head), {}
+    for item in read.grooms:
+        stem = re.sub(r"\W+", "_", item.path.strip("/"))
+        name = f"{stem}.npz" if f"{stem}.npz" not in written else f"{stem}_{len(written)}.npz"
+        arrays, joints = tables(item, runner)
+        with atomic_write(Path(folder) / name) as part:
+            np.savez(part, **arrays)
+        written[name] = {"prim": item.path, "strands": len(arrays["rest"]), "joints": joints}
+    return written
+
+
+def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], list[str]]:
+    """ARRAYS of one groom, and the joints whose motion its boundary vector is made of."""
+    character = item.attachment.character
+    sampler = model.sampler(character, item.attachment.rig.clip)
+    strands = GroomPlacer(item).strands
+    held = sampler.held_bind()
+    skeleton = character.skeleton
+    arrays = _of_strands(strands, model, held) | {
+        "held": held,
+        "facing": character.facing,
+        "canonical_to_head": character.inverse_bind[character.head] @ character.canonical_to_bind,
+        "bind": rotation_part(skeleton.bind[sampler.joints], "bind pose"),
+        "stance": sampler.stance,
+    }
+    return arrays, [skeleton.names[joint] for joint in sampler.joints]
+
+
+def _of_strands(strands: StrandSet, model: StrandModel, held: np.ndarray) -> dict[str, np.ndarray]:
+    count = len(strands.rest)
+    shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
+    codes = model.run("encoder.onnx", "code", shape=shape)
+    strand_part = model.run("strand.onnx", "strand_part", strand=strand_inputs(strands, codes))
+    edges = np.zeros((count, shape.shape[1]), np.float32)
+    edges[:, 3:] = np.diff(strands.rest, axis=1).reshape(count, -1)
+    anchor = np.zeros_like(edges)
+    if model.anchored:
+        anchor = model.run(
+            "tail.onnx", "offsets", strand_part=strand_part, anchor=anchor, edges=edges, **model.frame(held)
+        )
+    return {"rest": strands.rest, "valid": strands.valid, "strand_part": strand_part, "anchor": anchor, "edges": edges}
