@@ -19,6 +19,8 @@ from .surface import SkinnedMesh, bound_meshes, merged_body
 
 LOOP_GAP = 2.0
 """Turn of a joint from the last sample of a loop to its first [degrees] that is worth a word."""
+CLOSE = 1.5 / 24
+"""Samples no farther apart than this [s] are those of every frame, whatever the rate of the stage they come to."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def read_rig(
     """
     source = JointSource(prim)
     notes = source.notes
-    time_codes = _time_codes(source, border.frame)
+    time_codes = _time_codes(source, border)
     posed = source.posed(time_codes)
     meshes = bound_meshes(stage, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
@@ -128,13 +130,9 @@ def read_rig(
     return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes, by_hand)
 
 
-def _time_codes(source: JointSource, frame: float) -> np.ndarray:
-    """Every frame of the shot, or between the first and the last authored sample, and the authored ones.
-
-    Args:
-        source: the skeleton.
-        frame: time codes from one frame to the next; where that is one, frames are whole numbers.
-    """
+def _time_codes(source: JointSource, border: Border) -> np.ndarray:
+    """The authored samples, and where they are not close, every frame of the shot or between the first and the last."""
+    frame = border.frame
     samples = source.samples
     if not samples:
         return np.zeros(1)
@@ -154,9 +152,11 @@ def _time_codes(source: JointSource, frame: float) -> np.ndarray:
         )
     begin = np.ceil(first) if frame == 1 else first
     frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
-    every = np.unique(np.concatenate([frames, samples]))
-    # A frame and a sample at the same time, up to rounding, are one.
-    return every[np.append(True, np.diff(every) > 1e-6 * frame)]
+    samples = np.unique(samples)
+    # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
+    near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
+    wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
+    return np.unique(np.concatenate([frames[wide], samples]))
 
 
 def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) -> np.ndarray:

@@ -161,6 +161,27 @@ def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
     assert np.isclose(shot.rigs[0].clip.end - shot.rigs[0].clip.start, 1.0)
 
 
+def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_path):
+    """A layer of 24 frames a second in a shot of 60, its first frame between two of the shot's."""
+    motion = write_shot(tmp_path, Recipe(frames=9), "motion")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.SetTimeCodesPerSecond(60)
+    stage.GetRootLayer().subLayerPaths.append("./motion.usda")
+    stage.GetRootLayer().subLayerOffsets[0] = Sdf.LayerOffset(0.3)
+    stage.GetRootLayer().Save()
+    own, seen = (read_rigs(path)[0].clip for path in (motion, tmp_path / "shot.usda"))
+    assert np.allclose(seen.times - seen.start, own.times - own.start)
+    # Far keys are joined by straight lines, as renderers do.
+    for attribute in stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttributes():
+        stage.SetEditTarget(stage.GetRootLayer())
+        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()[::4]}
+        for code, value in values.items():
+            attribute.Set(value, code)
+    stage.GetRootLayer().Save()
+    assert len(read_rigs(tmp_path / "shot.usda")[0].clip.times) == 3 + 20
+
+
 def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before_it(tmp_path):
     """Animation with a run-up, whose exporter left out the samples after the character stopped."""
     path = write_shot(tmp_path, Recipe(frames=9))
