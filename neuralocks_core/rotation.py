@@ -62,7 +62,13 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def sizes(transforms: np.ndarray) -> np.ndarray:
     """Signed sizes (...) of transforms (..., 4, 4): edge of the cube that a unit cube becomes, negative if mirrored."""
-    return np.cbrt(np.linalg.det(np.asarray(transforms, float)[..., :3, :3]))
+    return np.cbrt(volumes(np.asarray(transforms, float)[..., :3, :3]))
+
+
+def volumes(linear: np.ndarray) -> np.ndarray:
+    """Determinants (...) of matrices (..., 3, 3), written out: an LU decomposition of each takes four times as long."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(np.asarray(linear, float), (-2, -1), (0, 1))
+    return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
 def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
@@ -78,7 +84,7 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
     if scale.size and scale.min() < 1e-9:
         raise NeuralocksError(f"{subject}: a transform has zero scale; give every joint a scale above zero")
     linear = linear / scale
-    if (np.linalg.det(linear) <= 0).any():
+    if (volumes(linear) <= 0).any():
         raise NeuralocksError(
             f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale"
         )

@@ -11,7 +11,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
-from neuralocks_core.rotation import from_quaternion, rotation_part, to_quaternion
+from neuralocks_core.rotation import from_quaternion, rotation_part, sizes, to_quaternion
 
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
@@ -32,7 +32,7 @@ def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
                 f"{subject}: it is mirrored (negative scale); apply its scale (Ctrl A in Object Mode)"
             ) from None
         raise
-    scale = np.cbrt(np.linalg.det(joints[..., :3, :3]))
+    scale = sizes(joints)
     result = joints.copy()
     result[..., :3, :3] = turn * scale[..., None, None]
     return result
@@ -44,7 +44,7 @@ def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
     Applied to bind and posed transforms alike it cancels; it keeps the scale of an object out of channels of half
     precision.
     """
-    size = np.cbrt(np.linalg.det(similar(bind, subject)[:, :3, :3]))
+    size = sizes(similar(bind, subject))
     trim = np.zeros((len(bind), 4, 4))
     trim[:, [0, 1, 2], [0, 1, 2]] = 1 / size[:, None]
     trim[:, 3, 3] = 1
@@ -59,15 +59,23 @@ def _matrices(translation, rotation, scale) -> np.ndarray:
     return result
 
 
+def _levels(parents: np.ndarray) -> list[np.ndarray]:
+    """Joints without a parent, their children, and so on."""
+    depth = np.zeros(len(parents), int)
+    for joint, parent in enumerate(parents):
+        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+    return [np.flatnonzero(depth == level) for level in range(depth.max(initial=-1) + 1)]
+
+
 def _undone(similar: np.ndarray) -> np.ndarray:
-    """Inverses of transforms (T, 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS
+    """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS
     threads for each 4x4, in Blender's Python a quarter of the time that playing the frames takes.
     """
-    linear = similar[:, :3, :3]
+    linear = similar[..., :3, :3]
     result = np.zeros_like(similar)
-    result[:, :3, :3] = linear.swapaxes(1, 2) / np.square(linear[:, :, :1]).sum(axis=1, keepdims=True)
-    result[:, :3, 3:] = -result[:, :3, :3] @ similar[:, :3, 3:]
-    result[:, 3, 3] = 1
+    result[..., :3, :3] = linear.swapaxes(-1, -2) / np.square(linear[..., :1]).sum(axis=-2, keepdims=True)
+    result[..., :3, 3:] = -result[..., :3, :3] @ similar[..., :3, 3:]
+    result[..., 3, 3] = 1
     return result
 
 
@@ -109,14 +117,16 @@ class Motion:
         stored = np.empty_like(joints)
         translation, scale = (np.empty((*joints.shape[:2], 3), np.float32) for _ in range(2))
         rotation = np.empty((*joints.shape[:2], 4), np.float32)
-        for joint, parent in enumerate(parents):
-            local = joints[:, joint] if parent < 0 else _undone(stored[:, parent]) @ joints[:, joint]
-            size = np.cbrt(np.linalg.det(local[:, :3, :3]))
-            translation[:, joint] = local[:, :3, 3]
-            rotation[:, joint] = to_quaternion(local[:, :3, :3] / size[:, None, None])
-            scale[:, joint] = size.astype(np.float16)[:, None]  # scales of a SkelAnimation have half precision
-            own = _matrices(translation[:, joint], rotation[:, joint], scale[:, joint])
-            stored[:, joint] = own if parent < 0 else stored[:, parent] @ own
+        for level in _levels(parents):
+            local, above = joints[:, level], parents[level]
+            if above[0] >= 0:
+                local = _undone(stored[:, above]) @ local
+            size = sizes(local)
+            translation[:, level] = local[..., :3, 3]
+            rotation[:, level] = to_quaternion(local[..., :3, :3] / size[..., None, None])
+            scale[:, level] = size.astype(np.float16)[..., None]  # scales of a SkelAnimation have half precision
+            own = _matrices(translation[:, level], rotation[:, level], scale[:, level])
+            stored[:, level] = own if above[0] < 0 else stored[:, above] @ own
         return cls(
             np.asarray(frames, float),
             float(rate),
@@ -137,9 +147,8 @@ class Motion:
     def world(self) -> np.ndarray:
         """Joints (T, J, 4, 4) in Blender's world space, from the stored channels."""
         joints = _matrices(self.translation, self.rotation, self.scale)
-        for joint, parent in enumerate(self.parents):
-            if parent >= 0:
-                joints[:, joint] = joints[:, parent] @ joints[:, joint]
+        for level in _levels(self.parents)[1:]:
+            joints[:, level] = joints[:, self.parents[level]] @ joints[:, level]
         return joints
 
     def clip(self, to_core: np.ndarray, loop: bool = False) -> Clip:
