@@ -13,6 +13,7 @@ from neuralocks_core.humanoid import find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import sizes
 
+from .blend_shapes import knot_weights, shares
 from .border import Border
 from .joints import JointSource
 from .surface import SkinnedMesh, bound_meshes, merged_body
@@ -117,15 +118,15 @@ def read_rig(
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
     humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
-    names = list(dict.fromkeys(name for mesh in meshes for name in mesh.shapes))
-    weights = source.shape(names, time_codes)
-    used = set(names) if all_shapes else {name for name, column in zip(names, weights.T) if column.any()}
-    body = merged_body(meshes, to_bind, used)
+    knots = knot_weights([mesh.shapes for mesh in meshes])
+    weights = dict(zip(knots, source.shape(list(knots), time_codes).T, strict=True))
+    used = {name: column for name, column in weights.items() if all_shapes or column.any()}
+    body = merged_body(meshes, to_bind, set(used))
     character = Character(skeleton, body, humanoid)
     clip = Clip(
         border.seconds(time_codes),
         border.to_core @ posed @ trim,
-        weights[:, [names.index(n) for n in names if n in used]],
+        np.concatenate([np.zeros((len(posed), 0)), *(shares(w, knots[name]) for name, w in used.items())], axis=1),
     )
     return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes, by_hand)
 

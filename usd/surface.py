@@ -10,6 +10,7 @@ from neuralocks_core.character import Body
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import inside_out
 
+from .blend_shapes import Knots, at_knot, knot_weights, read_blend_shapes
 from .border import column_matrix, transformed
 from .joints import JointSource
 from .placement import Placement
@@ -25,7 +26,7 @@ class SkinnedMesh:
         points: (V, 3), mesh space at rest.
         triangles: (F, 3) int, outward.
         indices, weights: (V, I), joints of the skeleton and their shares; rows sum to one.
-        shapes: blend shape name -> offsets (V, 3), mesh space.
+        shapes: blend shape name -> its knots, mesh space.
         placement: where the prim itself stands.
     """
 
@@ -35,7 +36,7 @@ class SkinnedMesh:
     triangles: np.ndarray
     indices: np.ndarray
     weights: np.ndarray
-    shapes: dict[str, np.ndarray] = field(repr=False)
+    shapes: dict[str, Knots] = field(repr=False)
     placement: Placement = field(repr=False)
 
 
@@ -125,7 +126,7 @@ def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] |
     Args:
         meshes: what one skeleton skins.
         to_bind: authored bind space to bind world [m], (4, 4).
-        keep: blend shapes wanted; all if None.
+        keep: blend shapes wanted; all if None. Each of their knots is a shape of the Body.
     """
     if not meshes:
         return None
@@ -137,12 +138,14 @@ def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] |
         [(m.triangles[:, ::-1] if f else m.triangles) + start for m, f, start in zip(meshes, flip, ends)]
     )
     pad = [((0, 0), (0, width - m.indices.shape[1])) for m in meshes]
-    names = [name for name in dict.fromkeys(n for m in meshes for n in m.shapes) if keep is None or name in keep]
-    shapes = {name: np.zeros((len(points), 3)) for name in names}
-    for mesh, start, end in zip(meshes, ends, ends[1:]):
-        for name, offsets in mesh.shapes.items():
-            if name in shapes:
-                shapes[name][start:end] = offsets @ (to_bind @ mesh.geom_bind)[:3, :3].T
+    shapes = {}
+    for name, knots in knot_weights([mesh.shapes for mesh in meshes]).items():
+        for knot in knots if keep is None or name in keep else ():
+            offsets = shapes.setdefault(name if knot == 1 else f"{name} at {knot:g}", np.zeros((len(points), 3)))
+            for mesh, start, end in zip(meshes, ends, ends[1:]):
+                if name in mesh.shapes:
+                    turn = (to_bind @ mesh.geom_bind)[:3, :3]
+                    offsets[start:end] = at_knot(mesh.shapes[name], knot) @ turn.T
     return Body(
         points,
         triangles,
@@ -172,7 +175,7 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh 
         notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to be rid of this")
         triangles = triangles[:, ::-1]
     indices, weights = joint_influences(prim, len(points), source)
-    shapes = _shapes(prim, len(points), notes)
+    shapes = read_blend_shapes(prim, len(points), notes)
     return SkinnedMesh(prim, geom_bind(prim), points, triangles, indices, weights, shapes, Placement(prim))
 
 
@@ -201,37 +204,3 @@ def _triangles(mesh: UsdGeom.Mesh, path, count: int) -> np.ndarray:
     step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
     triangles = np.stack([corners[first], corners[first + step + 1], corners[first + step + 2]], axis=1)
     return triangles[:, ::-1] if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else triangles
-
-
-def _shapes(prim: Usd.Prim, count: int, notes: list[str]) -> dict[str, np.ndarray]:
-    binding = UsdSkel.BindingAPI(prim)
-    names = [str(name) for name in binding.GetBlendShapesAttr().Get() or ()]
-    targets = binding.GetBlendShapeTargetsRel().GetTargets() if names else []
-    if len(names) != len(targets):
-        notes.append(
-            f"{prim.GetPath()}: {len(names)} blend shape names for {len(targets)} targets; blend shapes left out"
-        )
-        return {}
-    shapes = {}
-    for name, target in zip(names, targets):
-        shape = UsdSkel.BlendShape(prim.GetStage().GetPrimAtPath(target))
-        offsets = np.asarray(shape.GetOffsetsAttr().Get() or [], float).reshape(-1, 3) if shape else np.zeros((0, 3))
-        chosen = np.asarray(shape.GetPointIndicesAttr().Get() or [], np.int64) if shape else np.zeros(0, np.int64)
-        if not shape or not len(offsets):
-            notes.append(f"{prim.GetPath()}: blend shape '{name}' ({target}) is missing or empty; left out")
-            continue
-        dense = np.zeros((count, 3))
-        if len(chosen):
-            if len(chosen) != len(offsets) or not 0 <= chosen.min() <= chosen.max() < count:
-                raise NeuralocksError(
-                    f"{target}: {len(offsets)} offsets and {len(chosen)} point indices do not fit {count} points"
-                )
-            dense[chosen] = offsets
-        elif len(offsets) == count:
-            dense[:] = offsets
-        else:
-            raise NeuralocksError(f"{target}: {len(offsets)} offsets for {count} points; export the blend shape again")
-        if not np.isfinite(dense).all():
-            raise NeuralocksError(f"{target}: blend shape offsets hold NaN or infinity; repair it")
-        shapes[name] = dense
-    return shapes
