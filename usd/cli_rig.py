@@ -97,6 +97,10 @@ def bake(
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
     ] = False,
     strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
+    cuts: Annotated[
+        str | None,
+        typer.Option(help="First frames after cuts, such as 25,49: hair starts anew; found if left out, or 'none'."),
+    ] = None,
     head: Head = None,
     skeleton: Skeleton = None,
     as_json: AsJson = False,
@@ -115,6 +119,7 @@ def bake(
             subframes=subframes,
             loop=loop,
             strength=strength,
+            cuts=_frames(cuts),
             progress=progress,
         )
     note(result.notes)
@@ -122,6 +127,15 @@ def bake(
         print_json(vars(result))
     else:
         typer.echo(f"{result.path}: {result.joints} hair joints, {result.samples} samples, in {result.animation}")
+
+
+def _frames(cuts: str | None) -> list[float] | None:
+    if cuts is None or cuts.strip().lower() == "none":
+        return None if cuts is None else []
+    try:
+        return [float(cut) for cut in cuts.split(",")]
+    except ValueError:
+        raise NeuralocksError(f"--cuts {cuts}: is no list of frames; write for example 25,49, or none") from None
 
 
 @command("export-c")

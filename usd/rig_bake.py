@@ -52,6 +52,7 @@ def bake_rig(
     subframes: int = 1,
     loop: bool = False,
     strength: float = 1.0,
+    cuts=None,
     progress=None,
 ) -> RigBakeResult:
     """Bake the hair joints of a shot.
@@ -68,6 +69,7 @@ def bake_rig(
         subframes: samples a frame.
         loop: the clip repeats, its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
+        cuts: time codes from which the character is elsewhere and its hair starts anew; found by itself if None.
         progress: called with (done, total, message).
 
     Raises:
@@ -87,10 +89,18 @@ def bake_rig(
         raise NeuralocksError(f"{out}: the output is part of the shot; choose another name")
     _check_moves(hair)
     codes = _codes(hair, frames, subframes)
-    turns = _turns(hair, model, codes, loop, strength, progress)
+    clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
+    sampler = _sampler(hair, model, clip, cuts)
+    turns = _turns(hair, model, clip, sampler, codes, strength, progress)
     animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
     notes += hair.source.loop_notes() if loop else []
+    if cuts is None and len(sampler.cuts):
+        found = hair.source.time_codes[np.searchsorted(hair.source.clip.times, sampler.cuts - 1e-9)]
+        named = ",".join(f"{code:g}" for code in found[:8]) + (", ..." if len(found) > 8 else "")
+        notes.append(
+            f"{source.path}: its head is put elsewhere at {named}; the hair starts anew there (--cuts says where)"
+        )
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
@@ -138,17 +148,29 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
     return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
 
 
-def _turns(hair, model, codes, loop, strength, progress) -> np.ndarray:
+def _sampler(hair, model, clip, cuts) -> RigSampler:
+    if cuts is None:
+        return RigSampler(model.spec, hair.source.character, clip)
+    known, cuts = hair.source.time_codes, [float(cut) for cut in cuts]
+    if cuts and clip.loop:
+        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    outside = [cut for cut in cuts if not known[0] < cut <= known[-1]]
+    if outside:
+        raise NeuralocksError(
+            f"--cuts {outside[0]:g}: lies outside the animation, which goes from {known[0]:g} to {known[-1]:g}; "
+            "give the first time code after each cut"
+        )
+    return RigSampler(model.spec, hair.source.character, clip, hair.border.seconds(cuts) if cuts else ())
+
+
+def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
     """Turns of the hair joints (T, N, 4) wxyz in their own bind axes."""
-    clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
-    sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = np.empty((len(codes), len(model.chains), 4))
     for row, code in enumerate(codes):
         # One at a time: a matrix product may round otherwise for other batches.
         second = hair.border.seconds([code])
-        shown = (
-            clip.at(second) if loop and not clip.start <= second[0] <= clip.end else hair.source.joints_at(code)[None]
-        )
+        wrapped = clip.loop and not clip.start <= second[0] <= clip.end
+        shown = clip.at(second) if wrapped else hair.source.joints_at(code)[None]
         turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
         if progress:
             progress(row + 1, len(codes), "hair joints")

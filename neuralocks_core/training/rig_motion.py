@@ -135,7 +135,7 @@ def _teleports(rig, models, fit) -> dict:
     result = {}
     for name in [SPRINGS, *models]:
         if name in models:
-            ends = _model_ends(rig, models[name], clip, clip.times)
+            ends = _model_ends(rig, models[name], clip, clip.times, cuts=())
         else:
             ends = _spring_ends(rig, clip, 1 / rate, fit)
         away = np.linalg.norm(ends - ends[before - 10], axis=-1).max(axis=-1)[before:]
@@ -164,12 +164,12 @@ def _spring_ends(rig, clip: Clip, step: float, fit) -> np.ndarray:
     return _ends(rig, spring_bones(rig.chains, rig.character.canonical_to_world(clip.joints)[None], step, fit))[0]
 
 
-def _model_ends(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
-    return _ends(rig, _model_turns(rig, model, motion, times)[None])[0]
+def _model_ends(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
+    return _ends(rig, _model_turns(rig, model, motion, times, cuts)[None])[0]
 
 
-def _model_turns(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
-    return model.canonical_turns(RigSampler(model.spec, rig.character, motion).features(times))
+def _model_turns(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
+    return model.canonical_turns(RigSampler(model.spec, rig.character, motion, cuts).features(times))
 
 
 def _ends(rig, turns: np.ndarray) -> np.ndarray:

@@ -169,6 +169,36 @@ def test_a_loop_is_seamless(tmp_path):
     assert np.abs(first - last).max() > 1e-3
 
 
+def test_hair_starts_anew_after_a_cut(tmp_path):
+    """Found and told, or given; the frames before it are what they are without it."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot), dynamic=True)
+    bake_rig(shot, tmp_path / "whole.usda", model)
+    stage = Usd.Stage.Open(str(shot))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion"))
+    hips = np.array(motion.GetTranslationsAttr().Get())
+    for code in range(1, 26):
+        moved = np.vstack([hips[:1] + [3.0 * (code > 12), 0, 0], hips[1:]]).astype(np.float32)
+        motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(moved), code)
+    stage.GetRootLayer().Save()
+    found = bake_rig(shot, tmp_path / "found.usda", model)
+    assert any("elsewhere at 13" in note for note in found.notes)
+    given = bake_rig(shot, tmp_path / "given.usda", model, cuts=[13])
+    assert not any("elsewhere" in note for note in given.notes)
+    assert (tmp_path / "found.usda").read_bytes() == (tmp_path / "given.usda").read_bytes()
+    bake_rig(shot, tmp_path / "none.usda", model, cuts=[])
+    codes = list(range(1, 26))
+    turns = {name: hair_turns(tmp_path / f"{name}.usda", codes) for name in ("whole", "found", "none")}
+    assert np.abs(turns["found"] - turns["whole"])[:12].max() < 2e-3
+    assert np.abs(turns["none"] - turns["found"])[12:].max() > 0.05
+    for options, words in (
+        ({"cuts": [99]}, "--cuts 99: lies outside"),
+        ({"cuts": [13], "loop": True}, "leave out --loop"),
+    ):
+        with pytest.raises(NeuralocksError, match=words):
+            bake_rig(shot, tmp_path / "bad.usda", model, **options)
+
+
 @pytest.mark.parametrize(
     ("options", "words"), [({"bind": False}, "no bindTransforms"), ({"head_moves": False}, "is not animated")]
 )

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cuts in a clip: where a character is put elsewhere from one sample to the next, and its hair must not feel the way."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from neuralocks_core.motion import Clip
+
+JUMP = 0.4
+"""A joint that is farther [m] from where its motion was taking it than this, on both sides of a step, was put there: in
+1/24 s that takes 23 g. A fifth of a turn is as impossible."""
+_TURN = np.radians(72.0)
+_LONGEST = 0.1
+"""Over longer steps [s] people come anywhere."""
+
+
+def find_cuts(clip: Clip, joint: int) -> np.ndarray:
+    """Times (C,) [s] of the first sample after each cut, judged by one joint of a clip, the head.
+
+    A step is a cut if neither the motion before nor the motion after it explains it. Two steps in a row are none: that is
+    one damaged sample, or motion too fast for its rate.
+    """
+    times = clip.times
+    if len(times) < 3 or clip.loop:
+        return np.zeros(0)
+    places, turns = clip.joints[:, joint, :3, 3], clip.joints[:, joint, :3, :3]
+    span = np.diff(times)
+    speed = np.diff(places, axis=0) / span[:, None]
+    spin = np.einsum("tij,tij->t", turns[1:], turns[:-1]) / np.einsum("tij,tij->t", turns[:-1], turns[:-1])
+    angle = np.arccos(np.clip((3 * spin - 1) / 2, -1, 1))
+    # The steps at both ends have a neighbour on one side only.
+    unlike = np.full((2, len(span)), np.inf)
+    gap = np.linalg.norm(np.diff(speed, axis=0), axis=1)
+    unlike[0, 1:], unlike[1, :-1] = gap * span[1:], gap * span[:-1]
+    fling = np.full((2, len(span)), np.inf)
+    fling[0, 1:] = angle[1:] - angle[:-1] * span[1:] / span[:-1]
+    fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
+    jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)
+    alone = jumped & ~np.r_[False, jumped[:-1]] & ~np.r_[jumped[1:], False]
+    return times[1:][alone]
+
+
+def parts_of(clip: Clip, cuts) -> list[Clip]:
+    """A clip as parts, each from one cut (the time [s] of its first sample) up to the next."""
+    starts = np.searchsorted(clip.times, np.asarray(cuts, float) - 1e-9)
+    bounds = np.unique(np.concatenate([[0], starts[(starts > 0) & (starts < len(clip.times))], [len(clip.times)]]))
+    return [
+        replace(clip, times=clip.times[a:b], joints=clip.joints[a:b], shape=clip.shape[a:b])
+        for a, b in zip(bounds[:-1], bounds[1:])
+    ]

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cuts are where a character is put elsewhere; nothing that a body can do is one."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.cuts import find_cuts, parts_of
+from neuralocks_core.motion import Clip
+from neuralocks_core.random_motion import KINDS, scripted_clip
+from neuralocks_core.rig import RigSampler, rig_spec
+from neuralocks_core.rotation import from_vector
+from tests.core.rig.builders import character
+
+
+def walking(rate=24, seconds=2.0):
+    """A head that moves at 2 m/s and nods: times, joints and its index."""
+    who = character()
+    t = np.arange(0, seconds + 1e-9, 1 / rate)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, 0, 3] += 2 * t
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.5 * np.sin(7 * t), [1, 0, 0]))
+    return who, t, joints
+
+
+@pytest.mark.parametrize("rate", [24, 60])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_jump_and_a_turn_on_the_spot_are_cuts(rate, turned):
+    who, t, joints = walking(rate)
+    late = t > 1
+    if turned:
+        joints[late, who.head, :3, :3] = from_vector([0, 2.0, 0]) @ joints[late, who.head, :3, :3]
+    else:
+        joints[late, who.head, 2, 3] += 0.8
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[late][0]])
+
+
+def test_a_held_key_just_before_a_cut():
+    """As animators key it: two samples a thousandth of a frame apart."""
+    who, t, joints = walking()
+    t = np.insert(t, 24, t[24] - 1e-3 / 24)
+    joints = np.insert(joints, 24, joints[23], axis=0)
+    joints[25:, who.head, 1, 3] += 1
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[25]])
+
+
+def test_motion_and_damaged_samples_are_no_cuts():
+    who, t, joints = walking()
+    assert not len(find_cuts(Clip(t, joints), who.head))
+    joints[20, who.head, 0, 3] += 3
+    assert not len(find_cuts(Clip(t, joints), who.head))
+    for kind in KINDS:
+        assert not len(find_cuts(scripted_clip(who, kind, 4.0, 24.0), who.head)), kind
+
+
+def test_nothing_of_the_way_is_felt():
+    """After a cut the features are those of the part by itself, before it those of the clip without it."""
+    who, t, joints = walking(rate=30)
+    put = joints.copy()
+    put[30:, :, 0, 3] += 5
+    clip, spec = Clip(t, put), rig_spec(True)
+    sampler = RigSampler(spec, who, clip)
+    assert sampler.cuts == pytest.approx([1.0])
+    alone = RigSampler(spec, who, parts_of(clip, sampler.cuts)[1])
+    after, before = t[30:], t[:30] + 0.001
+    np.testing.assert_allclose(sampler.features(after), alone.features(after), atol=1e-6)
+    first = RigSampler(spec, who, Clip(t[:30], joints[:30]))
+    np.testing.assert_allclose(sampler.features(before), first.features(before), atol=1e-6)
+    assert np.abs(RigSampler(spec, who, clip, cuts=()).features(after) - alone.features(after)).max() > 1
+    mixed = sampler.features(t[::-1], joints=put[::-1])  # in any order
+    np.testing.assert_array_equal(mixed[::-1], sampler.features(t, joints=put))
+
+
+def test_held_poses_know_no_cuts():
+    who, t, joints = walking()
+    joints[30:, who.head, 0, 3] += 5
+    assert not len(RigSampler(rig_spec(), who, Clip(t, joints)).cuts)
