@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from .border import row_matrix, write_stage
+from .groom import Spline
 
 ROOT = "/Character"
 
@@ -39,19 +40,21 @@ class HairArrays:
 
     Attributes:
         name: a valid identifier.
-        points: (P, 3) in the prim's own space; counts: (S,); widths: (P,) or None.
+        points: (P, 3) in the prim's own space; counts: (S,); widths: (P,), or (1,) for all.
         bind_place: the prim's place in the bind pose, (4, 4).
         places: its place at every frame, (T, 4, 4).
         joint: index of the joint that carries it.
+        spline: how its vertices are interpolated.
     """
 
     name: str
     points: np.ndarray
     counts: np.ndarray
-    widths: np.ndarray | None
+    widths: np.ndarray
     bind_place: np.ndarray
     places: np.ndarray
     joint: int
+    spline: Spline = Spline()
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,13 +168,15 @@ def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> Non
 def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdSkel.Skeleton) -> None:
     curves = UsdGeom.BasisCurves.Define(stage, hair_path(hair.name))
     points = np.ascontiguousarray(hair.points, np.float32)
-    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
-    curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+    curves.CreateTypeAttr(hair.spline.type)
+    if hair.spline.type == "cubic":
+        curves.CreateBasisAttr(hair.spline.basis)
+    curves.CreateWrapAttr(hair.spline.wrap)
     curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(hair.counts, np.int32)))
     curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    widths = np.full(1, 1e-4, np.float32) if hair.widths is None else np.ascontiguousarray(hair.widths, np.float32)
+    widths = np.ascontiguousarray(hair.widths, np.float32)
     curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths))
-    curves.SetWidthsInterpolation(UsdGeom.Tokens.constant if hair.widths is None else UsdGeom.Tokens.vertex)
+    curves.SetWidthsInterpolation(UsdGeom.Tokens.constant if len(widths) == 1 else UsdGeom.Tokens.vertex)
     reach = np.float32(widths.max() / 2)
     curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])))
     op = curves.AddTransformOp(UsdGeom.XformOp.PrecisionDouble)

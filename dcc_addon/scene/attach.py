@@ -67,7 +67,7 @@ def detach(hair) -> bool:
     cache = modifier.cache_file
     hair.modifiers.remove(modifier)
     if cache is not None and not cache.users:
-        bpy.data.cache_files.remove(cache)
+        bpy.data.batch_remove([cache])  # cache files have no remove of their own
     return True
 
 

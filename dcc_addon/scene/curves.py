@@ -5,11 +5,20 @@ The rest shape lies in the attribute `neuralocks_rest` of the Curves while it is
 undone with the hair; the absence of the attribute says that the points themselves are at rest.
 """
 
+import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
 REST = "neuralocks_rest"
+TYPES = ("CATMULL_ROM", "POLY", "BEZIER", "NURBS")
+"""By the number that Blender keeps in the attribute `curve_type`."""
+UNTOLD = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_rna.functions
+"""Whether Blender goes on with the bounds and the smooth curves of the points before unless strands are added, be it
+none; geometry nodes that resample or mesh the hair would use these.
+"""
+RADIUS = 0.005
+"""Of hair without the attribute `radius`, as Cycles draws it, in the object's space."""
 
 
 def counts(data) -> np.ndarray:
@@ -39,6 +48,26 @@ def radius(data) -> np.ndarray | None:
     return values
 
 
+def kind(data) -> str:
+    """What the strands are, one of TYPES; POLY where they are of several types.
+
+    Raises:
+        NeuralocksError: some are Bezier curves.
+    """
+    attribute = data.attributes.get("curve_type")
+    if attribute is None or not len(attribute.data):
+        return TYPES[0]
+    values = np.empty(len(attribute.data), np.int32)
+    attribute.data.foreach_get("value", values)
+    found = {TYPES[i] for i in np.unique(values)}
+    if "BEZIER" in found:
+        raise NeuralocksError(
+            f"{data.name}: some strands are Bezier curves, whose handles would stay behind; set their type to Catmull Rom "
+            "(in Edit Mode, Curves > Set Curve Type)"
+        )
+    return found.pop() if len(found) == 1 else "POLY"
+
+
 def has_rest(data) -> bool:
     """Whether the rest shape is kept aside because the points are moved."""
     attribute = data.attributes.get(REST)
@@ -49,7 +78,7 @@ def keep_rest(data) -> None:
     """Put the points aside as rest shape, unless they already are.
 
     Raises:
-        NeuralocksError: the data belongs to another file, or to several objects.
+        NeuralocksError: the data belongs to another file, or to several objects, or cannot be moved by its points.
     """
     if data.library is not None or data.override_library is not None:
         raise NeuralocksError(
@@ -63,6 +92,7 @@ def keep_rest(data) -> None:
         )
     if has_rest(data):
         return
+    kind(data)
     stale = data.attributes.get(REST)
     if stale is not None:  # the strands were edited since: the old rest shape fits them no longer
         data.attributes.remove(stale)
@@ -88,12 +118,12 @@ def write(data, values: np.ndarray) -> None:
     times slower.
     """
     data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
+    if UNTOLD:
+        data.add_curves([])
 
 
 def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None):
     """A new Curves data block of polylines from counts (S,) and points (P, 3)."""
-    import bpy
-
     data = bpy.data.hair_curves.new(name)
     if hasattr(data, "add_curves"):
         data.add_curves([int(n) for n in strands])
@@ -120,8 +150,6 @@ def _make_poly(data) -> None:
 
 def _by_conversion(name, strands, points_of, empty):
     """Blender before 3.5 cannot add strands from Python: an edge mesh is turned into curves by geometry nodes."""
-    import bpy
-
     bpy.data.hair_curves.remove(empty)
     ends = np.cumsum(strands)
     first = np.arange(len(points_of) - 1)

@@ -12,6 +12,9 @@ from . import body as body_reader
 from . import curves
 from .sampling import bodies_of, hairs_of
 
+BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
+"""What strands of a type are in USD, where they are more than straight lines."""
+
 
 def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str]:
     """Write the armature's motion, its body and its hair at rest.
@@ -28,8 +31,10 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     Raises:
         NeuralocksError: the file cannot be written, or the USD libraries are missing.
     """
+    from usd.groom import Spline
     from usd.scene_writer import HairArrays, SceneArrays, SkinArrays, hair_path, write_scene
 
+    splines = {kind: Spline("cubic", basis, "pinned") for kind, basis in BASES.items()}
     motion, rig = sampled.motion, sampled.rig
     from_core = np.linalg.inv(to_core(sampled.bind_metres))
     bind = from_core @ sampled.character.skeleton.bind
@@ -38,15 +43,18 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     prims = []
     for hair, label in zip(hairs, labels, strict=True):
         data, radius = hair.data, curves.radius(hair.data)
+        if radius is None or not len(radius):
+            radius = np.full(1, curves.RADIUS)
         prims.append(
             HairArrays(
                 label,
                 curves.points(data),
                 curves.counts(data),
-                None if radius is None or not len(radius) else 2 * radius,
+                2 * radius,
                 sampled.bind_places[hair.name_full],
                 motion.places[hair.name_full],
                 sampled.character.head,
+                splines.get(curves.kind(data), Spline()),
             )
         )
     bodies = [

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake and Attach as time goes by, and how what is attached is drawn."""
+
+import shutil
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, make_live, messages, points_at
+
+
+def attached_again(folder: Path) -> None:
+    """Attached hair is saved, opened elsewhere, attached anew with another look, when its files are gone, and freed of
+    its cache.
+    """
+    if not getattr(bpy.app.build_options, "usd", True):
+        print("no USD in this Blender")
+        return
+    operators, here = bpy.ops.neuralocks, folder / "here"
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    here.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(here / "shot.blend"))
+    bpy.context.scene.neuralocks.output = "//cache/hair.usdc"
+    make_live(rig, strands)
+    live = points_at(strands, 9)
+    assert operators.bake_attach() == {"FINISHED"}
+    bpy.ops.wm.save_mainfile()
+
+    there = folder / "there"
+    shutil.move(here, there)
+
+    def opened():
+        bpy.ops.wm.open_mainfile(filepath=str(there / "shot.blend"))
+        return bpy.data.objects["Hair"]
+
+    strands = opened()
+    assert apart(points_at(strands, 9), live) < SAME, "the cache did not move with the file"
+    assert operators.sample_motion() == {"FINISHED"}
+    strands.neuralocks_hair.motion = 0.2
+    strands.neuralocks_hair.live = True
+    slow = points_at(strands, 9)
+    assert apart(slow, live) > 1e-3 and not messages(), messages()
+    assert operators.bake_attach() == {"FINISHED"}
+    assert apart(points_at(strands, 9), slow) < SAME, "the cache from before is shown"
+    bpy.ops.wm.save_mainfile()
+
+    shutil.rmtree(there / "cache")
+    strands = opened()
+    assert operators.bake_attach() == {"FINISHED"}
+    assert apart(points_at(strands, 9), slow) < SAME
+    bpy.ops.wm.save_mainfile()
+    opened()
+    assert operators.detach() == {"FINISHED"}
+    assert not bpy.data.objects["Hair"].modifiers and not bpy.data.cache_files
+
+
+def drawn_alike(folder: Path) -> None:
+    """What is live and what is attached have the same smooth curves, thickness and bounds; Bezier strands, whose handles
+    are no points, are refused.
+    """
+    if "set_types" not in bpy.types.Curves.bl_rna.functions:
+        kinds = ["CATMULL_ROM"] if "add_curves" in bpy.types.Curves.bl_rna.functions else []
+    else:
+        kinds = ["CATMULL_ROM", "POLY", "NURBS", "BEZIER"]
+    scene = bpy.context.scene
+    rig = scenes.armature()
+    scenes.dance(rig)
+    for kind in kinds:
+        counts = [6, 6, 8]
+        data = bpy.data.hair_curves.new(kind)
+        data.add_curves(counts)
+        if kind != "CATMULL_ROM":
+            data.set_types(type=kind)
+        along = np.concatenate([np.linspace(0, 1, count) for count in counts])
+        turn = np.repeat([0, 1, 2], counts) + 6 * along
+        points = np.stack([0.08 * np.cos(turn), 0.08 * np.sin(turn), 1.72 - 0.25 * along], axis=1)
+        data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+        strands = bpy.data.objects.new(kind, data)
+        scene.collection.objects.link(strands)
+        strands.parent = rig
+        make_live(rig, strands)
+        if kind == "BEZIER":
+            assert "Catmull Rom" in messages()["BEZIER"], messages()
+            assert apart(points_at(strands, 9), points_at(strands, 1)) > 0.01, "it goes with its parent, and no more"
+            assert "neuralocks_rest" not in data.attributes
+            continue
+        live = _drawn(strands, 1), _drawn(strands, 9)
+        assert not messages(), messages()
+        assert apart(live[0][0], live[1][0]) > 0.01, "the smooth curves stayed behind"
+        assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / f"{kind}.usdc")) == {"FINISHED"}
+        for frame, (smooth, radius, bounds) in zip((1, 9), live):
+            attached = _drawn(strands, frame)
+            assert apart(attached[0], smooth) < SAME, kind
+            assert abs(attached[1] - radius) < 1e-6, kind
+            for found in (bounds, attached[2]):  # with up to 10 mm for the thickness
+                assert apart(found, np.stack([smooth.min(axis=0), smooth.max(axis=0)])) < 0.011, kind
+
+
+def _drawn(strands, frame: int) -> tuple:
+    """Points (N, 3) of the curves with their steps in between, as geometry nodes get them, largest radius, and bounds
+    (2, 3), all in the object's space.
+    """
+    scene = bpy.context.scene
+    mesh = bpy.data.meshes.new("Probe")
+    probe = bpy.data.objects.new("Probe", mesh)
+    scene.collection.objects.link(probe)
+    tree = bpy.data.node_groups.new("Probe", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source, drawn = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeCurveToMesh")
+    source.inputs[0].default_value = strands
+    tree.links.new(source.outputs["Geometry"], drawn.inputs[0])
+    tree.links.new(drawn.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    probe.modifiers.new("Probe", "NODES").node_group = tree
+    scene.frame_set(frame)
+    graph = bpy.context.evaluated_depsgraph_get()
+    smooth = np.array([vertex.co for vertex in probe.evaluated_get(graph).data.vertices])
+    evaluated = strands.evaluated_get(graph)
+    radius = evaluated.data.attributes.get("radius")
+    # Cycles draws hair without this attribute so thick.
+    thick = 0.005 if radius is None else max(value.value for value in radius.data)
+    corners = np.array([corner[:] for corner in evaluated.bound_box])
+    bpy.data.objects.remove(probe)
+    bpy.data.node_groups.remove(tree)
+    bpy.data.meshes.remove(mesh)
+    return smooth, thick, np.stack([corners.min(axis=0), corners.max(axis=0)])
