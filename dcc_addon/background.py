@@ -26,19 +26,20 @@ def request() -> None:
     _work.clear()
     if bpy.app.background:
         return
-    if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=PAUSE)
+    if not bpy.app.timers.is_registered(look):
+        bpy.app.timers.register(look, first_interval=PAUSE)
 
 
 def cancel() -> None:
     """Stop; the motion stays out of date."""
     _work.clear()
     session.sampling = None
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
+    if bpy.app.timers.is_registered(look):
+        bpy.app.timers.unregister(look)
 
 
-def _tick():
+def look() -> float | None:
+    """Blender's timer: sample for SLICE; seconds until the next look, None when nothing is out of date."""
     context = bpy.context
     scene = context.scene
     if _busy(context):

@@ -34,18 +34,18 @@ def _is_hair(_self, candidate) -> bool:
     return candidate.type == "CURVES"
 
 
-def _by_script(context) -> bool:
+def by_script(context) -> bool:
     """Whether a setting is changed by a script, which goes on with the result, and not in the sidebar."""
     return context.area is None or context.area.type not in {"VIEW_3D", "PROPERTIES"}
 
 
 def _live_changed(hair_settings, context) -> None:
-    live.strands_toggled(hair_settings.id_data, context, wait=_by_script(context))
+    live.strands_toggled(hair_settings.id_data, context, wait=by_script(context))
     background.request()
 
 
 def _look_changed(hair_settings, context) -> None:
-    live.refresh(context.scene, wait=_by_script(context))
+    live.refresh(context.scene, wait=by_script(context))
 
 
 def _rig_live_changed(character, context) -> None:

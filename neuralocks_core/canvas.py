@@ -80,7 +80,7 @@ class VtkCanvas:
         view.clipping_range = (0.2 * far, 4 * far)
         self._plotter.render()
         image = self._plotter.screenshot(return_img=True, transparent_background=True)
-        return _over(image, self.size, self._backdrop)
+        return composite(image, self.size, self._backdrop)
 
     def close(self) -> None:
         """Free the window."""
@@ -112,7 +112,7 @@ class PlainCanvas:
         # Far samples first: the last one written to a pixel is the nearest.
         image[pixel_y[order], pixel_x[order], :3] = (255 * colour[order]).astype(np.uint8)
         image[pixel_y[order], pixel_x[order], 3] = 255
-        return _over(image, self.size, self._backdrop)
+        return composite(image, self.size, self._backdrop)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -144,7 +144,7 @@ class PlainCanvas:
         return both[:, 0], both[:, 1], both[:, 2], both[:, 3:]
 
 
-def _over(image: np.ndarray, size: tuple[int, int], backdrop: np.ndarray) -> np.ndarray:
+def composite(image: np.ndarray, size: tuple[int, int], backdrop: np.ndarray) -> np.ndarray:
     """A drawing (H, W, 4) uint8 with coverage, reduced to a size and laid over the backdrop (height, width, 3)."""
     from PIL import Image
 
@@ -155,7 +155,7 @@ def _over(image: np.ndarray, size: tuple[int, int], backdrop: np.ndarray) -> np.
 
 
 def open_canvas(width, height, triangles, strands, detail) -> VtkCanvas | PlainCanvas:
-    """The best canvas that works here, for so many strands of `detail.vertices` points (see `preview.Detail`)."""
+    """The best canvas that works here, for so many strands of `detail.vertices` points (see `film.Detail`)."""
     canvas = None
     try:
         canvas = VtkCanvas(width, height, triangles, strands, detail)

@@ -8,7 +8,7 @@ import numpy as np
 from pxr import UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.preview import Scene
+from neuralocks_core.film import Scene
 
 from .border import transformed
 from .stage import Shot, StageGroom, read_shot

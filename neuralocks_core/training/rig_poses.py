@@ -29,6 +29,7 @@ class PosePool:
     Attributes:
         relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
         shapes: blend shape weights of each, (P, B).
+        bodies: with `whole`, vertices of the body around the head of each (V, 3) float32 [m], canonical; else None.
     """
 
     def __init__(
@@ -38,7 +39,7 @@ class PosePool:
         self.relative = np.empty((count, 2, 3, 3))
         self._patch = _BodyPatch(rig, rng, most_points) if rig.character.body is not None and len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.offsets) if self._patch else 0))
-        self._bodies = [None] * count if self._patch and whole else None
+        self.bodies = [None] * count if self._patch and whole else None
         self._trees = [None] * count
         kept = len(self._patch.kept) if self._patch else 0
         self._points, self._normals = np.empty((2, count, kept, 3), np.float32)
@@ -68,8 +69,8 @@ class PosePool:
             self._points[row] = body[self._patch.kept]
             self._normals[row] = normals[self._patch.kept]
             self._trees[row] = cKDTree(self._points[row], balanced_tree=False, compact_nodes=False)
-            if self._bodies is not None:
-                self._bodies[row] = body
+            if self.bodies is not None:
+                self.bodies[row] = body
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
         """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
@@ -107,7 +108,7 @@ class PosePool:
         result = np.ones(near.shape)
         for row, pose in enumerate(poses):
             if near[row].any():
-                collider = Collider(self._bodies[pose], self._patch.triangles)
+                collider = Collider(self.bodies[pose], self._patch.triangles)
                 result[row, near[row]] = collider.distance(points[row][near[row]])[0]
         return result
 

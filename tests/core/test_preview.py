@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Pictures and clips show the hair, by either canvas, and are written whole or not at all."""
+
 import sys
+from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +13,10 @@ import trimesh
 
 from neuralocks_core import canvas, preview, shading
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.film import Detail, Film, Scene
 
 CENTRE = np.array([0.0, 1.5, 0.0])
-SMALL = preview.Detail(2000, 16, 1.0, 1.2, 0)
+SMALL = Detail(2000, 16, 1.0, 1.2, 0)
 
 
 def scene(frames=4, strands=300):
@@ -34,7 +39,7 @@ def scene(frames=4, strands=300):
     def posed(points):
         return lambda i: points @ head[i, :3, :3].T + head[i, :3, 3]
 
-    return preview.Scene(
+    return Scene(
         np.arange(frames) / 24,
         head,
         np.eye(3),
@@ -65,7 +70,7 @@ def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
 def test_a_pixel_a_quarter_covered_takes_a_quarter_of_the_colour():
     drawn = np.zeros((2, 2, 4), np.uint8)
     drawn[0, 0] = 200, 100, 40, 255
-    seen = canvas._over(drawn, (1, 1), np.full((1, 1, 3), 100, np.float32))
+    seen = canvas.composite(drawn, (1, 1), np.full((1, 1, 3), 100, np.float32))
     np.testing.assert_allclose(seen[0, 0], [125, 100, 85], atol=1)
 
 
@@ -75,13 +80,10 @@ def test_both_canvases_draw_the_same_picture():
         canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, SMALL).close()
     except Exception as error:
         pytest.skip(f"VTK cannot draw here: {error}")
-    pictures, detail = [], preview.Detail(600, 24, 2.0, 1.2, 4)
+    pictures, detail = [], Detail(600, 24, 2.0, 1.2, 4)
     for kind in (canvas.VtkCanvas, canvas.PlainCanvas):
-        film = preview._Film(scene(), 120, 160, detail, 0.02)
-        film._canvas.close()
-        film._canvas = kind(120, 160, film.scene.triangles, len(film._tone), detail)
-        pictures.append(next(film.shoot([0])).astype(float))
-        film.close()
+        with closing(Film(scene(), 120, 160, detail, 0.02, kind)) as film:
+            pictures.append(next(film.shoot([0])).astype(float))
     background = canvas.backdrop(120, 160).astype(float)
     covered = [np.abs(picture - background).max(axis=2) > 12 for picture in pictures]
     assert covered[0].mean() > 0.05
@@ -97,19 +99,21 @@ def test_hair_in_front_dims_what_is_behind_it():
     assert behind == pytest.approx(5, rel=0.25) and before < 0.05 and aside == 0
 
 
+def never_drawn():
+    return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
+
+
 @pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("file/hair.png", "cannot be written")])
-def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, monkeypatch, name, said):
+def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, name, said):
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(preview, "_Film", lambda *arguments: pytest.fail("the drawing was begun"))
     with pytest.raises(NeuralocksError, match=said):
-        preview.render(scene(2, 20), tmp_path / name, size=(64, 64), panels=1)
+        preview.render(never_drawn(), tmp_path / name, size=(64, 64), panels=1)
 
 
 def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setattr(preview, "_Film", lambda *arguments: pytest.fail("the drawing was begun"))
     with pytest.raises(NeuralocksError, match="imageio-ffmpeg is not installed"):
-        preview.render(scene(2, 20), tmp_path / "hair.mp4")
+        preview.render(never_drawn(), tmp_path / "hair.mp4")
     assert not list(tmp_path.iterdir())
 
 

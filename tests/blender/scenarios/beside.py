@@ -82,7 +82,7 @@ def prepared_beside(_folder: Path) -> None:
     own.live = False
     groomed = points_at(strands, 9)
     live_strands.at_once = lambda graph: graph.mode == "RENDER"
-    properties._by_script = lambda context: False
+    properties.by_script = lambda context: False
 
     def finish():
         while preparing.look() is not None:
@@ -192,9 +192,9 @@ def sampled_beside(_folder: Path) -> None:
 
     def sample():
         session.rigs["Rig"].stale = True
-        while background._tick() is not None:
+        while background.look() is not None:
             pass
-        assert session.sampling is None and not background._work
+        assert session.sampling is None
 
     def broken(_context, _armature):
         yield 1, 2
@@ -223,16 +223,16 @@ def sampled_beside(_folder: Path) -> None:
             bpy.context.scene.frame_set(frame)
             bpy.ops.ed.undo_push(message="another frame")
         background.SLICE, session.rigs["Rig"].stale = 0.0, True
-        background._tick()
+        background.look()
         bpy.ops.ed.undo()
         sample()
         assert not messages() and not session.rigs["Rig"].stale, messages()
 
     background.SLICE, session.rigs["Rig"].stale, scene = 0.0, True, bpy.context.scene
-    background._tick()
+    background.look()
     assert session.sampling is not None
     bpy.context.window.scene = bpy.data.scenes.new("Other")
-    assert background._tick() is None and session.sampling is None, "nobody looks at what was sampled"
+    assert background.look() is None and session.sampling is None, "nobody looks at what was sampled"
     bpy.context.window.scene = scene
     sample()
     assert not messages() and not session.rigs["Rig"].stale, messages()
