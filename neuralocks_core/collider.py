@@ -10,6 +10,8 @@ from neuralocks_core.errors import NeuralocksError
 
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
+THREADED = 2_000
+"""Points from which a search is worth sharing with other threads."""
 
 
 class Collider:
@@ -61,7 +63,7 @@ class Collider:
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
             return np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape, int)
-        rough, sample = self._tree.query(points, workers=-1)
+        rough, sample = self._tree.query(points, workers=_workers(points))
         triangle = self._owner[sample]
         closest = self._tree.data[sample]
         normal = self._normals[triangle]
@@ -72,8 +74,9 @@ class Collider:
         pending, k = near, 8 if proven else 4
         while len(pending):
             count = min(k, self._tree.n)
-            far, found = self._tree.query(points[pending], k=np.arange(1, count + 1), workers=-1)
-            nearest = self._nearest(points[pending], self._owner[found])
+            asked = points[pending]
+            far, found = self._tree.query(asked, k=np.arange(1, count + 1), workers=_workers(asked))
+            nearest = self._nearest(asked, self._owner[found])
             closest[pending], normal[pending], triangle[pending], best = nearest
             done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
             pending, k = pending[~done], 4 * k
@@ -117,6 +120,11 @@ class Collider:
         at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
         result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
         return result
+
+
+def _workers(points: np.ndarray) -> int:
+    """Threads for a tree's query: of few points it is done before others have started."""
+    return -1 if len(points) >= THREADED else 1
 
 
 def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
