@@ -19,6 +19,7 @@ PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64", "manylinux_2_17_x86_64"],
     "windows-x64": ["win_amd64"],
     "macos-arm64": ["macosx_14_0_arm64", "macosx_11_0_arm64", "macosx_10_15_universal2"],
+    "macos-x64": ["macosx_13_0_x86_64", "macosx_10_13_x86_64", "macosx_10_15_universal2"],
 }
 PYTHONS = ("3.11", "3.13")
 """Of Blender 4.2 to 5.0, and of 5.1 and later."""
@@ -26,6 +27,10 @@ COMPILED = ("onnxruntime==1.31.1", "usd-core==26.11", "scipy==1.15.3")
 """scipy: the newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons. numpy is Blender's
 own.
 """
+OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}}
+"""The last with wheels for a platform; on Linux it gives the same points as the newest, bit for bit."""
+ENDED = {"macos-x64": ("3.13",)}
+"""Pythons that no Blender of a platform has: the last for Intel Macs is 4.5 LTS."""
 LEGACY = ("linux-x64", "3.11")
 """What the zip for Blender before 4.2 is built for: Linux distributions, which still carry it."""
 NOT_SHIPPED = ("build.py", "__pycache__")
@@ -47,7 +52,7 @@ def main() -> int:
     own = own_wheel(args.cache / "own")
     for platform in PLATFORMS if args.platform == "all" else [args.platform]:
         wheels = [own]
-        for python in pythons:
+        for python in [p for p in pythons if p not in ENDED.get(platform, ())]:
             wheels += download(args.cache / platform / python, COMPILED, platform, python)
         print(extension(args.output, platform, wheels))
     if not args.no_legacy:
@@ -70,10 +75,11 @@ def download(folder: Path, requirements, platform: str, python: str) -> list[Pat
     found = []
     for requirement in requirements:
         name, version = requirement.split("==")
+        version = OLDER.get(platform, {}).get(name, version)
         pattern = f"{name.replace('-', '_')}-{version}-*.whl"
         if not list(folder.glob(pattern)):
             tags = [t for tag in PLATFORMS[platform] for t in ("--platform", tag)] + ["--python-version", python]
-            pip("download", "--no-deps", "--only-binary", ":all:", *tags, "-d", str(folder), requirement)
+            pip("download", "--no-deps", "--only-binary", ":all:", *tags, "-d", str(folder), f"{name}=={version}")
         found.append(next(folder.glob(pattern)))
     return found
 
