@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the documents name exists: linked files, files and modules of the tree, what modules define, options."""
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("neuralocks_core", "usd", "dcc_addon", "benchmarks", "examples", "docs", "tests")
+DOCUMENTS = ["README.md", "CREDITS.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))]
+FILES = [path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in (ROOT / folder).rglob("*.*")]
+
+
+def defined(path: Path) -> set[str]:
+    """Names that a module, or a class in it, defines or imports."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.ImportFrom):
+            names |= {each.asname or each.name for each in node.names}
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
+            names |= {each.attr for target in targets for each in ast.walk(target) if isinstance(each, ast.Attribute)}
+    return names
+
+
+@cache
+def modules() -> dict[str, set[str]]:
+    """Module or package -> what it defines; modules of one name count as one."""
+    found: dict[str, set[str]] = {}
+    for folder in FOLDERS[:3]:
+        for path in (ROOT / folder).rglob("*.py"):
+            own = path.parent.name if path.stem == "__init__" else path.stem
+            found.setdefault(own, set()).update(defined(path))
+            found.setdefault(path.parent.name, set()).add(own)
+    return found
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_what_is_named_exists(document):
+    text = (ROOT / document).read_text("utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#\s]+)\)", text) if "://" not in link]
+    missing = [link for link in links if not ((ROOT / document).parent / link).exists()]
+    known = modules()
+    for code in re.findall(r"`([^`\n]+)`", text):
+        missing += [
+            name
+            for name in re.findall(r"[\w/]+\.(?:py|h\.in|c\.in|md|png|gif)\b", code)
+            if not any(file == name or file.endswith(f"/{name}") for file in (*FILES, "README.md", "CREDITS.md"))
+        ]
+        for dotted in re.findall(r"(?<![\w./])[a-z_]+(?:\.[A-Za-z_]\w*)+\b(?!/)", code):
+            first, then = dotted.split(".")[:2]
+            if first in known and then not in known[first] and then not in ("py", "json"):
+                missing.append(dotted)
+    assert not missing
+
+
+def test_the_map_names_modules_that_are_there():
+    """`docs/architecture.md`, Where things are: whatever is in a table's code stands for a module or a folder."""
+    map_ = (ROOT / "docs/architecture.md").read_text("utf-8").split("## Where things are")[1].split("\n## ")[0]
+    rows = [line for line in map_.splitlines() if line.startswith("|")]
+    named = {name.rstrip("/") for row in rows for name in re.findall(r"`([\w/]+)`", row)}
+    assert len(named) > 80 and named <= set(modules()), named - set(modules())
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_commands_have_the_options_that_are_written(document):
+    """Of lines that begin with `neuralocks`; what its commands take stands in the sources of the command line."""
+    text = (ROOT / document).read_text("utf-8")
+    sources = "".join(path.read_text("utf-8") for path in (ROOT / "usd").glob("*.py"))
+    taken = {f"--{name.replace('_', '-')}" for name in re.findall(r"^    (\w+): ", sources, re.M)}
+    taken |= set(re.findall(r"--[a-z][a-z-]+", sources))
+    for line in re.findall(r"neuralocks (?:rig )?[a-z]+[^#`\n]*", text):
+        assert set(re.findall(r"(?<!\w)--[a-z][a-z-]+", line)) <= taken, line
