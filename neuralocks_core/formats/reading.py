@@ -59,12 +59,12 @@ def read_with_notes(
         fact = f"does not state its unit; took 1 {name}, which suits a human scalp"
         notes.append(f"{path}: {fact}; --unit says otherwise")
     axis = wanted_axis or raw.up
-    with np.errstate(over="ignore"):  # Groom refuses what overflows
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows or is no number is dealt with below
         points = points * np.float32(scale)
+        widths = None if raw.widths is None else raw.widths.astype(np.float32) * np.float32(scale)
     if axis == "Z":
         points = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
 
-    widths = None if raw.widths is None else raw.widths.astype(np.float32) * np.float32(scale)
     if widths is not None and not (np.isfinite(widths).all() and 0 < widths.max(initial=0.0) <= WIDEST):
         notes.append(f"{path}: its thickness is not that of hair; took 0.08 mm")
         widths = None

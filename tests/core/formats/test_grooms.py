@@ -143,6 +143,17 @@ def test_hair_round_trip(folder, counts, each, unit, up):
     assert [p.name for p in folder.glob(".*")] == []  # no scratch file left
 
 
+def test_thickness_that_is_no_number_is_left_out(folder):
+    """A signalling NaN, of which numpy warns when it is multiplied."""
+    groom = Groom("a", np.random.default_rng(0).normal(0, 0.1, (6, 3)), [3, 3], np.full(6, 1e-4))
+    cemyuksel.write(folder / "bad.hair", groom)
+    content = bytearray((folder / "bad.hair").read_bytes())
+    content[-4:] = b"\x01\x00\xa0\x7f"
+    (folder / "bad.hair").write_bytes(content)
+    read, notes = formats.read_with_notes(folder / "bad.hair", unit="cm")
+    assert read.widths == np.float32(8e-5) and any("thickness" in note for note in notes)
+
+
 def test_hair_refuses_what_it_cannot_hold(folder):
     with pytest.raises(NeuralocksError, match="1 to 65536"):
         cemyuksel.write(folder / "g.hair", Groom("g", POINTS, [8, 0]))
