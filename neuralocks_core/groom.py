@@ -45,13 +45,28 @@ class Groom:
     """(S,) int32, a number for each named part of the hairstyle."""
 
     def __post_init__(self) -> None:
-        def put(field: str, value: np.ndarray) -> None:
-            value = value.view()
-            value.flags.writeable = False
-            object.__setattr__(self, field, value)
+        self._put("points", self._array("points", self.points, np.float32))
+        self._put("counts", self._whole_numbers("counts", self.counts))
+        self._check_topology()
+        self._check_values("points", self.points, LARGEST_COORDINATE, "m")
 
-        put("points", self._array("points", self.points, np.float32))
-        put("counts", self._whole_numbers("counts", self.counts))
+        strands, total = len(self.counts), len(self.points)
+        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
+        if widths.ndim != 1 or len(widths) not in {1, strands, total}:
+            raise self._error(
+                f"widths have shape {widths.shape}", f"give 1, {strands} (one a strand) or {total} (one a point)"
+            )
+        self._check_values("widths", widths, LARGEST_COORDINATE, "m")
+        self._put("widths", widths)
+        if self.root_uv is not None:
+            self._put("root_uv", self._shaped("root_uv", self._array("root_uv", self.root_uv, np.float32), 2))
+            self._check_values("root_uv", self.root_uv, np.inf, "")
+        if self.guides is not None:
+            self._put("guides", self._shaped("guides", self._array("guides", self.guides, np.bool_)))
+        if self.group is not None:
+            self._put("group", self._shaped("group", self._whole_numbers("group", self.group)))
+
+    def _check_topology(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 3:
             raise self._error(f"points have shape {self.points.shape}", "give (P, 3)")
         if self.counts.ndim != 1:
@@ -68,33 +83,6 @@ class Groom:
             )
         if total == 0:
             raise self._error("has strands but no points", "give the strands their points")
-        self._check_values("points", self.points, LARGEST_COORDINATE, "m")
-
-        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
-        if widths.ndim != 1 or len(widths) not in {1, len(self.counts), total}:
-            raise self._error(
-                f"widths have shape {widths.shape}",
-                f"give 1, {len(self.counts)} (one a strand) or {total} (one a point)",
-            )
-        self._check_values("widths", widths, LARGEST_COORDINATE, "m")
-        put("widths", widths)
-
-        per_strand = (
-            ("root_uv", np.float32, (len(self.counts), 2)),
-            ("guides", np.bool_, (len(self.counts),)),
-        )
-        for field, kind, shape in per_strand:
-            if getattr(self, field) is not None:
-                value = self._array(field, getattr(self, field), kind)
-                if value.shape != shape:
-                    raise self._error(f"{field} has shape {value.shape}", f"give {shape}")
-                if kind == np.float32:
-                    self._check_values(field, value, np.inf, "")
-                put(field, value)
-        if self.group is not None:
-            put("group", self._whole_numbers("group", self.group))
-            if self.group.shape != self.counts.shape:
-                raise self._error(f"group has shape {self.group.shape}", f"give ({len(self.counts)},)")
 
     @property
     def strand_count(self) -> int:
@@ -140,6 +128,18 @@ class Groom:
             f: None if getattr(self, f) is None else getattr(self, f)[chosen] for f in ("root_uv", "guides", "group")
         }
         return replace(self, points=self.points[kept], counts=counts, widths=widths, **pick)
+
+    def _put(self, field: str, value: np.ndarray) -> None:
+        value = value.view()
+        value.flags.writeable = False
+        object.__setattr__(self, field, value)
+
+    def _shaped(self, field: str, value: np.ndarray, *each: int) -> np.ndarray:
+        """The value, if it holds one entry of shape `each` a strand."""
+        shape = (len(self.counts), *each)
+        if value.shape != shape:
+            raise self._error(f"{field} has shape {value.shape}", f"give {shape}")
+        return value
 
     def _error(self, fact: str, remedy: str) -> NeuralocksError:
         return NeuralocksError(f"{self.name}: {fact}; {remedy}")
