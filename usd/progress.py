@@ -3,7 +3,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 QUIET_FOR = 2.0
@@ -13,51 +13,73 @@ LOG_EVERY = 20.0
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator:
-    """A callback (done, total, message) that draws on stderr."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[message]}"),
-    )
-    bar = Progress(*columns, console=console, transient=True)
-    began, shown = time.monotonic(), None
-    # A resumed job begins in the middle, and one step follows another: only what is done of this step tells the speed.
-    logged, since, first, last = began, began, None, (0, 0)
-    drawn = sys.stderr.isatty()
-
-    def callback(done: int, total: int, message: str = "") -> None:
-        nonlocal shown, logged, since, first, last
-        now = time.monotonic()
-        another = total != last[1] or done < last[0]
-        if another:
-            since, first = now, done
-        last = done, total
-        if not drawn:
-            if now - logged > LOG_EVERY:
-                logged = now
-                left = f", {(now - since) * (total - done) / (done - first) / 60:.1f} min left" if done > first else ""
-                print(f"{title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
-            return
-        if shown is None and now - began < QUIET_FOR:
-            return
-        if shown is None:
-            bar.start()
-            shown = bar.add_task(title, total=total, message="")
-        elif another:
-            bar.reset(shown, total=total)
-        bar.update(shown, completed=done, total=total, message=message)
-
+def progress_bar(title: str) -> Iterator[Callable[..., None]]:
+    """A callback (done, total, message) that draws on stderr, or writes lines where that is no terminal."""
+    shown = _Bar(title) if sys.stderr.isatty() else _Log(title)
     try:
-        yield callback
+        yield shown
     finally:
-        if shown is not None:
-            bar.stop()
+        shown.close()
+
+
+class _Log:
+    """A line now and then, with the time left at the speed so far."""
+
+    def __init__(self, title: str):
+        self._title = title
+        self._written = self._since = time.monotonic()
+        # A resumed job begins in the middle, and one step follows another: only what is done of this step tells the
+        # speed.
+        self._first, self._last = 0, (0, -1)
+
+    def __call__(self, done: int, total: int, message: str = "") -> None:
+        now = time.monotonic()
+        if total != self._last[1] or done < self._last[0]:
+            self._since, self._first = now, done
+        self._last = done, total
+        if now - self._written <= LOG_EVERY:
+            return
+        self._written, gone = now, done - self._first
+        left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if gone > 0 else ""
+        print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Nothing to put away."""
+
+
+class _Bar:
+    """A bar of the terminal, from QUIET_FOR on; begun anew when another step follows."""
+
+    def __init__(self, title: str):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[message]}"),
+        )
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._title, self._began = title, time.monotonic()
+        self._task, self._last = None, (0, -1)
+
+    def __call__(self, done: int, total: int, message: str = "") -> None:
+        another = total != self._last[1] or done < self._last[0]
+        self._last = done, total
+        if self._task is None:
+            if time.monotonic() - self._began < QUIET_FOR:
+                return
+            self._bar.start()
+            self._task = self._bar.add_task(self._title, total=total, message="")
+        elif another:
+            self._bar.reset(self._task, total=total)
+        self._bar.update(self._task, completed=done, total=total, message=message)
+
+    def close(self) -> None:
+        """Take the bar off the terminal."""
+        if self._task is not None:
+            self._bar.stop()
