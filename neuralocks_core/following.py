@@ -82,24 +82,30 @@ class _Alike:
     """
 
     def __init__(self, first: np.ndarray, weights: np.ndarray) -> None:
-        weights = weights.reshape(*first.shape, spans.NODES)
-        self._low = first.min(axis=0)
-        width = int((first - self._low).max()) + spans.NODES
-        self._weights = np.zeros((width, *first.T.shape), np.float32)
-        for node in range(spans.NODES):
-            np.put_along_axis(self._weights, (first - self._low + node).T[None], weights[..., node].T[None], 0)
+        weights = weights.reshape(*first.shape, spans.NODES).T
+        low, late = first.min(axis=0), first.T - first.min(axis=0)[:, None]
+        reach = late.max(axis=1) + spans.NODES
+        # Own vertices, a network vertex of each, and its weights (V', N); few own vertices need more than four.
+        self._terms = []
+        for step in range(reach.max()):
+            own = np.flatnonzero(reach > step)
+            term = np.zeros((len(own), len(first)), np.float32)
+            for node in range(spans.NODES):
+                np.copyto(term, weights[node, own], where=late[own] + node == step)
+            self._terms.append((own, low[own] + step, term))
 
     def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
         """Into `result` (3, V, n), of strands from `start` on."""
         count, vertices = displacement.shape[:2]
-        network, part = _network.arrays((3, vertices, count), result.shape)
+        network, spare = _network.arrays((3, vertices, count), result.shape)
         network[:] = displacement.transpose(2, 1, 0)
-        for node, weight in enumerate(self._weights[:, :, start : start + count]):
-            moved = part if node else result
-            # Beyond the last vertex of the network the weight is zero.
-            network.take(self._low + node, axis=1, out=moved, mode="clip")
-            moved *= weight
-            if node:
+        for step, (some, of, weights) in enumerate(self._terms):
+            part = spare[:, : len(some)] if step else result
+            network.take(of, axis=1, out=part, mode="clip")
+            part *= weights[:, start : start + count]
+            if step >= spans.NODES:
+                result[:, some] += part
+            elif step:
                 result += part
 
 
