@@ -18,7 +18,7 @@ _ITERATIONS = 12
 
 
 def lock_of_roots(roots: np.ndarray, locks: int | None = None, seed: int = 0) -> np.ndarray:
-    """Cluster strands by their roots (k-means; the paper, section 4.1, leaves the clustering open).
+    """Cluster strands by their roots (k-means; the paper, section 3.3, leaves the clustering open).
 
     Args:
         roots: (S, 3) [m].
@@ -46,7 +46,7 @@ def lock_of_roots(roots: np.ndarray, locks: int | None = None, seed: int = 0) ->
 
 
 def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
-    """Mean code of each strand's lock (z_lock of the paper, section 4.1): `lock_means`, (S, D)."""
+    """Mean code of each strand's lock (z_lock of the paper, section 3.3): `lock_means`, (S, D)."""
     return lock_means(codes, lock, valid)[lock]
 
 

@@ -127,7 +127,7 @@ def strand_set(
 
 
 def scalp_local(strands: StrandSet) -> np.ndarray:
-    """(S, K, 3) float32 [m]: root-relative points in scalp axes, the encoder's input (paper, section 4.1)."""
+    """(S, K, 3) float32 [m]: root-relative points in scalp axes, the encoder's input (paper, section 3.2)."""
     relative = strands.rest - strands.rest[:, :1]
     return np.matmul(relative, strands.root_frame.transpose(0, 2, 1))
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training on rollouts of our own solver: positions, frame differences and the body they must stay out of.
 
-The paper's detached inertia term (its section 3.3.5) is an iteration that diverges for weakly damped hair; here each
+The paper's detached inertia term (its section 3.4.5) is an iteration that diverges for weakly damped hair; here each
 step is pulled to where the converged solver went instead. `selfsupervised.py` has the paper's way.
 """
 
