@@ -8,21 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.locks import lock_means
-from neuralocks_core.materials import RANGES
+from neuralocks_core.materials import RANGES, Material, constants
 from neuralocks_core.strands import K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
-SPREAD = 0.85
-"""How fast hairs part as ties get weaker. With this, free hair that is shaken parts by the same ratios as the solver's
-(`benchmarks/materials.py --groom library`), whose hairs stray by about the inverse root of the ties' stiffness (counted
-from 20 /s^2, see `Material.log_ratios`), as a spring does in a random drive; kept lengths take a part of what is asked
-for."""
-
-
-def spread(log_ratio: float) -> float:
-    """Factor on how far hairs stray from their lock, for the logarithm of the clumping's ratio to its default."""
-    return float(np.exp(-SPREAD * log_ratio))
+GRAVITY = 9.81
+"""[m/s^2]"""
+CANTILEVER = 12.36
+"""Fourth power of 1.8751, the first root of a clamped rod's cos cosh = -1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +34,10 @@ class Locks:
     """The hairs' (S, 24, 3) rest points [m]."""
     lock: np.ndarray
     """(S,) each hair's lock."""
+    rod: np.ndarray
+    """(S,) what bending stiffness holds each hair with, a clamped rod: 12.36 / L^4 [1/m^4]."""
+    pendulum: np.ndarray
+    """(S,) what its weight holds it with, a pendulum: g / L [1/s^2]."""
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:
@@ -60,23 +58,42 @@ class Locks:
             head_centre=strands.head_centre,
             facing=strands.facing,
         )
-        return cls(lock, strands.rest, strands.lock)
+        length = np.maximum(strands.length.astype(np.float64), 1e-3)
+        return cls(lock, strands.rest, strands.lock, CANTILEVER / np.square(np.square(length)), GRAVITY / length)
 
-    def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: float) -> None:
+    def spread(self, log_ratios: np.ndarray) -> np.ndarray:
+        """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more of it.
+
+        Whatever drives a hair out of its lock's way works against its own stiffness k0 and its ties, 2 k in the solver's
+        energy k |x - mean of neighbours|^2 per mass. So it strays by the drive over k0 + 2 k, with k0 = 12.36 B / L^4 + w g / L:
+        ties hardly act on short hair, and are most of what holds long hair. `benchmarks/materials.py` measures it beside
+        the solver.
+
+        Args:
+            log_ratios: of the material (4,), see `Material.log_ratios`.
+
+        Returns:
+            (S,) float32.
+        """
+        bend, weight, _, clumping = constants(log_ratios)
+        own = bend * self.rod + weight * self.pendulum
+        return ((own + 2 * Material().clumping) / (own + 2 * clumping)).astype(np.float32)
+
+    def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:
         """Change how far hairs stray from their locks, every length kept.
 
         Args:
             displacement: of these hairs (n, 72) float32 [m], changed in place.
             hairs: which.
             led: displacement of all locks (L, 24, 3) [m].
-            factor: on the distance between a hair's displacement and its lock's.
+            factor: of all hairs (S,) float32, on the distance between a hair's displacement and its lock's (`spread`).
         """
         rest = self.rest[hairs]
         moved = displacement.reshape(rest.shape)
         way = led[self.lock[hairs]]
         edges = np.diff(rest, axis=1)
         length = np.sqrt(np.square(edges).sum(-1, keepdims=True))
-        wanted = edges + np.diff(way + np.float32(factor) * (moved - way), axis=1)
+        wanted = edges + np.diff(way + factor[hairs, None, None] * (moved - way), axis=1)
         size = np.sqrt(np.square(wanted).sum(-1, keepdims=True))
         change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, 1:]
         moved[:, :2] = 0

@@ -95,3 +95,13 @@ class Material:
                 ) from None
             material = replace(material, **{name: value * getattr(cls(), name) if factor else value})
         return material
+
+
+def constants(log_ratios: np.ndarray) -> tuple[float, float, float, float]:
+    """Bend, weight, damping and clumping, in the units of `Material`, whose `log_ratios` (4,) these are.
+
+    Single precision may leave the ranges by a part in a million, and clumping is never below 0.
+    """
+    default, ratio = Material(), np.exp(np.asarray(log_ratios, np.float64))
+    tie = (default.clumping + _SOFT) * ratio[3] - _SOFT
+    return default.bend * ratio[0], default.weight * ratio[1], default.damping * ratio[2], max(float(tie), 0.0)

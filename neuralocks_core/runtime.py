@@ -9,7 +9,7 @@ cores each at one of its own.
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cached_property, partial
 from threading import Lock
 
@@ -18,7 +18,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.clumping import COLUMN, Locks, spread
+from neuralocks_core.clumping import COLUMN, Locks
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.locks import lock_codes
 from neuralocks_core.motion import Clip
@@ -78,8 +78,21 @@ class StrandModel:
 
     def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
         """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds `start` on."""
-        for _ in self.map(function, chunks(count, start)):
-            pass
+        todo = chunks(count, start)
+        left = iter(todo)
+
+        def work() -> None:
+            for chunk in left:
+                function(chunk)
+
+        # The caller works, too, and is not woken for each chunk: in Python threads that wake cost more than they do.
+        others = [self._pool.submit(work) for _ in range(min(self.threads, len(todo)) - 1)]
+        try:
+            work()
+        finally:
+            wait(others)
+        for other in others:
+            other.result()
 
     def map(self, function: Callable, items) -> Iterable:
         """Results of calls on this model's threads, in order; a single one is made where it stands."""
@@ -136,13 +149,14 @@ class StrandSession:
         """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
         plain, clumping = self._without_clumping(vector)
         frame = self.model.frame(plain)
-        if not clumping:
+        if not clumping:  # exactly 0 for the default
             return frame, None
         locks, session = self._locks
         if self._anchored_at is not None:
             session.anchor(self._anchored_at)
         led = session._tail("displacement", frame).reshape(-1, K, 3)
-        return frame, partial(locks.gather, led=led, factor=spread(clumping))
+        factor = locks.spread(vector[self.model.spec.slices["material"]])
+        return frame, partial(locks.gather, led=led, factor=factor)
 
     def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
         """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
@@ -229,6 +243,7 @@ def graph_session(file: model_file.ModelFile, name: str):
     onnxruntime.disable_telemetry_events()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
+    options.enable_cpu_mem_arena = name == "tail.onnx"  # the others run once a groom or once a frame: they give it back
     options.log_severity_level = 3
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])

@@ -18,7 +18,7 @@ STRANDS = {
     "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, 256), and where the frame "
     "changes the weights behind, `middle` (256, 256) and `out` (256, 72); `material` in it are logarithms of the ratios to "
     "the default bend, weight and damping, and 0: clumping is no input, it scales how far a hair's displacement lies from "
-    "that of its lock's mean strand, by ((clumping + 20) / 80)^-0.85",
+    "that of its lock's mean strand, by (k0 + 120) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 + 9.81 weight / length",
     "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
     "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
     "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
