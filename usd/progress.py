@@ -28,13 +28,13 @@ class _Log:
     def __init__(self, title: str):
         self._title = title
         self._written = self._since = time.monotonic()
-        # A resumed job begins in the middle, and one step follows another: only what is done of this step tells the
-        # speed.
+        # A resumed job begins in the middle, one step follows another, and some prepare long before they begin: only
+        # what is done of this step, since it got going, tells the speed.
         self._first, self._last = 0, (0, -1)
 
     def __call__(self, done: int, total: int, message: str = "") -> None:
         now = time.monotonic()
-        if total != self._last[1] or done < self._last[0]:
+        if total != self._last[1] or done < self._last[0] or done == self._first:
             self._since, self._first = now, done
         self._last = done, total
         if now - self._written <= LOG_EVERY:

@@ -20,11 +20,21 @@ def test_a_log_tells_the_time_left_of_the_step_that_it_is_at(monkeypatch, capsys
     assert lines[3] == "baking: 0% writing"
 
 
+def test_the_time_before_work_gets_going_is_not_taken_for_its_speed(monkeypatch, capsys):
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.progress_bar("training") as say:
+        for done in (0, 0, 0, 0, 50):
+            say(done, 100, "first simulations" if not done else "")
+    assert ", 0.5 min left" in capsys.readouterr().err.splitlines()[-1]
+
+
 def test_quick_work_shows_nothing_and_slow_work_on_a_terminal_a_bar(monkeypatch, capsys):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with progress.progress_bar("baking") as say:
         say(1, 2, "frame 1")
     assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(progress, "QUIET_FOR", -1.0)
     with progress.progress_bar("baking") as say:
         say(1, 2, "frame 1")
