@@ -31,41 +31,12 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     Raises:
         NeuralocksError: the file cannot be written, or the USD libraries are missing.
     """
-    from usd.groom import Spline
-    from usd.scene_writer import HairArrays, SceneArrays, SkinArrays, hair_path, write_scene
+    from usd.scene_writer import SceneArrays, hair_path, write_scene
 
-    splines = {kind: Spline("cubic", basis, "pinned") for kind, basis in BASES.items()}
     motion, rig = sampled.motion, sampled.rig
-    from_core = np.linalg.inv(to_core(sampled.bind_metres))
-    bind = from_core @ sampled.character.skeleton.bind
+    bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
     hairs = hairs_of(armature, scene) if hairs is None else hairs
     labels = names.unique([f"Hair_{h.name}" for h in hairs])
-    prims = []
-    for hair, label in zip(hairs, labels, strict=True):
-        data, radius = hair.data, curves.radius(hair.data)
-        if radius is None or not len(radius):
-            radius = np.full(1, curves.RADIUS)
-        prims.append(
-            HairArrays(
-                label,
-                curves.points(data),
-                curves.counts(data),
-                2 * radius,
-                sampled.bind_places[hair.name_full],
-                motion.places[hair.name_full],
-                sampled.character.head,
-                splines.get(curves.kind(data), Spline()),
-            )
-        )
-    bodies = [
-        body_reader.read(body, armature) for body in bodies_of(armature, scene) if body.name_full in motion.places
-    ]
-    labels_of_shapes = iter(shape_names(bodies))
-    skins = []
-    for arrays, label in zip(bodies, names.unique([f"Body_{b.name}" for b in bodies]), strict=True):
-        points, triangles, shapes = skin(arrays, sampled.bind_places[arrays.name])
-        shapes = {next(labels_of_shapes): offsets for offsets in shapes.values()}
-        skins.append(SkinArrays(label, points, triangles, *joint_weights(arrays, rig.bones), shapes))
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
@@ -82,9 +53,45 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
             motion.translation,
             motion.rotation,
             motion.scale,
-            skins,
+            _skins(armature, scene, sampled),
             motion.shape,
-            prims,
+            [_hair(hair, label, sampled) for hair, label in zip(hairs, labels, strict=True)],
         ),
     )
     return {hair.name_full: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
+
+
+def _hair(hair, label: str, sampled):
+    """A hair object at rest, as `HairArrays`."""
+    from usd.groom import Spline
+    from usd.scene_writer import HairArrays
+
+    data, radius = hair.data, curves.radius(hair.data)
+    if radius is None or not len(radius):
+        radius = np.full(1, curves.RADIUS)
+    basis = BASES.get(curves.kind(data))
+    return HairArrays(
+        label,
+        curves.points(data),
+        curves.counts(data),
+        2 * radius,
+        sampled.bind_places[hair.name_full],
+        sampled.motion.places[hair.name_full],
+        sampled.character.head,
+        Spline("cubic", basis, "pinned") if basis else Spline(),
+    )
+
+
+def _skins(armature, scene, sampled) -> list:
+    """The bodies that were sampled, as `SkinArrays`; shape names are unique among all of them."""
+    from usd.scene_writer import SkinArrays
+
+    bodies = [body for body in bodies_of(armature, scene) if body.name_full in sampled.motion.places]
+    arrays = [body_reader.read(body, armature) for body in bodies]
+    labels, shape_labels = names.unique([f"Body_{a.name}" for a in arrays]), iter(shape_names(arrays))
+    skins = []
+    for body, label in zip(arrays, labels, strict=True):
+        points, triangles, shapes = skin(body, sampled.bind_places[body.name])
+        shapes = {next(shape_labels): offsets for offsets in shapes.values()}
+        skins.append(SkinArrays(label, points, triangles, *joint_weights(body, sampled.rig.bones), shapes))
+    return skins

@@ -79,55 +79,75 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     Raises:
         NeuralocksError: the armature cannot be sampled, in plain words.
     """
-    scene = context.scene
-    rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
-    rig.humanoid()
-    bodies = [body.name_full for body in bodies_of(armature, scene)]
-    tracked = [*(hair.name_full for hair in hairs_of(armature, scene)), *bodies]
-    frames = frame_numbers(*frames_of(scene), scene.neuralocks.subframes)
-    key = key_of(armature, scene)
-    joints = np.empty((len(frames), len(rig.bones), 4, 4))
-    places = {name: np.empty((len(frames), 4, 4)) for name in ["", *tracked]}
-    shapes = []
-    name = armature.name_full
-    for row, frame in enumerate(frames):
+    recording = _Recording(context, armature)
+    total = len(recording.frames)
+    for row in range(total):
+        recording.take(row)
+        yield row + 1, total
+    session.renew_motion(recording.name, recording.sampled(), recording.reader)
+
+
+class _Recording:
+    """An armature's motion, and that of what it carries, while the scene's frames are stepped."""
+
+    def __init__(self, context, armature):
+        self._context, self._scene, self.name = context, context.scene, armature.name_full
+        self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
+        self._rig.humanoid()
+        self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
+        self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
+        self._key = key_of(armature, self._scene)
+        self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
+        self._joints = np.empty((len(self.frames), len(self._rig.bones), 4, 4))
+        self._places = {name: np.empty((len(self.frames), 4, 4)) for name in ["", *self._tracked]}
+        self._shapes = []
+        self.reader = None
+
+    def take(self, row: int) -> None:
+        """Step to a frame and read it; objects are found anew, since handlers may have changed them."""
+        frame = self.frames[row]
         whole = int(np.floor(frame + 1e-6))
-        scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
-        graph = context.evaluated_depsgraph_get()
-        armature = _found(name)
+        self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+        graph = self._context.evaluated_depsgraph_get()
+        armature = _found(self.name)
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
             raise hidden(armature)
         if not row:
-            reader = armature_reader.PoseReader(armature, rig.bones)
-            binds = bind_places(context, armature, tracked, reader, rig.rest)
-            graph = context.evaluated_depsgraph_get()
+            self.reader = armature_reader.PoseReader(armature, self._rig.bones)
+            self._binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
+            graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        joints[row] = reader.world(evaluated)
-        places[""][row] = armature_reader.matrix(evaluated.matrix_world)
-        for other in tracked:
-            places[other][row] = world(_found(other), graph)
-        values = [body_reader.shape_values(find(body)) for body in bodies]
-        shapes.append(np.concatenate([np.zeros(0), *values]))
-        yield row + 1, len(frames)
-    rate, unit = scene.render.fps / scene.render.fps_base, scene.unit_settings.scale_length
-    untrimmed = places[""][0] @ rig.rest
-    motion = Motion.from_world(frames, rate, unit, rig.parents, untrimmed, joints, np.array(shapes), places, name)
-    head = rig.humanoid()["head"]
-    for other in tracked:
-        own = rig_service.on_head(places[other], places[""], joints[:, head], untrimmed[head])
-        binds[other] = binds[other] if own is None else own
-    arrays = [(body_reader.read(find(body), armature), binds[body]) for body in bodies]
-    metres = unit * rig_service.size_shown(rig, places[""][0], motion)
-    character = rig_service.character(rig, places[""][0], arrays, metres)
-    clip = motion.clip(to_core(unit), find(name).neuralocks_character.loop)
-    before = session.rigs.get(name)
-    if before is not None and rig_service.same(before.character, character):
-        character = before.character
-    trim = trim_of(untrimmed, name)
-    drawn = (joints @ trim).astype(np.float32)
-    sampled = SampledRig(rig, motion, character, clip, trim, key, binds, bind_metres=metres, drawn=drawn)
-    session.renew_motion(name, sampled, reader)
+        self._joints[row] = self.reader.world(evaluated)
+        self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
+        for other in self._tracked:
+            self._places[other][row] = world(_found(other), graph)
+        values = [body_reader.shape_values(find(body)) for body in self._bodies]
+        self._shapes.append(np.concatenate([np.zeros(0), *values]))
+
+    def sampled(self) -> SampledRig:
+        """What was read, as the character and clip that live view and bake use."""
+        rig, places, armature = self._rig, self._places, find(self.name)
+        rate = self._scene.render.fps / self._scene.render.fps_base
+        unit = self._scene.unit_settings.scale_length
+        untrimmed = places[""][0] @ rig.rest
+        motion = Motion.from_world(
+            self.frames, rate, unit, rig.parents, untrimmed, self._joints, np.array(self._shapes), places, self.name
+        )
+        head, binds = rig.humanoid()["head"], self._binds
+        for other in self._tracked:
+            own = rig_service.on_head(places[other], places[""], self._joints[:, head], untrimmed[head])
+            binds[other] = binds[other] if own is None else own
+        arrays = [(body_reader.read(find(body), armature), binds[body]) for body in self._bodies]
+        metres = unit * rig_service.size_shown(rig, places[""][0], motion)
+        character = rig_service.character(rig, places[""][0], arrays, metres)
+        clip = motion.clip(to_core(unit), armature.neuralocks_character.loop)
+        before = session.rigs.get(self.name)
+        if before is not None and rig_service.same(before.character, character):
+            character = before.character
+        trim = trim_of(untrimmed, self.name)
+        drawn = (self._joints @ trim).astype(np.float32)
+        return SampledRig(rig, motion, character, clip, trim, self._key, binds, bind_metres=metres, drawn=drawn)
 
 
 def _found(name: str):
