@@ -5,6 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.collider import Collider
+from neuralocks_core.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
@@ -108,8 +109,9 @@ class PosePool:
         result = np.ones(near.shape)
         for row, pose in enumerate(poses):
             if near[row].any():
-                collider = Collider(self.bodies[pose], self._patch.triangles)
-                result[row, near[row]] = collider.distance(points[row][near[row]])[0]
+                result[row, near[row]] = proven_distances(
+                    self.bodies[pose], self._patch.triangles, points[row][near[row]]
+                )
         return result
 
 
@@ -158,9 +160,7 @@ def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.
     patch = _BodyPatch(rig, np.random.default_rng(0), 1)
     skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
     shape = np.zeros(len(patch.offsets))
-    return np.stack(
-        [Collider(patch.posed(m, shape)[0], patch.triangles).distance(p)[0] for m, p in zip(skinning, points)]
-    )
+    return np.stack([proven_distances(patch.posed(m, shape)[0], patch.triangles, p) for m, p in zip(skinning, points)])
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:

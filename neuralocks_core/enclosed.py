@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether points lie in a mesh, however it folds into itself."""
+
+import numpy as np
+
+from neuralocks_core.collider import Collider
+
+_DEEP = 2e-3
+"""Depth [m] from which on it is proven."""
+_AT_ONCE = 2_000_000
+"""Pairs of a point and a triangle that are held in memory."""
+
+
+def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them; what seems deep inside is proven to be."""
+    result = Collider(vertices, triangles).distance(points)[0]
+    deep = np.flatnonzero(result < -_DEEP)
+    result[deep] = np.where(enclosed(points[deep], vertices, triangles), result[deep], -result[deep])
+    return result
+
+
+def enclosed(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Which points (N,) of (N, 3) a mesh of vertices (V, 3) and outward triangles (F, 3) goes round more than half.
+
+    The winding number, a sum of solid angles (Van Oosterom and Strackee 1983), holds where the surface cuts through
+    itself, as skin does in the crease of a bent neck: there the nearest face may look either way, and a point a hand's
+    breadth away from it in free air seems as deep inside. A hole counts by the angle at which it is seen.
+    """
+    inside = np.zeros(len(points), bool)
+    corners = vertices[triangles].astype(float)
+    step = max(1, _AT_ONCE // max(len(triangles), 1))
+    for first in range(0, len(points), step):
+        a, b, c = np.moveaxis(corners[None] - points[first : first + step, None, None], 2, 0)
+        la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+        volume = np.sum(a * np.cross(b, c), axis=-1)
+        spread = la * lb * lc + np.sum(a * b, -1) * lc + np.sum(b * c, -1) * la + np.sum(c * a, -1) * lb
+        inside[first : first + step] = 2 * np.arctan2(volume, spread).sum(axis=1) > 2 * np.pi
+    return inside
