@@ -47,7 +47,7 @@ class Material:
             low, high = RANGES[name]
             if not np.isfinite(value) or not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
                 raise NeuralocksError(
-                    f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside"
+                    f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"
                 )
 
     def log_ratios(self) -> np.ndarray:

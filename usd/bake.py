@@ -13,6 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 
+from .notes import out_of_range
 from .posing import GroomPoser
 from .samples import check_out, write_samples
 from .stage import Shot, StageGroom, read_shot
@@ -103,7 +104,8 @@ def bake(
         return GroomPoser(item, strand_model, look, **options)
 
     resumed = write_samples(shot, out, codes, poser, inputs | options, velocities=velocities, progress=progress)
-    notes = [*shot.notes, *(text for rig in shot.rigs if loop for text in rig.loop_notes())]
+    notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

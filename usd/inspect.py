@@ -8,6 +8,7 @@ from pxr import UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 
 from .attach import attach, rig_joint
@@ -15,7 +16,7 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
-from .notes import composition_notes, groom_notes, head_width, left_out, rig_notes, too_far
+from .notes import composition_notes, groom_notes, head_width, left_out, out_of_range, rig_notes, too_far
 from .placement import Placement
 from .rig_source import read_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
@@ -40,6 +41,8 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     kind = path.suffix.lower()
     if kind in USD:
         return {"file": str(path), "kind": "stage", **_stage(path, head, joints)}
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; name the file in it")
     if not path.is_file():
         raise NeuralocksError(f"{path}: no such file; check the path")
     if kind == ".neuralocks":
@@ -77,14 +80,15 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
+        spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
     if not rigs and not stops:
         stops.append(f"{path.name}: holds no UsdSkel skeleton; export the character with its armature")
     elif rigs and not moving:
         stops.append(
             f"{rigs[0].path}: the skeleton has no animation; bind a SkelAnimation to it (skel:animationSource)"
         )
-    grooms, far = [], []
-    for prim in find_curves(stage):
+    grooms, far, curves = [], [], find_curves(stage)
+    for prim in curves:
         try:
             groom = _curves(prim, rigs, border, head, spoils, stops, far)
             grooms += [groom] if groom else []
@@ -93,7 +97,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     (spoils if grooms else stops).extend(far)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
-    elif not grooms and not far and not any("groom" in s for s in stops):
+    elif not curves:
         stops.append(f"{path.name}: holds no groom (no BasisCurves prim); add one, or import a hair file")
     return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
 
@@ -124,10 +128,11 @@ def _chains(rig, spoils: list[str]) -> list[dict]:
     try:
         chains = assemble_rig(rig.character, core_meshes(rig)).chains
         check_orients(rig, chains)
+    except NoHairChains:
+        return []
     except NeuralocksError as error:
-        if "no hair chains" not in str(error):
-            reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
-            spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
+        reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
+        spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
     spoils += weight_notes(rig)
     return [

@@ -54,6 +54,17 @@ def rig_notes(rig: StageRig) -> list[str]:
     return notes
 
 
+def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
+    """What to say of frames (time codes) in which the character stands still, since its animation is elsewhere."""
+    samples = rig.source.samples
+    if len(samples) < 2 or (samples[0] <= last and first <= samples[-1]):
+        return []
+    return [
+        f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, none of it within {first:g} to "
+        f"{last:g}: a held pose; check --frames, the shot's range and the layer offsets"
+    ]
+
+
 def head_width(rig: StageRig) -> float | None:
     """Width of the head's skin in bind pose [m], if the rig has a head and skin on it."""
     if "head" not in rig.character.humanoid or (mask := rig.character.head_mask()) is None or mask.sum() < 20:

@@ -61,6 +61,7 @@ def train(
         import warp  # noqa: F401  (the solver's)
     except ImportError as error:
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+    _check_amounts({**settings, "rollouts": rollouts, "processes": processes})
     if settings.get("device") == "cuda" and not torch.cuda.is_available():
         raise NeuralocksError("--device cuda: this machine has no CUDA device; use --device cpu")
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -80,6 +81,13 @@ def train(
         scene, out, options, rollouts=rollouts, processes=processes, resume=resume,
         credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
     )  # fmt: skip
+
+
+def _check_amounts(given: dict) -> None:
+    for name in ("minutes", "steps", "rollouts", "processes"):
+        value = given.get(name)
+        if isinstance(value, (int, float)) and not 0 < value < math.inf:
+            raise NeuralocksError(f"--{name} {value:g}: must be above 0")
 
 
 def parsed(kind: type, settings: dict) -> dict:

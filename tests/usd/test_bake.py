@@ -15,6 +15,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
 from usd.border import open_stage
+from usd.inspect import inspect
 from usd.stage import read_shot
 
 from .shots import CENTRE, HEAD, Recipe, strand_points, write_shot
@@ -282,6 +283,18 @@ def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, m
         bake(shot, out, model, progress=stop)
     own.write_text("another")
     assert bake(shot, out, model).resumed == 0
+
+
+def test_frames_without_animation_are_said(tmp_path, still_model):
+    """A shot at 1001 whose animation stayed at 1: nothing is wrong with any file, and nothing moves."""
+    shot = write_shot(tmp_path)
+    assert not any("held pose" in note for note in bake(shot, tmp_path / "a.usdc", still_model, frames="9:20").notes)
+    assert any("1 to 9" in note for note in bake(shot, tmp_path / "b.usdc", still_model, frames="1001:1003").notes)
+    stage = Usd.Stage.Open(str(shot))
+    stage.SetStartTimeCode(1001)
+    stage.SetEndTimeCode(1048)
+    stage.GetRootLayer().Save()
+    assert any("layer offsets" in note for note in inspect(shot)["spoils"])
 
 
 def test_material_and_strength_reach_the_network(tmp_path, model):

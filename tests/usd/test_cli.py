@@ -221,6 +221,10 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
     for words, said in (
         (("--method", "magic"), "selfsupervised"),
         (("--paper",), "--method"),
+        (("--minutes", "0"), "--minutes"),
+        (("--minutes", "nan"), "--minutes"),
+        (("--steps", "-1"), "--steps"),
+        (("--rollouts", "0"), "--rollouts"),
         ((*selfsupervised, "--set", "colour=red"), "undetached"),
         ((*selfsupervised, "--set", "form=round"), "constant"),
         ((*selfsupervised, "--set", "rate=nan"), "rate"),
