@@ -10,6 +10,10 @@ NEARLY = 1e-4
 """How far the columns' products may be from a rotation's for two of Newton's steps to reach rounding."""
 
 
+class Mirrored(NeuralocksError):
+    """A transform has negative scale."""
+
+
 def to_quaternion(matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) wxyz, w >= 0, of rotation matrices (..., 3, 3)."""
     matrices = np.asarray(matrices, float)
@@ -75,7 +79,8 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
     """Rotation (..., 3, 3) of transforms (..., 4, 4) after scale is divided out.
 
     Raises:
-        NeuralocksError: a transform is mirrored, flat or not finite; `subject` names it.
+        Mirrored: a transform is.
+        NeuralocksError: a transform is flat or not finite; `subject` names it.
     """
     linear = np.asarray(transforms, float)[..., :3, :3]
     if not np.isfinite(linear).all():
@@ -85,9 +90,7 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
         raise NeuralocksError(f"{subject}: a transform has zero scale; give every joint a scale above zero")
     linear = linear / scale
     if (volumes(linear) <= 0).any():
-        raise NeuralocksError(
-            f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale"
-        )
+        raise Mirrored(f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale")
     # The nearest rotation, so that shear from non-uniform scale cannot leak in. What is one up to rounding gets there by
     # Newton's iteration, whose error is squared in each step: a fifth of the time.
     square = np.swapaxes(linear, -1, -2) @ linear

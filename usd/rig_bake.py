@@ -11,6 +11,7 @@ import numpy as np
 from pxr import UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
 from .damage import names_damage
@@ -109,13 +110,11 @@ def _read(shot, skeleton, head, model) -> RiggedHair:
     tops = [model.chains.names[i] for i in model.chains.roots]
     try:
         hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops)
-    except NeuralocksError as error:
-        if "--chains" in str(error) and "no joint has such a name" in str(error):
-            raise NeuralocksError(
-                f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
-                "give a model trained for this rig (neuralocks rig train)"
-            ) from None
-        raise
+    except NoHairChains:
+        raise NeuralocksError(
+            f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
+            "give a model trained for this rig (neuralocks rig train)"
+        ) from None
     model.chains.match(hair.source.character.skeleton.names)
     model.chains.check_same(hair.rig.chains)
     return hair

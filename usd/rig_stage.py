@@ -67,20 +67,18 @@ def read_rigged_hair(
             )
     if not prims:
         raise NeuralocksError(f"{path}: it has no Skeleton; give a stage with a skinned character")
-    found, reasons = [], []
+    found, errors = [], []
     for prim in prims:
         try:
             _check_authored(prim)
             source = read_rig(stage, prim, border, head, all_shapes=all_shapes)
             rig = assemble_rig(source.character, core_meshes(source), chains)
         except NeuralocksError as error:
-            if len(prims) == 1:
-                raise NeuralocksError(_with_path(prim, error)) from None
-            reasons.append(_with_path(prim, error))
+            errors.append(type(error)(_with_path(prim, error)))
             continue
         found.append(RiggedHair(stage, border, source, rig))
     if not found:
-        raise NeuralocksError(reasons[0])
+        raise errors[0]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")

@@ -11,7 +11,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
-from neuralocks_core.rotation import from_quaternion, rotation_part, sizes, to_quaternion
+from neuralocks_core.rotation import Mirrored, from_quaternion, rotation_part, sizes, to_quaternion
 
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
@@ -26,12 +26,10 @@ def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
     joints = np.asarray(joints, float)
     try:
         turn = rotation_part(joints, subject)
-    except NeuralocksError as error:
-        if "mirrored" in str(error):
-            raise NeuralocksError(
-                f"{subject}: it is mirrored (negative scale); apply its scale (Ctrl A in Object Mode)"
-            ) from None
-        raise
+    except Mirrored:
+        raise NeuralocksError(
+            f"{subject}: it is mirrored (negative scale); apply its scale (Ctrl A in Object Mode)"
+        ) from None
     scale = sizes(joints)
     result = joints.copy()
     result[..., :3, :3] = turn * scale[..., None, None]

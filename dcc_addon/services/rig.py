@@ -54,10 +54,10 @@ class RigArrays:
             raise NeuralocksError(f"{self.name}: the armature has no bones; choose the armature that moves the body")
         try:
             return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3], self.by_hand())
-        except NeuralocksError as error:
-            if "head" in str(error) and not self.head_bone:
-                raise NeuralocksError(f"{self.name}: no bone is named like a head; choose the head bone") from None
-            raise
+        except NeuralocksError:
+            if self.head_bone:
+                raise
+            raise NeuralocksError(f"{self.name}: no bone is named like a head; choose the head bone") from None
 
 
 @dataclass(frozen=True, eq=False)

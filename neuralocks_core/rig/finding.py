@@ -14,6 +14,10 @@ from neuralocks_core.rig.measuring import measured_chains
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 
+class NoHairChains(NeuralocksError):
+    """No joint is hair, or none has the names that were given."""
+
+
 def find_chains(
     character: Character, meshes: list[SkinnedMesh] | None = None, patterns: list[str] | None = None
 ) -> HairChains:
@@ -29,13 +33,14 @@ def find_chains(
         patterns: names by hand.
 
     Raises:
-        NeuralocksError: there are none, a bone has no length, or a joint is mirrored or unevenly scaled.
+        NoHairChains: there are none.
+        NeuralocksError: a bone has no length, or a joint is mirrored or unevenly scaled.
     """
     skeleton, head = character.skeleton, character.head
     tops = _by_pattern(character, patterns) if patterns else _by_itself(character, meshes)
     if not tops:
         others = ", ".join(leaf(skeleton.names[j]) for j in skeleton.children[head][:8]) or "nothing"
-        raise NeuralocksError(
+        raise NoHairChains(
             f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); "
             "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
         )
@@ -51,7 +56,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
         if any(fnmatch.fnmatchcase(name, p) or fnmatch.fnmatchcase(leaf(name), p) for p in patterns)
     ]
     if not hits:
-        raise NeuralocksError(
+        raise NoHairChains(
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"
         )
     below = character.skeleton.below(character.head)
