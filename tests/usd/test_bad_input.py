@@ -128,6 +128,12 @@ def test_a_broken_stage_is_named_in_one_line(tmp_path, model, case):
         assert any(fact in line for line in facts["stops"])
 
 
+def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called(tmp_path):
+    Usd.Stage.CreateNew(str(tmp_path / "groom.usda")).Save()
+    stops = inspect(tmp_path / "groom.usda")["stops"]
+    assert "no UsdSkel skeleton" in stops[0] and "no BasisCurves prim" in stops[1]
+
+
 def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
     path = edited(tmp_path, renamed, Recipe(bound="none"))
     try:

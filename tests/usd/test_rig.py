@@ -120,6 +120,14 @@ def test_the_body_stays_sample_for_sample(tmp_path):
     assert stage.GetRootLayer().subLayerPaths[0] == "./shot.usda"
 
 
+def test_a_model_of_another_rig_is_named_as_such(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    shot.write_text(shot.read_text().replace("hair_", "tuft_"))
+    with pytest.raises(NeuralocksError, match=r"1 hair chains \(hair_0, ...\).*a model trained for this rig"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+
+
 def test_units_axes_and_rates_cancel(tmp_path):
     """Centimetres, Z up and 48 fps give the same local turns at shared times."""
     plain = small_shot(tmp_path / "a.usda")
