@@ -67,7 +67,7 @@ def train(
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
     from neuralocks_core.training.regression import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
-    from neuralocks_core.training.train import train_strands
+    from neuralocks_core.training.train import train_strands, work_folder
 
     from .training import training_scene
 
@@ -75,6 +75,7 @@ def train(
     values = parsed(kind, settings)
     options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
     history = {"spec": paper_boundary()} if paper else {}
+    work_folder(out, resume=resume)
     scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=options.seed, **history)
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(

@@ -61,7 +61,8 @@ def train_strands(
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
         processes: that make rollouts; the network's training uses what is left.
         work: folder for checkpoint and rollouts; `OUT.training` beside the model where left out.
-        resume: go on from the checkpoint in `work`; with a larger budget than before, a finished run trains longer.
+        resume: go on with what is in `work`: simulations, strand codes, the checkpoint if it came to one; with a larger
+            budget than before, a finished run trains longer.
         keep_work: leave `work` behind after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
@@ -71,13 +72,8 @@ def train_strands(
         NeuralocksError: nothing to train on, a checkpoint that does not fit, or a failed solver process.
     """
     options = options or RegressionOptions()
-    out = Path(out)
-    if out.suffix != ".neuralocks":
-        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
-    work = Path(work) if work else out.with_name(out.name + ".training")
+    out, work = Path(out), work_folder(out, work, resume)
     saved = work / "checkpoint.npz"
-    if resume and not saved.exists():
-        raise NeuralocksError(f"{work}: there is no checkpoint to resume; train without --resume")
     if not resume:
         _discard(work)
     if not any(groom.valid.any() for groom in scene.grooms):
@@ -94,7 +90,7 @@ def train_strands(
         coder = _coder(scene, work, options, report)
         codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
         method = method_of(scene, codes, options, farm, report)
-        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, resume)
+        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, resume and saved.exists())
         gauge = run.train(farm, held_farm, report)
     card = {
         "command": command,
@@ -116,6 +112,21 @@ def train_strands(
     if not keep_work:
         _discard(work)
     return path
+
+
+def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
+    """Where a training keeps what it goes on from: asked for before anything is read.
+
+    Raises:
+        NeuralocksError: `out` is no name for a model, or there is nothing to resume.
+    """
+    out = Path(out)
+    if out.suffix != ".neuralocks":
+        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
+    work = Path(work) if work else out.with_name(out.name + ".training")
+    if resume and not any((work / name).exists() for name in ("checkpoint.npz", "codes.npz")):
+        raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
+    return work
 
 
 class _Run:

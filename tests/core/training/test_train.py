@@ -93,23 +93,29 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
 
 
 def test_a_killed_run_goes_on(scene, tmp_path):
+    """Killed while the first simulations are made, and again after the first checkpoint."""
     out = tmp_path / "hair.neuralocks"
+    work = tmp_path / "hair.neuralocks.training"
     short = RegressionOptions(steps=40, clips=8, strands=4)
+    made = {}
+    for resume, moment in ((False, "first simulations: 2"), (True, "motion error")):
 
-    def kill(done, total, message):
-        if "motion error" in message:
-            raise KeyboardInterrupt
+        def kill(done, total, message, moment=moment):
+            if moment in message:
+                raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        train_strands(scene, out, short, rollouts=30, progress=kill)
-    assert not out.exists()
-    assert (tmp_path / "hair.neuralocks.training" / "checkpoint.npz").exists()
+        with pytest.raises(KeyboardInterrupt):
+            train_strands(scene, out, short, rollouts=30, resume=resume, progress=kill)
+        assert not out.exists() and (work / "checkpoint.npz").exists() == resume
+        kept = {path: path.stat().st_mtime_ns for path in [work / "codes.npz", *work.glob("*/*.npz")]}
+        assert len(kept) > 2 and made.items() <= kept.items()
+        made = kept
     train_strands(scene, out, short, rollouts=30, resume=True)
     assert model.read(out).meta["training"]["steps"] >= 40
 
 
 def test_what_cannot_be_resumed_says_why(scene, tmp_path):
-    with pytest.raises(NeuralocksError, match="no checkpoint"):
+    with pytest.raises(NeuralocksError, match="no training to resume"):
         train_strands(scene, tmp_path / "x.neuralocks", resume=True)
     with pytest.raises(NeuralocksError, match="ends in .neuralocks"):
         train_strands(scene, tmp_path / "x.zip")
