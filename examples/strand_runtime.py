@@ -7,8 +7,8 @@ engine, and prints how far its strands lie from the bake's. The stage must be in
 24 vertices even in arc length, since those of the network are compared.
 """
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -125,4 +125,7 @@ def largest_difference(folder: Path, shot: Path, baked: Path) -> float:
 
 
 if __name__ == "__main__":
-    print(f"{largest_difference(*map(Path, sys.argv[1:4])):.2e} m at most from the bake")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("folder", "shot", "baked"):
+        parser.add_argument(name, type=Path)
+    print(f"{largest_difference(**vars(parser.parse_args())):.2e} m at most from the bake")
