@@ -39,6 +39,12 @@ def backdrop(width: int, height: int) -> np.ndarray:
 class VtkCanvas:
     """Draws with VTK in an off-screen window, larger than asked for and then reduced.
 
+    Args:
+        width, height: of a picture in pixels.
+        triangles: of the body (F, 3) int; none where it is not drawn.
+        strands: how many there will be in each picture, of `detail.vertices` points each.
+        detail: how finely; see `film.Detail`.
+
     Raises:
         RuntimeError, ImportError: VTK is missing or has no way to draw here.
     """
@@ -59,7 +65,13 @@ class VtkCanvas:
         self._backdrop = backdrop(width, height).astype(np.float32)
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
-        """An image (height, width, 3) uint8 of body points (V, 3) and hair points (P, 3) with colours in 0..1."""
+        """An image (height, width, 3) uint8.
+
+        Args:
+            camera: what it is seen by.
+            body: points (V, 3) [m], or None for no body; body_colours: (V, 3) sRGB in 0..1.
+            hair: points (P, 3) [m], strand after strand; hair_colours: (P, 3).
+        """
         body_colours, hair_colours = ((255 * c).astype(np.uint8) for c in (body_colours, hair_colours))
         if len(hair):
             if self._hair is None:
@@ -90,7 +102,7 @@ class VtkCanvas:
 class PlainCanvas:
     """Draws by sampling every triangle and segment a pixel or so apart and keeping the nearest sample.
 
-    Slower and plainer than VTK, and works wherever numpy does.
+    Slower and plainer than VTK, and works wherever numpy does. Arguments as `VtkCanvas`.
     """
 
     def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):

@@ -107,7 +107,9 @@ def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
 
 
 def penetration_of(points: np.ndarray, rest_distance: np.ndarray, colliders: list[Collider]) -> dict[str, float]:
-    """Penetration of points (T, N, 3) [m] in canonical space, one collider a frame."""
+    """`metrics.penetration` of points (T, N, 3) [m] in canonical space, one collider a frame; `rest_distance` (N,) [m] is
+    how far outside each lies at rest.
+    """
     distance = np.stack([c.distance(p, limit=0.005)[0] for c, p in zip(colliders, points, strict=True)])
     return metrics.penetration(distance, rest_distance)
 

@@ -106,12 +106,12 @@ def ease(times: np.ndarray, start: float, duration: float) -> np.ndarray:
 
 
 def pulse(times: np.ndarray, start: float, attack: float, hold: float, release: float) -> np.ndarray:
-    """Up in `attack`, held, and down in `release`, all with least jerk."""
+    """0, up to 1 in `attack` from `start` on, held for `hold`, and down in `release` [s], all with least jerk; (T,)."""
     return ease(times, start, attack) - ease(times, start + attack + hold, release)
 
 
 def swing(times: np.ndarray, start: float, cycles: float, rate: float) -> np.ndarray:
-    """A sine of `cycles` at `rate` [Hz] whose first and last half cycle fade in and out."""
+    """A sine of `cycles` at `rate` [Hz] from `start` [s] on, whose first and last half cycle fade in and out; (T,)."""
     end = start + cycles / rate
     fade = ease(times, start, 0.5 / rate) - ease(times, end - 0.5 / rate, 0.5 / rate)
     return fade * np.sin(2 * np.pi * rate * (times - start))

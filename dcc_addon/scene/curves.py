@@ -123,7 +123,9 @@ def write(data, values: np.ndarray) -> None:
 
 
 def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None):
-    """A new Curves data block of polylines from counts (S,) and points (P, 3)."""
+    """A new Curves data block of polylines, of this name and material, with `strands` (S,) vertices each and points
+    `points_of` (P, 3) in the object's space.
+    """
     data = bpy.data.hair_curves.new(name)
     if hasattr(data, "add_curves"):
         data.add_curves([int(n) for n in strands])

@@ -105,10 +105,22 @@ class Motion:
     def from_world(
         cls, frames, rate, metres_per_unit, parents, bind, joints, shape, places, subject="armature"
     ) -> "Motion":
-        """From world transforms of every joint in the bind pose, (J, 4, 4), and over time, (T, J, 4, 4).
+        """From world transforms.
 
         Channels are relative to the parent as stored, rounding included, so that rounding does not add up along the
         spine.
+
+        Args:
+            frames: (T,); rate: frames a second.
+            metres_per_unit: the scene's.
+            parents: (J,) int, -1 for a root.
+            bind: world transforms of every joint in the bind pose, (J, 4, 4); joints: over time, (T, J, 4, 4).
+            shape: blend shape weights (T, B).
+            places: world transforms (T, 4, 4) of other objects, by name.
+            subject: what messages call the armature.
+
+        Raises:
+            NeuralocksError: a transform is mirrored, flat or not finite.
         """
         trim = trim_of(bind, subject)
         joints, parents = similar(joints, subject) @ trim, np.asarray(parents, int)

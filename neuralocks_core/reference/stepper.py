@@ -18,7 +18,19 @@ CHUNKS = (3, 3, 100)
 
 
 class Stepper:
-    """State of all strands in world space. Private to the reference; arguments are checked by `simulate`."""
+    """State of all strands in world space. Private to the reference; `rods.simulate` checks the arguments.
+
+    Args:
+        rods: the strands at rest.
+        material: bend, weight, damping and clumping, each (S,).
+        neighbours: (S, N) int strands tied to each, -1 for none; N may be 0.
+        margin: largest distance kept from the body [m].
+        collision: stiffness of the contact [1/(m s^2)].
+        gravity: [m/s^2].
+        tolerance: rms net force per mass [m/s^2] below which a strand is solved.
+        volume: stiffness against crowding [m^2/s^2], 0 for none.
+        device: of warp.
+    """
 
     def __init__(
         self,
@@ -99,7 +111,7 @@ class Stepper:
         self.mesh.refit()
 
     def begin(self, turn: np.ndarray, origin: np.ndarray, points: np.ndarray) -> None:
-        """Set the first pose and (S, K, 3) canonical points."""
+        """Set the first pose, the head's rotation (4,) xyzw and place (3,) [m], and (S, K, 3) canonical points [m]."""
         self._pose(turn, origin)
         self.x.assign(np.ascontiguousarray(np.swapaxes(points @ self._matrix().T + origin, 0, 1)))
         self._add_drift()
@@ -123,7 +135,9 @@ class Stepper:
         self._moving = False
 
     def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
-        """Advance to a new pose of the head; the body has been moved."""
+        """Advance by `dt` [s] to a new pose of the head, rotation (4,) xyzw and place (3,) [m], in at most `iterations`
+        Newton steps; the body has been moved.
+        """
         wp = self.wp
         old_turn, old_origin = self.turn, self.origin
         self._pose(turn, origin)

@@ -87,7 +87,7 @@ def rounded(x: array_vec, points: wp.array2d(dtype=wp.vec3)):
 
 @wp.kernel(enable_backward=False)
 def densities(grid: wp.uint64, points: wp.array(dtype=wp.vec3), mass: array_real, x: array_vec, density: array_real):
-    """rho_i = sum_j m_j W(|x_i - x_j|), itself included."""
+    """rho_i = sum_j m_j W(|x_i - x_j|), itself included; `points` are x in float32, in which `grid` was built."""
     k, s = wp.tid()
     p = x[k, s]
     total = wp.float64(0.0)
@@ -118,7 +118,10 @@ def push(
     target: array_vec,
     pull: array_real,
 ):
-    """The energy's negative gradient, as a shift of the spring that stands for all other forces."""
+    """The energy's negative gradient, as a shift of the spring `pull` to `target` that stands for all other forces.
+
+    pressure: of `pressures`; stiffness [m^2/s^2]; grid and points as in `densities`.
+    """
     k, s = wp.tid()
     if k < 2:
         return

@@ -58,7 +58,7 @@ def _weights(layer: nn.Linear | tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarr
 
 
 class _Graph:
-    """A chain of layers under construction."""
+    """A chain of layers under construction; values are known by their names."""
 
     def __init__(self, name: str):
         from onnx import helper, numpy_helper
@@ -67,6 +67,7 @@ class _Graph:
         self.name, self.nodes, self.constants = name, [], []
 
     def linear(self, value: str, layer, output: str | None = None, *, half: bool = False) -> str:
+        """x W^T + b of a linear layer, or of its folded arrays; `half` stores W in float16."""
         output = output or f"linear{len(self.nodes)}"
         weight, bias = _weights(layer)
         stored = (self.half if half else self.constant)(f"{output}.weight", weight)
@@ -90,14 +91,17 @@ class _Graph:
         return name
 
     def constant(self, name: str, array: np.ndarray) -> str:
+        """An array under this name, which is returned."""
         self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
         return name
 
     def node(self, kind: str, inputs: list[str], output: str) -> str:
+        """One operation of ONNX; the name of its only output is returned."""
         self.nodes.append(self.helper.make_node(kind, inputs, [output]))
         return output
 
     def finish(self, inputs: dict[str, tuple], outputs: dict[str, tuple]) -> bytes:
+        """The checked graph; inputs and outputs are names -> shapes, where a name in a shape is any size."""
         import onnx
 
         def describe(values):

@@ -117,12 +117,18 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
 
 
 def normalise(net: StrandNet, strands: np.ndarray, frames: np.ndarray, history: slice, static: bool) -> None:
-    """Set the network's input normalisation from samples."""
+    """Set the network's input normalisation from strand inputs (n, 70) and boundary vectors (m, F), whose history lies
+    at `history`; `static` networks do not see it.
+    """
     net.set_normalisation(torch.from_numpy(strands), torch.from_numpy(frames), history, static=static)
 
 
 def wait(farm: RolloutFarm, count: int, report: Callable[[float, str], None]) -> None:
-    """Until a farm has made so many rollouts."""
+    """Until a farm has made `count` rollouts; `report` is told how many there are.
+
+    Raises:
+        NeuralocksError: a process of it failed.
+    """
     while len(farm.files()) < count:
         if farm.failed() or not farm.alive:
             raise NeuralocksError("training: the solver's process ended early; free some memory and try again")

@@ -164,7 +164,7 @@ class StrandNet(nn.Module):
 
 
 class LowRank(nn.Module):
-    """Adds a matrix of low rank whose terms a frame weighs: x -> back(weights * to(x))."""
+    """A matrix (outputs, inputs) of low rank whose terms a frame weighs: x -> back(weights * to(x))."""
 
     def __init__(self, inputs: int, rank: int, outputs: int):
         super().__init__()

@@ -185,6 +185,11 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
     they do, `collision` how far x lies under the plane of the body next to x*, beyond where x* itself lies or MARGIN,
     whichever is nearer the body.
+
+    Args:
+        net: the network.
+        batch: what `RolloutBank.batch` gives.
+        options: weights, and what the network's output stands for.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])
@@ -222,7 +227,14 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
 def predicted(
     net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str = "direction", anchored: bool = True
 ) -> np.ndarray:
-    """The network's displacement (T, n, 24, 3) float32 [m] over a whole rollout."""
+    """The network's displacement (T, n, 24, 3) float32 [m] over a whole rollout.
+
+    Args:
+        net: the network.
+        bank: where the rollout's strand inputs are.
+        rollout: whose strands, frames and materials.
+        output, anchored: see `networks.deform`; not anchored, the bind pose's own answer stays in.
+    """
     chosen = rollout.strands
     device = next(net.parameters()).device
     strands = net.strand_part(torch.from_numpy(bank.inputs[rollout.groom][chosen]).to(device))

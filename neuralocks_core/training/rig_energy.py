@@ -128,7 +128,12 @@ class RigEnergy(torch.nn.Module):
         return rotation, position, ends
 
     def skin(self, rotation, position, chosen=None) -> torch.Tensor:
-        """Hair vertices (B, V, 3) [m] by linear blend skinning; all, or the chosen ones."""
+        """Hair vertices (B, V, 3) [m] by linear blend skinning; all, or the chosen ones (of `draw`).
+
+        Args:
+            rotation, position: of the joints, as `pose` gives them.
+            chosen: indices of vertices.
+        """
         weights, points = (self.weights, self.points) if chosen is None else (self.weights[chosen], self.points[chosen])
         count = len(rotation)
         shift = position - torch.einsum("bnij,nj->bni", rotation, self.origins)
@@ -141,6 +146,8 @@ class RigEnergy(torch.nn.Module):
         """Elastic and collision energy (B,) each, of turns (B, N, 4) in poses (B,) of the pool.
 
         Args:
+            pool: posed bodies; poses: which of them, (B,) int.
+            quaternions: the turns, wxyz, canonical.
             gravity: its directions in the head's frame, (B, 3) numpy.
             some: which hair vertices collide; all if left out. Their planes are those of the state itself.
         """
@@ -153,14 +160,19 @@ class RigEnergy(torch.nn.Module):
         return elastic, self.collision(points, torch.as_tensor(normals), torch.as_tensor(offsets), some)
 
     def elastic(self, quaternions, gravity, ends) -> torch.Tensor:
-        """Gravity and bend-twist (B,) [m^2/s^2]; `gravity` (B, 3) in the head's frame [m/s^2]."""
+        """Gravity and bend-twist (B,) [m^2/s^2] of turns (B, N, 4) wxyz, whose bones end at `ends` (B, M, 3) [m];
+        `gravity` (B, 3) in the head's frame [m/s^2].
+        """
         bend = 2 * (quaternions[..., 1:].square().sum(-1) * self.stiffness).sum(-1)
         moved = ends - self.rest_ends
         fall = (moved * (self.mass[:, None] * gravity[:, None] * self.material.weight + self.support)).sum((-1, -2))
         return bend - fall
 
     def collision(self, points, normals, offsets, chosen=None) -> torch.Tensor:
-        """Body collision (B,) [m^2/s^2] of vertices (B, V, 3) against planes, mean over vertices."""
+        """Body collision (B,) [m^2/s^2] of vertices (B, V, 3) [m] against planes, mean over vertices.
+
+        A plane's `normals` (B, V, 3) n and `offsets` (B, V) d [m] give the distance n.x - d; `chosen` as in `skin`.
+        """
         margins = self.margins if chosen is None else self.margins[chosen]
         depth = torch.relu(margins - ((points * normals).sum(-1) - offsets))
         cap = 0.02

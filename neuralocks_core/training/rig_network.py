@@ -10,7 +10,16 @@ from neuralocks_core.training.rig_poses import PosePool
 
 
 class TinyNet(torch.nn.Module):
-    """Two hidden layers; gives turns (B, N, 4) in canonical axes, none for the held bind pose."""
+    """Two hidden layers; gives turns (B, N, 4) wxyz in canonical axes, none for the held bind pose.
+
+    Args:
+        inputs: F, how many features it reads.
+        hidden: width of both layers.
+        joints: N.
+        pool: poses whose features scale the inputs.
+        spec: which features these are.
+        max_angle: largest turn of a joint [rad].
+    """
 
     def __init__(self, inputs: int, hidden: int, joints: int, pool: PosePool, spec, max_angle: float):
         super().__init__()
