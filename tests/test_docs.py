@@ -77,3 +77,13 @@ def test_commands_have_the_options_that_are_written(document):
     taken |= set(re.findall(r"--[a-z][a-z-]+", sources))
     for line in re.findall(r"neuralocks (?:rig )?[a-z]+[^#`\n]*", text):
         assert set(re.findall(r"(?<!\w)--[a-z][a-z-]+", line)) <= taken, line
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_examples_import_what_is_there(document):
+    text = (ROOT / document).read_text("utf-8")
+    for example in re.findall(r"```python\n(.*?)```", text, re.S):
+        for node in ast.walk(ast.parse(example)):
+            if isinstance(node, ast.ImportFrom):
+                module = (ROOT / node.module.replace(".", "/")).with_suffix(".py")
+                assert {each.name for each in node.names} <= defined(module), node.module
