@@ -12,7 +12,7 @@ from .cli_bake import bake_command, simulate_command
 from .cli_rig import app as rig_app
 from .cli_train import train_command
 from .command import command_of, note, print_json
-from .options import AsJson, Grooms, Head, Joints, Model, Out, Skeleton, numbers, pairs
+from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Skeleton, numbers, pairs
 
 app = typer.Typer(
     name="neuralocks",
@@ -97,21 +97,30 @@ def inspect_command(
 def evaluate_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     reference: Annotated[bool, typer.Option(help="Compare with the reference solver (minutes).")] = False,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    model: Model = None,
+    material: Materials = None,
     plot: Annotated[
         Path | None, typer.Option(help="Also draw how the tips move, as curves (.png, .svg, .pdf).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a bake's report card."""
+    """Print a bake's report card. Give the options again that the bake was made with."""
     from neuralocks_core.report import check_plot
 
+    from .bake import as_material
     from .evaluate import evaluate
     from .progress import progress_bar
 
     if plot is not None:
         check_plot(plot)
     with progress_bar("evaluating") as progress:
-        card = evaluate(baked, reference=reference, progress=progress)
+        card = evaluate(
+            baked, reference, grooms=groom or None, skeleton=skeleton, head=head,
+            model=model, material=as_material(material), progress=progress,
+        )  # fmt: skip
     if as_json:
         typer.echo(card.to_json())
     else:
@@ -124,13 +133,19 @@ def evaluate_command(
 def preview_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     out: Out,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
 ) -> None:
-    """Draw a bake: a strip of pictures (.png) or a clip (.mp4, .gif)."""
+    """Draw a bake: a strip of pictures (.png) or a clip (.mp4, .gif).
+
+    Of several characters the first with hair is drawn, or the one that --groom or --skeleton names.
+    """
     from .picture import preview
     from .progress import progress_bar
 
     with progress_bar("drawing") as progress:
-        preview(baked, out, progress=progress)
+        preview(baked, out, grooms=groom or None, skeleton=skeleton, head=head, progress=progress)
     typer.echo(str(out))
 
 

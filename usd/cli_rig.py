@@ -28,11 +28,11 @@ def train(
     dynamic: Annotated[
         bool, typer.Option("--dynamic/--quasi-static", help="Learn lag, swing and settling, or held poses only.")
     ] = True,
-    seconds: Annotated[float | None, typer.Option(help="How long to descend [s]; 120, and 75 quasi-static.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Seconds to descend; 120, and 75 quasi-static.")] = None,
     steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
-    bend: Annotated[float | None, typer.Option(help="Stiffness over line density [m^4/s^2].")] = None,
+    bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
     weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
     damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]. Dynamic only.")] = None,
     seed: Annotated[int, typer.Option(help="Decides poses and first weights.")] = 0,

@@ -4,9 +4,10 @@
 from pathlib import Path
 
 from neuralocks_core import preview as drawing
+from neuralocks_core.errors import NeuralocksError
 
 from .baked import Baked, read_baked
-from .border import open_stage
+from .border import Border, open_stage
 from .curves import find_curves
 from .damage import names_damage
 from .rig_picture import rigged_scene
@@ -27,10 +28,22 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
     Raises:
         NeuralocksError: the file is no bake, or the picture cannot be made.
     """
-    if isinstance(baked, Baked) or find_curves(open_stage(baked), grooms):
-        baked = baked if isinstance(baked, Baked) else read_baked(baked, grooms, skeleton, head)
+    if isinstance(baked, Baked):
         scene, border = baked.scene(), baked.shot.border
     else:
-        rigged = read_rigged_hair(baked, skeleton=skeleton, head=head)
-        scene, border = rigged_scene(rigged), rigged.border
+        scene, border = _scene(baked, grooms, skeleton, head)
     return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
+
+
+def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:
+    """Strands where any move, else mesh hair: a character with mesh hair may have brows, or stand on grass."""
+    try:
+        baked = read_baked(path, grooms, skeleton, head)
+        return baked.scene(), baked.shot.border
+    except NeuralocksError as error:
+        no_strands = error
+    try:
+        rigged = read_rigged_hair(path, skeleton=skeleton, head=head)
+    except NeuralocksError as error:
+        raise (no_strands if find_curves(open_stage(path), grooms) else error) from None
+    return rigged_scene(rigged), rigged.border

@@ -261,6 +261,11 @@ def test_a_picture_of_mesh_hair(tmp_path):
 
     baked = tmp_path / "baked.usda"
     bake_rig(EXAMPLE / "shot.usda", baked)
+    stage = Usd.Stage.Open(str(baked))  # a cable in the set, which is no hair
+    cable = UsdGeom.BasisCurves.Define(stage, "/Set/Cable")
+    cable.CreatePointsAttr([(3, 0, 0), (3, 4, 0)])
+    cable.CreateCurveVertexCountsAttr([2])
+    stage.GetRootLayer().Save()
     rigged = read_rigged_hair(baked)
     scene, meshes = rigged_scene(rigged), rigged.source.meshes
     begin = 0
