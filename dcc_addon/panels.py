@@ -8,6 +8,8 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from .operators.training import job
+from .scene.actions import has_keys
+from .scene.attach import MODIFIER
 from .services.panel_errors import for_the_panel
 from .session import session
 
@@ -48,18 +50,19 @@ class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
 
 
 def _motion(layout, armature) -> None:
-    """How up to date the sampled motion is."""
-    sampled = session.rigs.get(armature.name_full)
+    """How up to date the sampled motion is; in few words, for a narrow sidebar cuts labels beside buttons."""
+    sampled, character = session.rigs.get(armature.name_full), armature.neuralocks_character
+    if sampled is not None and character.body is None and sampled.bodies:
+        words(layout, f"Body: {', '.join(sampled.bodies)}", "INFO")
     row = layout.row()
     if session.sampling is not None:
-        row.label(text=f"Sampling motion {100 * session.sampling:.0f} %", icon="TIME")
+        row.label(text=f"Sampling {100 * session.sampling:.0f} %", icon="TIME")
     elif sampled is None:
-        row.label(text="Motion not sampled", icon="QUESTION")
+        row.label(text="Not sampled", icon="QUESTION")
     elif sampled.stale:
-        row.label(text="Animation has changed", icon="ERROR")
+        row.label(text="Out of date", icon="ERROR")
     else:
         row.label(text=f"{len(sampled.motion.frames)} frames", icon="CHECKMARK")
-    character = armature.neuralocks_character
     row.prop(character, "loop", text="", icon="LOOP_FORWARDS")
     row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
     if character.loop and sampled is not None:
@@ -88,12 +91,12 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             if own.armature is not None:
                 words(layout, f"This hair belongs to {own.armature.name_full}", "INFO")
             layout.operator("neuralocks.assign", icon="LINKED")
-        layout.prop(own, "model")
+        layout.prop(own, "model", **hint("Shipped with the add-on"))
         _training(layout, settings, "strands")
         row = layout.row()
         row.scale_y = 1.5
         row.use_property_split = False
-        row.prop(own, "live", toggle=True, icon="PLAY")
+        row.prop(own, "live", toggle=True, icon="PAUSE" if own.live else "PLAY")
         if hair.name_full in session.preparing:
             done = session.preparing[hair.name_full].done
             progress(layout, done, f"Preparing the hair {100 * done:.0f} %, Live cancels")
@@ -107,8 +110,8 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         sampled = session.rigs.get(own.armature.name_full) if own.armature is not None else None
         if own.resolve and sampled is not None and sampled.character.body is None:
             words(layout, "No body mesh is found; choose it above", "INFO")
-        layout.operator("neuralocks.reset_look", icon="LOOP_BACK")
-        layout.operator("neuralocks.report_card", icon="PRESET")
+        layout.operator("neuralocks.reset_look", text="Reset", icon="LOOP_BACK")
+        layout.operator("neuralocks.report_card", text="Report Card", icon="PRESET")
         for line in session.cards.get(hair.name_full, ()):
             words(layout, line, "NONE")
 
@@ -143,24 +146,26 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
             layout.label(text="Choose a character first", icon="INFO")
             return
         own = armature.neuralocks_character
-        layout.prop(own, "chains")
+        layout.prop(own, "chains", **hint("Found by themselves"))
         layout.operator("neuralocks.find_chains", icon="BONE_DATA")
         for line in session.cards.get(armature.name_full, ()):
             words(layout, line, "NONE")
-        layout.prop(own, "rig_model")
+        layout.prop(own, "rig_model", **hint("Shipped with the add-on"))
         _training(layout, settings, "rig")
         row = layout.row()
         row.scale_y = 1.5
         row.use_property_split = False
-        row.prop(own, "rig_live", toggle=True, icon="PLAY")
+        row.prop(own, "rig_live", toggle=True, icon="PAUSE" if own.rig_live else "PLAY")
         layout.prop(own, "rig_motion", slider=True)
         message(layout, armature.name_full)
         row = layout.row(align=True)
-        row.operator("neuralocks.bake_keys", icon="KEYINGSET")
-        row.operator("neuralocks.remove_keys", text="", icon="X")
+        row.operator("neuralocks.bake_keys", text="Bake to Keyframes", icon="KEYINGSET")
+        taking = row.row(align=True)
+        taking.enabled = has_keys(armature)
+        taking.operator("neuralocks.remove_keys", text="", icon="X")
         row = layout.row(align=True)
-        row.operator("neuralocks.export_skel", icon="EXPORT")
-        row.operator("neuralocks.export_c", icon="FILE_SCRIPT")
+        row.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
+        row.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
 
 
 class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
@@ -183,7 +188,9 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         layout.operator("neuralocks.bake", icon="EXPORT")
         row = layout.row(align=True)
         row.operator("neuralocks.bake_attach", icon="LINKED")
-        row.operator("neuralocks.detach", text="", icon="X")
+        taking = row.row(align=True)
+        taking.enabled = settings.hair is not None and MODIFIER in settings.hair.modifiers
+        taking.operator("neuralocks.detach", text="", icon="X")
 
 
 def findings(armature) -> tuple[list[str], str]:
@@ -199,7 +206,9 @@ def findings(armature) -> tuple[list[str], str]:
             rig = armature_reader.read(armature, chosen)
             humanoid = rig.humanoid()
             head = humanoid["head"]
-            _findings[key] = [f"Head: {rig.bones[head]} ({humanoid.reasons['head']})", *rig_service.advice(rig)], ""
+            reason = humanoid.reasons["head"]
+            why = "" if reason.startswith(("by name", "given")) else f" ({reason})"
+            _findings[key] = [f"Head: {rig.bones[head]}{why}", *rig_service.advice(rig)], ""
         except NeuralocksError as error:
             _findings[key] = [], str(error)
     return _findings[key]
@@ -209,6 +218,11 @@ def message(layout, name: str) -> None:
     """What went wrong with an object, if anything did."""
     if session.messages.get(name):
         words(layout, for_the_panel(session.messages[name]), "ERROR")
+
+
+def hint(text: str) -> dict[str, str]:
+    """What a property shows while it is empty, where Blender can."""
+    return {"placeholder": text} if "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters else {}
 
 
 def progress(layout, done: float, text: str) -> None:

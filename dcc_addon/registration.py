@@ -3,10 +3,10 @@
 
 import bpy
 
-from . import background, handlers, live_rig, live_strands, operators, panels, preparing, properties
+from . import background, handlers, live_rig, live_strands, menu, operators, panels, preparing, properties
 from .session import session
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)
 
 
 def register() -> None:
@@ -14,6 +14,7 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     properties.attach()
+    menu.attach()
     handlers.attach()
     if hasattr(bpy.data, "scenes"):  # while Blender starts no file is open yet; its load calls the handler
         handlers.on_load()
@@ -31,6 +32,7 @@ def unregister() -> None:
         for armature in live_rig.live_armatures(scene):
             live_rig.rest(armature)
     session.clear()
+    menu.detach()
     properties.detach()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

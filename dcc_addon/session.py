@@ -41,6 +41,11 @@ class SampledRig:
     drawn: np.ndarray = None
     """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
 
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the body meshes."""
+        return self.key[1]
+
     @cached_property
     def world(self) -> np.ndarray:
         """Joints (T, J, 4, 4) in Blender's world space."""

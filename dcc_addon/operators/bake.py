@@ -153,7 +153,7 @@ class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
     """Take the baked cache off the hair object again"""
 
     bl_idname = "neuralocks.detach"
-    bl_label = "Remove Cache"
+    bl_label = "Remove Hair Cache"
 
     def steps(self, context):
         hair = shown_hair(context)
@@ -167,7 +167,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
     """Bake into a temporary folder and measure it: stretch, hair inside the body, motion, settling"""
 
     bl_idname = "neuralocks.report_card"
-    bl_label = "Report Card"
+    bl_label = "Hair Report Card"
     bl_options = {"REGISTER"}
 
     def steps(self, context):

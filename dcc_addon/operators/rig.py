@@ -46,7 +46,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
     """Key the hair bones, and nothing else, in an action of its own on an NLA track that can be muted"""
 
     bl_idname = "neuralocks.bake_keys"
-    bl_label = "Bake to Keyframes"
+    bl_label = "Bake Hair Bones to Keyframes"
 
     def steps(self, context):
         armature, scene = shown_armature(context), context.scene
@@ -71,7 +71,7 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
     """Remove the baked keyframes of the hair bones"""
 
     bl_idname = "neuralocks.remove_keys"
-    bl_label = "Remove Baked Keys"
+    bl_label = "Remove Baked Hair Keys"
 
     def work(self, context):
         armature = shown_armature(context)
@@ -85,7 +85,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     """Write the rig with moving hair bones as a USD skeleton animation"""
 
     bl_idname = "neuralocks.export_skel"
-    bl_label = "USD Animation"
+    bl_label = "Export USD Animation"
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
@@ -114,7 +114,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     """Write the model of the hair bones as a C header for a game engine"""
 
     bl_idname = "neuralocks.export_c"
-    bl_label = "C Header"
+    bl_label = "Export C Header"
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(name="File", description="Header to write", default="//neuralocks_hair.h", **FILE)

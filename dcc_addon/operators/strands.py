@@ -39,7 +39,7 @@ class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
     """Put stiffness, weight, damping, clumping and motion back to average"""
 
     bl_idname = "neuralocks.reset_look"
-    bl_label = "Reset"
+    bl_label = "Reset Hair Look"
 
     def work(self, context):
         settings = shown_hair(context).neuralocks_hair

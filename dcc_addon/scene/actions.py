@@ -48,12 +48,17 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray):
     return action
 
 
+def has_keys(armature) -> bool:
+    """Whether its hair bones are baked."""
+    return armature.animation_data is not None and TRACK in armature.animation_data.nla_tracks
+
+
 def remove(armature) -> bool:
     """Take an earlier bake off and turn the bones as they were before it; whether there was one."""
-    data = armature.animation_data
-    track = data.nla_tracks.get(TRACK) if data else None
-    if track is None:
+    if not has_keys(armature):
         return False
+    data = armature.animation_data
+    track = data.nla_tracks[TRACK]
     actions = [s.action for s in track.strips if s.action]
     data.nla_tracks.remove(track)
     for action in actions:

@@ -2,10 +2,12 @@
 """The add-on itself: enabled, disabled, and described in words."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 
-from tests.blender.checks import own_handlers
+from tests.blender import scenes
+from tests.blender.checks import make_live, own_handlers
 
 
 def lifecycle(folder: Path) -> None:
@@ -18,13 +20,81 @@ def lifecycle(folder: Path) -> None:
     assert not own_handlers()
     assert not [n for n in dir(bpy.types) if n.startswith("NEURALOCKS_")]
     assert not hasattr(bpy.types.Object, "neuralocks_hair")
+    assert not _menu_entries()
     dcc_addon.register()
+    assert len(_menu_entries()) >= 2
     assert len(own_handlers()) == before
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "empty.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(folder / "empty.blend"))
     assert len(own_handlers()) == before
     dcc_addon.unregister()
     assert not own_handlers()
+
+
+def _menu_entries() -> list:
+    """What the add-on has put into menus of the 3D viewport."""
+    menus = [getattr(bpy.types, name) for name in ("VIEW3D_MT_object", "VIEW3D_MT_pose")]
+    drawn = [function for menu in menus for function in getattr(menu.draw, "_draw_funcs", ())]
+    return [function for function in drawn if "dcc_addon" in function.__module__]
+
+
+class _Layout:
+    """Stands in for Blender's layout, which only a window has: what it is asked for must exist in this Blender."""
+
+    def __init__(self, said: list):
+        self.said = said
+
+    def __getattr__(self, name):
+        known = bpy.types.UILayout.bl_rna.functions[name].parameters
+
+        def asked(*given, **options):
+            assert set(options) <= set(known.keys()), (name, options)
+            if name in ("prop", "prop_search"):
+                assert given[1] in given[0].bl_rna.properties, given
+            if name == "operator":
+                described = getattr(bpy.ops.neuralocks, given[0].split(".")[1]).get_rna_type()
+                self.said.append(options.get("text", described.name))
+                return SimpleNamespace(**dict.fromkeys(described.properties.keys()))
+            self.said += [options["text"]] if options.get("text") else []
+            return _Layout(self.said)
+
+        return asked
+
+
+def _drawn() -> list[str]:
+    """Everything that the panels and the menu say now."""
+    from dcc_addon import menu, panels
+
+    said = []
+    for cls in (*panels.CLASSES, *menu.CLASSES):
+        cls.draw(SimpleNamespace(layout=_Layout(said)), bpy.context)
+    return said
+
+
+def panel(folder: Path) -> None:
+    """The panel can be drawn at every step of an artist's work, and says what is found and what is wrong."""
+    scene = bpy.context.scene
+    assert "Find Character and Hair" in _drawn()
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    scene.neuralocks.armature = rig
+    assert {"Head: head", "Not sampled"} <= set(_drawn())
+    strands = scenes.hair(rig, 10)
+    strands.neuralocks_hair.armature = None
+    scene.neuralocks.hair = strands
+    attach = "Attach to Character"  # in the menu always
+    assert _drawn().count(attach) == 2
+    make_live(rig, strands)
+    said = _drawn()
+    assert {"24 frames", f"Body: {skin.name}"} <= set(said), said
+    assert said.count(attach) == 1
+    rig.neuralocks_character.loop = True
+    strands.neuralocks_hair.model = "/nowhere.neuralocks"
+    scene.neuralocks.use_scene_range = False
+    assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
+    said = " ".join(_drawn())
+    assert "differs from" in said and "no such" in said and "2 bones" in said, said
 
 
 def words(_folder: Path) -> None:

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators in a menu of the 3D viewport: Blender's search (F3) looks into menus, not into sidebars."""
+
+import bpy
+
+from . import operators
+
+PLACES = ("VIEW3D_MT_object", "VIEW3D_MT_pose", "VIEW3D_MT_edit_curves", "VIEW3D_MT_sculpt_curves")
+
+
+class NEURALOCKS_MT_menu(bpy.types.Menu):
+    """Hair that moves with the character"""
+
+    bl_label = "Neuralocks"
+
+    def draw(self, _context):
+        for cls in operators.CLASSES:
+            self.layout.operator(cls.bl_idname)
+
+
+CLASSES = (NEURALOCKS_MT_menu,)
+
+
+def draw(menu, _context) -> None:
+    """The entry in a menu of Blender's."""
+    menu.layout.separator()
+    menu.layout.menu(NEURALOCKS_MT_menu.__name__)
+
+
+def attach() -> None:
+    """Put the menu where the modes of a character and of its hair have theirs; some are younger than the oldest
+    Blender.
+    """
+    for place in PLACES:
+        if hasattr(bpy.types, place):
+            getattr(bpy.types, place).append(draw)
+
+
+def detach() -> None:
+    """Take it out again."""
+    for place in PLACES:
+        if hasattr(bpy.types, place):
+            getattr(bpy.types, place).remove(draw)
