@@ -66,7 +66,7 @@ class Inputs:
     """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
 
     def __init__(self, model, real, strands: int):
-        from neuralocks_core.runtime import strand_inputs
+        from neuralocks_core.strand_session import strand_inputs
 
         take = np.arange(strands) % len(real.rest)
         session = model.prepare(real)

@@ -13,7 +13,8 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import rotation_part
-from neuralocks_core.runtime import StrandModel, strand_inputs
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.strands import StrandSet, scalp_local
 
 from .placing import GroomPlacer

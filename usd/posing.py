@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import chunks
 from neuralocks_core.strands import StrandSet
 
 from .memory import give_back

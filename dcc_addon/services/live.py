@@ -9,7 +9,8 @@ from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.resolve import Resolver
-from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import chunks
 from neuralocks_core.strands import strands_on
 
 from .history import SampledBoundary

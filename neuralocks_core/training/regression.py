@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core.runtime import strand_inputs
+from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform

@@ -15,7 +15,8 @@ from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.clumping import COLUMN, Locks
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
-from neuralocks_core.runtime import StrandModel, strand_inputs
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.strands import strand_set
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")

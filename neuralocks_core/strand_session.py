@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A strand model bound to one groom: what depends on its strands alone is computed once, and kept for all frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, partial
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neuralocks_core.clumping import COLUMN, Locks
+from neuralocks_core.locks import lock_codes
+from neuralocks_core.strands import K, StrandSet, scalp_local
+
+if TYPE_CHECKING:
+    from neuralocks_core.runtime import StrandModel
+
+CHUNK = 512
+"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
+so that results do not depend on the machine."""
+
+
+class StrandSession:
+    """A model bound to one groom.
+
+    Attributes:
+        strands: the groom.
+        codes: latent codes z_rest, (S, 32).
+    """
+
+    def __init__(self, model: StrandModel, strands: StrandSet):
+        self.model, self.strands = model, strands
+        count = len(strands.rest)
+        shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
+        self.codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
+        inputs = strand_inputs(strands, self.codes)
+        self._strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
+        self._anchor = np.zeros((count, 3 * K), np.float32)
+        self._anchored_at: np.ndarray | None = None
+        self._turn = Lock()
+
+    def anchor(self, vector: np.ndarray) -> None:
+        """Measure an anchored model's answers from this boundary vector: the bind pose, held, with the
+        materials in use.
+
+        Costs one inference, and nothing when the vector is the one already in use.
+        """
+        vector, _ = self._without_clumping(vector)
+        if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
+            return
+        self._anchor[:] = 0
+        self._anchor[:] = self._tail("offsets", self.model.frame(vector))
+        self._anchored_at = vector
+
+    def displacement(
+        self, vector: np.ndarray, strands: slice = slice(None), out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Displacement (n, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
+
+        Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
+        """
+        frame, gather = self._frame(vector)
+        result = self._tail("displacement", frame, strands, out, gather)
+        still = ~self.strands.valid[strands]
+        if still.any():
+            result[still] = 0
+        return result.reshape(len(result), K, 3)
+
+    def _frame(self, vector: np.ndarray):
+        """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
+        plain, clumping = self._without_clumping(vector)
+        frame = self.model.frame(plain)
+        if not clumping:  # exactly 0 for the default
+            return frame, None
+        locks, session = self._locks
+        if self._anchored_at is not None:
+            session.anchor(self._anchored_at)
+        led = session._tail("displacement", frame).reshape(-1, K, 3)
+        factor = locks.spread(vector[self.model.spec.slices["material"]])
+        return frame, partial(locks.gather, led=led, factor=factor)
+
+    def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
+        """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
+        plain, column = np.array(vector, np.float32), self.model.spec.slices["material"].start + COLUMN
+        clumping, plain[column] = float(plain[column]), 0.0
+        return plain, clumping
+
+    @cached_property
+    def _locks(self) -> tuple[Locks, StrandSession]:
+        locks = Locks.of(self.strands)
+        return locks, self.model.prepare(locks.strands)
+
+    def _tail(self, output, frame, strands: slice = slice(None), out=None, gather=None) -> np.ndarray:
+        start, stop, _ = strands.indices(len(self.strands.rest))
+        result = np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
+
+        # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the groom's end: the
+        # sums in a matrix product may depend on its height, and a bake must not depend on its split.
+        def work(chunk: slice) -> None:
+            values = self._chunk(output, chunk, frame)
+            if gather is not None:
+                gather(values, chunk)
+            a, b = max(chunk.start, start), min(chunk.stop, stop)
+            result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
+
+        self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self.strands.rest)), start)
+        return result
+
+    def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
+        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
+        computed it and still has it in its cache, one at a time.
+        """
+        (frame, gather), valid = self._frame(vector), self.strands.valid
+
+        def work(chunk: slice) -> None:
+            values = self._chunk("displacement", chunk, frame)
+            if gather is not None:
+                gather(values, chunk)
+            if not valid[chunk].all():
+                values[~valid[chunk]] = 0
+            # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
+            with self._turn:
+                function(chunk, values.reshape(-1, K, 3))
+
+        self.model.by_chunk(work, len(self.strands.rest))
+
+    def _chunk(self, output: str, chunk: slice, frame: dict[str, np.ndarray]) -> np.ndarray:
+        """(n, 72) of one whole chunk."""
+        return self.model.run(
+            "tail.onnx",
+            output,
+            strand_part=self._strand_part[chunk],
+            anchor=self._anchor[chunk],
+            edges=_edges(self.strands.rest[chunk]),
+            **frame,
+        )
+
+    def _by_chunk(self, function, width: int) -> np.ndarray:
+        result = np.empty((len(self.strands.rest), width), np.float32)
+
+        def work(chunk: slice) -> None:
+            result[chunk] = function(chunk)
+
+        self.model.by_chunk(work, len(result))
+        return result
+
+
+def chunks(count: int, start: int = 0) -> list[slice]:
+    """The chunks of `count` strands, from the one that holds `start` on."""
+    return [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
+
+
+def _edges(rest: np.ndarray) -> np.ndarray:
+    """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
+    edges = np.zeros(rest.shape, np.float32)
+    np.subtract(rest[:, 1:], rest[:, :-1], out=edges[:, 1:])
+    return edges.reshape(len(rest), -1)
+
+
+def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
+    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1."""
+    locks = lock_codes(codes, strands.lock, strands.valid)
+    return np.concatenate([strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1).astype(
+        np.float32
+    )
