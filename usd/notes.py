@@ -7,6 +7,7 @@ import numpy as np
 from pxr import Usd
 
 from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
 from .attach import Attachment, rig_joint
@@ -19,6 +20,15 @@ HEAD_WIDTHS = (0.08, 0.6)
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose, missing layers say."""
     return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+
+
+def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
+    """The error for a stage without something that a bake needs: where layers are missing, it was in one of those."""
+    missing = composition_notes(stage, path)
+    if missing:
+        loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
+        remedy = f"not all of it is there ({loaded}); bring along what the file refers to"
+    return NeuralocksError(f"{path}: holds no {what}; {remedy}")
 
 
 def left_out(error) -> str:

@@ -14,6 +14,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from .border import Border, open_stage, transformed
 from .damage import names_damage
+from .notes import nothing_found
 from .rig_source import StageRig, read_rig
 from .surface import rest_primvar
 
@@ -66,7 +67,7 @@ def read_rigged_hair(
                 f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims"
             )
     if not prims:
-        raise NeuralocksError(f"{path}: it has no Skeleton; give a stage with a skinned character")
+        raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
     found, errors = [], []
     for prim in prims:
         try:

@@ -14,7 +14,7 @@ from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
-from .notes import composition_notes, groom_notes, left_out, rig_notes, too_far
+from .notes import composition_notes, groom_notes, left_out, nothing_found, rig_notes, too_far
 from .placement import Placement
 from .rig_source import StageRig, read_rig
 
@@ -87,8 +87,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     notes = composition_notes(stage, path)
     curves = find_curves(stage, grooms)
     if not curves:
-        raise NeuralocksError(
-            f"{path}: holds no groom (no BasisCurves prim); add one, or import a hair file with 'neuralocks import'"
+        raise nothing_found(
+            stage, path, "groom (no BasisCurves prim)", "add one, or import a hair file with 'neuralocks import'"
         )
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs, path)
@@ -153,7 +153,7 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None)
         if not prims:
             raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
     if not prims:
-        raise NeuralocksError(f"{path}: holds no UsdSkel skeleton; export the character with its armature")
+        raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
     rigs, errors = [], []
     for prim in prims:
         try:

@@ -9,6 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 from usd.bake import bake
 from usd.inspect import inspect
+from usd.rig_bake import bake_rig
 from usd.spool import Spool
 from usd.stage import read_shot
 
@@ -277,3 +278,16 @@ def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
     with pytest.raises(NeuralocksError, match="needs"):
         bake(shot, tmp_path / "out.usdc", model)
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "file"}
+
+
+@pytest.mark.parametrize(
+    "made_of", ["(\n    subLayers = [@./groom.usda@]\n)", 'def "Hero" (\n    references = @./groom.usda@\n)\n{\n}']
+)
+def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of):
+    """Copied away from the layers that it is made of, a shot was said to need a groom."""
+    path = tmp_path / "shot.usda"
+    path.write_text(f"#usda 1.0\n{made_of}\n")
+    for work in (lambda: bake(path, tmp_path / "a.usdc", model), lambda: bake_rig(path, tmp_path / "b.usda")):
+        with pytest.raises(NeuralocksError, match=r"shot.usda: holds no .*groom.usda.*bring along") as caught:
+            work()
+        assert "\n" not in str(caught.value)
