@@ -10,7 +10,7 @@ from neuralocks_core.carrier import Carrier
 from neuralocks_core.centreline import centre_lines
 from neuralocks_core.groom import Groom
 from neuralocks_core.lengths import keep_lengths_of_any
-from neuralocks_core.spans import LEFT_OVER
+from neuralocks_core.spans import LEFT_OVER, weights
 from neuralocks_core.strands import K, root_frames, root_uv, scalp_local, strand_set
 
 ORIGIN = np.array([0.0, 1.5, 0.02])
@@ -83,6 +83,19 @@ def test_a_uniform_strand_of_24_moves_exactly_with_the_network():
     np.testing.assert_array_equal(Carrier(groom, strands).carry(displacement), groom.points + displacement[0])
 
 
+def finer_than_the_network(groom, strands):
+    """Which strands (S,) no means of the network's vertices can follow, and how far (P,) [m] own vertices lie beside its
+    polyline.
+    """
+    strand, own, (arc, length) = groom.strand_of_point, groom.points - ORIGIN, arc_lengths(groom)
+    place = arc / np.where(strands.valid, length, 1.0)[strand] * (K - 1)
+    fine = weights(strands.rest, own, strand, place)[2] & strands.valid
+    segment = np.clip(place.astype(int), 0, K - 2)
+    share = (place - segment)[:, None]
+    line = (1 - share) * strands.rest[strand, segment] + share * strands.rest[strand, segment + 1]
+    return fine, np.linalg.norm(own - line, axis=1)
+
+
 @pytest.mark.parametrize("make", [ragged_groom, coil_groom])
 def test_rigid_motion_is_carried_exactly(make):
     """However coarse the network's polyline, turning it as a whole turns every own vertex."""
@@ -100,11 +113,11 @@ def test_rigid_motion_is_carried_exactly(make):
     # each other. Means of the network's vertices follow exactly but for what they leave over, and but for the first
     # segment, which the network never moves.
     off = np.linalg.norm(carried - expected, axis=1)
-    fine = np.concatenate([block._fine for block in carrier._blocks])[groom.strand_of_point]
-    residual = np.concatenate([block._coils._residual for block in carrier._blocks if block._coils])
+    fine, beside = finer_than_the_network(groom, strands)
+    fine = fine[groom.strand_of_point]
     arc, length = arc_lengths(groom)
     further = 0.02 * length[groom.strand_of_point][fine]
-    assert (off[fine] <= 2e-6 + 1.2 * np.linalg.norm(residual, axis=1) + further).all()
+    assert (off[fine] <= 2e-6 + 1.2 * beside[fine] + further).all()
     beyond = ~fine & (arc * (K - 1) >= length[groom.strand_of_point])
     assert (off[beyond] <= 2e-6 + 1.2 * LEFT_OVER).all()
     assert beyond.any() or make is coil_groom
@@ -120,7 +133,7 @@ def test_corners_of_a_smooth_groom_turn_with_it():
     groom = Groom("/arcs", (arcs + [0.0, 1.7, 0.05]).reshape(-1, 3), np.full(20, 16))
     strands = strand_set(groom, ORIGIN, CENTRE)
     carrier = Carrier(groom, strands)
-    assert carrier._blocks[0]._coils is None
+    assert not finer_than_the_network(groom, strands)[0].any()
     edges = np.diff(strands.rest, axis=1)
     more = np.linspace(0.0, 1.6, K - 1)[None, :] * np.linspace(0.7, 1.3, 20)[:, None]
     more[:, 0] = 0.0
