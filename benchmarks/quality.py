@@ -6,8 +6,8 @@
 
 Hair is grown with a seed that no model was trained on, and of it only the locks that training leaves out are looked
 at; the motion is the scripted clips, or files. Hair files in place of grown hair are put on the head by the spheres
-through their roots and through the scalp; `--shape` gives the body a random shape. Rigid hair has motion error 1 and
-velocity error 1 by definition.
+through the roots of each folder's files and through the scalp (`real_grooms.py` takes them through the whole command);
+`--shape` gives the body a random shape. Rigid hair has motion error 1 and velocity error 1 by definition.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import argparse
 import json
 from collections import defaultdict
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from real_grooms import on_head
 
 from neuralocks_core import metrics
 from neuralocks_core.collider import Collider
@@ -27,6 +27,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strands import strand_set
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
@@ -47,7 +48,11 @@ class Bench:
         self.styles = {n: g for n, g in zip(STYLES, scene.grooms) if not styles or n in styles}
         if grooms:
             roots = np.concatenate([g.rest[g.valid, 0] for g in scene.grooms])
-            self.styles = {Path(path).stem: on_head(path, self.character, roots) for path in grooms}
+            to_bind, placed = scene.character.canonical_to_bind, on_head(grooms, scene.character, roots)
+            self.styles = {
+                path.stem: strand_set(g, to_bind[:3, 3], scene.character.head_centre, scene.character.facing)
+                for path, g in placed.items()
+            }
         self.body = hair_body(scene.character, reach=0.9)
         count = len(scene.character.body.shapes)
         self.shape = np.zeros(count)
@@ -91,29 +96,6 @@ class Bench:
         sampler = model.sampler(self.character, clip)
         sessions[key].anchor(sampler.held_bind(shape=self.shape))
         return np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in sampler.vectors(times)])
-
-
-def on_head(path: str, character, scalp: np.ndarray):
-    """A hair file's strands on a character's head, Y up and facing Z; `scalp` (n, 3) are canonical roots of grown hair."""
-    from neuralocks_core.formats.reading import read
-    from neuralocks_core.strands import strands_on
-
-    groom = read(path)
-    (centre, radius), (middle, wanted) = (
-        sphere(groom.points[np.cumsum(groom.counts) - groom.counts].astype(float)),
-        sphere(scalp),
-    )
-    points = (groom.points - centre) * (wanted / radius) + middle
-    to_bind = character.canonical_to_bind
-    groom = replace(groom, points=(points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32))
-    return strands_on(character, groom)
-
-
-def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of the sphere next to points (n, 3), in least squares."""
-    rows = np.concatenate([2 * points, np.ones((len(points), 1))], axis=1)
-    x = np.linalg.lstsq(rows, np.square(points).sum(1), rcond=None)[0]
-    return x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
 
 
 def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarray, rest: np.ndarray) -> list[float]:

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real grooms on the shipped shot, from hair file to report card: how much of each the model gets right.
+
+    python benchmarks/real_grooms.py FILE... [--model MODEL] [--frames A:B]
+
+Files of one folder are parts of one head of hair: they are put on the shot's head together, by the sphere through their
+roots and the one through the roots of the shot's own hair. Then come the commands that a user has: `neuralocks bake`, and
+`neuralocks evaluate --reference`, which simulates 200 strands of each file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.groom import Groom
+
+SHOT = Path(__file__).resolve().parents[1] / "examples/shot/shot.usda"
+COLUMNS = {
+    "position_percent": "position, % L",
+    "motion_error_median": "motion, median",
+    "motion_error_rms": "motion, rms",
+    "velocity_error": "velocity",
+    "motion_ratio": "motion ratio",
+}
+INSIDE = {
+    "inside_at_rest_percent": "inside at rest, %",
+    "penetration_percent": "inside, %",
+    "penetration_3mm_percent": "over 3 mm, %",
+}
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="+")
+    parser.add_argument("--model", help="the shipped one if left out")
+    parser.add_argument("--frames", help="A:B of the shot; all if left out")
+    arguments = parser.parse_args()
+    print(
+        "| groom | strands | length, cm | rigid: position | " + " | ".join([*COLUMNS.values(), *INSIDE.values()]) + " |"
+    )
+    print("| --- |" + " ---: |" * (3 + len(COLUMNS) + len(INSIDE)))
+    for row in rows(arguments.files, arguments.model, arguments.frames):
+        print("| " + " | ".join(v if isinstance(v, str) else f"{v:.3g}" for v in row.values()) + " |", flush=True)
+
+
+def rows(paths, model=None, frames=None):
+    """Yield the numbers of each file, by column."""
+    from usd.bake import bake
+    from usd.evaluate import evaluate
+    from usd.stage import read_shot
+
+    shot = read_shot(SHOT)
+    character = shot.grooms[0].attachment.character
+    fitted = on_head(paths, character, canonical(character, roots(shot.grooms[0].groom)))
+    with tempfile.TemporaryDirectory() as folder:
+        for path, groom in fitted.items():
+            scene = write_scene(Path(folder) / f"{path.stem}.usda", groom, character)
+            baked = Path(folder) / f"{path.stem}_hair.usdc"
+            bake(scene, baked, model, frames=frames, velocities=False)
+            card = evaluate(baked, reference=True, model=model)
+            measured, compared = (next(iter(part.values())) for part in (card.grooms, card.compared))
+            yield {
+                "groom": path.stem,
+                "strands": str(measured["strands"]),
+                "length": 100 * float(np.median(lengths(groom))),
+                "rigid": compared["rigid"]["position_percent"],
+                **{name: compared["bake"][name] for name in COLUMNS},
+                **{name: measured[name] for name in INSIDE},
+            }
+
+
+def write_scene(path: Path, groom: Groom, character) -> Path:
+    """The shipped shot with another hair, skinned to its head."""
+    from pxr import Gf, Usd, UsdSkel
+
+    from usd.groom import author_groom
+
+    stage = Usd.Stage.CreateNew(str(path))
+    shipped = Usd.Stage.Open(str(SHOT))
+    layers = shipped.GetRootLayer().subLayerPaths
+    stage.GetRootLayer().subLayerPaths = [str(SHOT.parent / name) for name in layers if "groom" not in name]
+    for key in ("startTimeCode", "endTimeCode", "timeCodesPerSecond", "framesPerSecond", "metersPerUnit", "upAxis"):
+        stage.SetMetadata(key, shipped.GetMetadata(key))
+    stage.SetDefaultPrim(stage.OverridePrim("/Body"))
+    binding = UsdSkel.BindingAPI.Apply(author_groom(stage, "/Body/Hair", groom).GetPrim())
+    skeleton = next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Skeleton))
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+    binding.CreateJointsAttr([character.skeleton.names[character.head]])
+    binding.CreateJointIndicesPrimvar(True, 1).Set([0])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    stage.GetRootLayer().Save()
+    return path
+
+
+def on_head(paths, character, scalp: np.ndarray) -> dict[Path, Groom]:
+    """Hair files on a character's head, in bind-world metres.
+
+    Args:
+        paths: files whose hair stands upright and faces +Z; those of one folder share their place and size.
+        character: whose head.
+        scalp: (n, 3) canonical roots of hair that covers it [m].
+    """
+    from neuralocks_core.formats.reading import read
+
+    heads = defaultdict(dict)
+    for path in map(Path, paths):
+        heads[path.parent][path] = read(path, unit=1.0)
+    middle, wanted = sphere(scalp)
+    to_bind = character.canonical_to_bind
+    result = {}
+    for parts in heads.values():
+        centre, radius = sphere(np.concatenate([roots(groom) for groom in parts.values()]))
+        for path, groom in parts.items():
+            points = (groom.points - centre) * (wanted / radius) + middle
+            points = (points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32)
+            result[path] = replace(groom, points=points, widths=np.float32([8e-5]))
+    return {path: result[path] for path in map(Path, paths)}
+
+
+def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre and radius of the sphere next to points (n, 3), in least squares; a tail's hair tie lies off it and is
+    left out.
+    """
+    used = points
+    for _ in range(4):
+        design = np.concatenate([2 * used, np.ones((len(used), 1))], axis=1)
+        x = np.linalg.lstsq(design, np.square(used).sum(1), rcond=None)[0]
+        centre, radius = x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
+        used = points[np.abs(np.linalg.norm(points - centre, axis=1) - radius) < 0.2 * radius]
+    return centre, radius
+
+
+def roots(groom: Groom) -> np.ndarray:
+    """First points (S, 3) of the strands."""
+    return groom.points[groom.starts[groom.counts > 0]].astype(float)
+
+
+def lengths(groom: Groom) -> np.ndarray:
+    """Of the strands (S,) [m]."""
+    from neuralocks_core.arclength import arc_lengths
+
+    return arc_lengths(groom)[1]
+
+
+def canonical(character, points: np.ndarray) -> np.ndarray:
+    """Canonical coordinates (n, 3) of bind-world points."""
+    to_bind = character.canonical_to_bind
+    return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
+
+
+if __name__ == "__main__":
+    main()
