@@ -223,6 +223,8 @@ def as_text(facts: dict, indent: int = 0) -> str:
             continue
         if isinstance(value, dict):
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
+        elif name == "curve":  # of a long training: thousands of lines
+            lines.append(f"{pad}curve: {len(value)} points, in --json")
         elif isinstance(value, list) and value and isinstance(value[0], dict):
             if len(value[0]) <= 3:
                 lines.append(f"{pad}{name}:")

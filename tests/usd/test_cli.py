@@ -147,6 +147,13 @@ def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
     assert "head width [m]: 0.2" in capsys.readouterr().out
 
 
+def test_inspect_tells_of_a_model_what_a_person_reads(capsys):
+    shipped = Path(__file__).parents[2] / "neuralocks_core" / "shipped" / "strands.neuralocks"
+    assert status("inspect", shipped) == 0
+    text = capsys.readouterr().out
+    assert "inputs of the body" in text and text.count("\n") < 150  # the curve alone has 200 points
+
+
 def test_a_wrong_unit_is_noticed(tmp_path):
     from pxr import Usd, UsdGeom
 
