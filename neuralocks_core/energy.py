@@ -21,7 +21,7 @@ def energies(
         material: constants; the default material where left out.
 
     Returns:
-        `gravity`: -g x . down; `stretch`: K/2 strain^2; `bend`: B/2 |Omega - Omega_rest|^2 with
+        `gravity`: -g x . down; `bend`: B/2 |Omega - Omega_rest|^2 with
         Omega = 2/l Im(conj(q_i) q_i+1), seen in a frame that follows the strand without twist (paper, bend-twist
         energy with exact transport).
     """
@@ -34,15 +34,24 @@ def energies(
     mass[:, 1:] += length / 2
     total = mass.sum()
     drop = np.einsum("tskc,tc->tsk", points - rest, down)
-    now = np.linalg.norm(np.diff(points, axis=2), axis=3)
     between = (length[:, 1:] + length[:, :-1]) / 2
     change = curvature(points) - curvature(rest[None])
     bend = 0.5 * material.bend * (np.square(change).sum(axis=-1) / between).sum(axis=(1, 2))
     return {
         "gravity": -9.81 * material.weight * (mass * drop).sum(axis=(1, 2)) / total,
-        "stretch": 0.5 * STRETCH * (length * np.square(now / length - 1)).sum(axis=(1, 2)) / total,
         "bend": bend / total,
     }
+
+
+def stretch_energy(lengths: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Mean of K/2 strain^2 per unit mass of each frame (T,) [m^2/s^2 = J/kg].
+
+    Args:
+        lengths: (T, E) [m] of a groom's own edges; chords of finer hair would count its bending as stretch.
+        rest: (E,) [m] at rest; edges of no length weigh nothing.
+    """
+    strain = np.asarray(lengths, float) / np.maximum(rest, 1e-9) - 1
+    return 0.5 * STRETCH * (np.square(strain) * rest).sum(axis=1) / max(rest.sum(), 1e-9)
 
 
 def curvature(points: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core import comparison, metrics
 from neuralocks_core.arclength import arc_lengths
-from neuralocks_core.energy import energies
+from neuralocks_core.energy import energies, stretch_energy
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.report import Card
@@ -91,10 +91,12 @@ class _Subject:
         self.collision_frames = np.unique(np.linspace(0, total - 1, min(total, COLLISION_FRAMES)).round().astype(int))
         self.own_rest = rest[self._own]
         self.own = np.zeros((len(self.collision_frames), len(self._own), 3), np.float32)
-        sums = []
+        sums, taut = [], []
+        edges_at_rest = self._edge_lengths(rest)
         for frame, code in enumerate(baked.codes):
             points = baked.canonical(item, code)
             sums.append(metrics.stretch(metrics.strand_lengths(points, groom.counts)[None], rest_lengths))
+            taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
             self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
             where = np.flatnonzero(self.collision_frames == frame)
@@ -105,13 +107,14 @@ class _Subject:
             key: float(max(s[key] for s in sums) if key.endswith("max") else np.mean([s[key] for s in sums]))
             for key in sums[0]
         }
+        self.stretch_energy = float(np.mean(taut))
 
     def _within(self, groom) -> None:
         """Where the chosen strands' network vertices lie between own vertices, and which own vertices can move."""
         arc, length = arc_lengths(groom)
         self._low = np.zeros((len(self.chosen), K), int)
         self._part = np.zeros((len(self.chosen), K, 1))
-        own = []
+        own, edges = [], []
         for row, strand in enumerate(self.chosen):
             start, count = int(groom.starts[strand]), int(groom.counts[strand])
             mine = arc[start : start + count]
@@ -122,7 +125,13 @@ class _Subject:
             self._part[row, :, 0] = np.clip((wanted - mine[low]) / span, 0, 1)
             free = mine > length[strand] * (CLAMPED - 1) / (K - 1) * 1.001
             own.append(start + np.flatnonzero(free))
+            edges.append(np.arange(start, start + count - 1))
         self._own = np.concatenate(own) if own else np.zeros(0, int)
+        self._edges = np.concatenate(edges) if edges else np.zeros(0, int)
+
+    def _edge_lengths(self, points: np.ndarray) -> np.ndarray:
+        """Lengths (E,) of the chosen strands' own edges [m]; points (P, 3) of the whole groom."""
+        return np.linalg.norm(points[self._edges + 1] - points[self._edges], axis=1)
 
     def measures(self, material: Material) -> dict:
         """Everything that needs no reference."""
@@ -147,7 +156,8 @@ class _Subject:
             result["swing_percent"] = 100 * float(swing.mean())
             result |= self._stops(joints)
         sums = energies(strands.rest + self.moved, strands.rest, down, material)
-        return result | {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
+        result |= {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
+        return result | {"energy_stretch": self.stretch_energy}
 
     def _penetration(self) -> dict:
         resolver = self._resolver
