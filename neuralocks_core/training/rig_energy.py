@@ -3,7 +3,7 @@
 
 Per unit of mass [m^2/s^2], zero at rest. Bones do not stretch, so what is left of the rod potentials is
 gravity, and bend-twist with the joints' own rotations as the material frame: Omega = 2 / l Im(q), q the turn of
-a joint from rest (paper eq. 6 with q^0 = 1).
+a joint from rest (paper eq. 3 with q^0 = 1).
 """
 
 from dataclasses import dataclass
