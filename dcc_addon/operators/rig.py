@@ -16,7 +16,7 @@ from ..scene.attach import check_own
 from ..scene.lookup import find
 from ..scene.paths import FILE
 from ..scene.sampling import ensure, sample, stepping
-from ..services.bones import chains_of
+from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..session import session
 from .bake import frame_range, output_path
@@ -43,7 +43,7 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
-    """Key the hair bones, and nothing else, in an action of its own on an NLA track that can be muted"""
+    """Key the hair bones, and nothing else, in an action of their own on an NLA track; muted, the bones do as before"""
 
     bl_idname = "neuralocks.bake_keys"
     bl_label = "Bake Hair Bones to Keyframes"
@@ -60,10 +60,11 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
             for done, total in sample(context, armature):
                 yield done, total, f"Sampling the motion of {name}"
         armature = find(name)
-        bones = bind(armature, session.rigs[name])
-        frames = frame_numbers(first, last, 0)
-        turns = bones.turns(frames / session.rigs[name].motion.rate, armature.neuralocks_character.rig_motion)
-        action = actions.bake_keys(armature, bones.bones, frames, turns)
+        sampled = session.rigs[name]
+        bones, frames = bind(armature, sampled), frame_numbers(first, last, 0)
+        turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
+        own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
+        action = actions.bake_keys(armature, bones.bones, frames, turns, own)
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
 

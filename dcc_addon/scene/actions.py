@@ -6,74 +6,88 @@ import numpy as np
 
 from . import rotations
 
-TRACK = "Neuralocks Hair"
+TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
+"""NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
 KEPT = "neuralocks_rotations"
 """Property of the action with how the hair bones were turned before."""
+STILL = 1e-6
+"""Rotations that change by less over time do not move."""
 
 
-def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray):
-    """Key the rotations of the hair bones and put them on a strip above all other animation.
+def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.ndarray):
+    """Key the rotations of the hair bones and put them on a strip above all other animation; on one below it what they
+    did before, for Blender leaves at its last value what a muted strip writes no more.
 
     Args:
         armature: the armature object.
         bones: bone names, (N).
         frames: (T,).
-        turns: (T, N, 4) wxyz.
+        turns, own: rotations (T, N, 4) wxyz with the hair's motion and without.
 
     Returns:
-        the action.
+        the action of the hair's motion.
     """
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
-    action = bpy.data.actions.new(f"{armature.name} Hair")
-    action[KEPT] = rotations.kept(armature, bones)
-    curves = _curves(action, armature)
-    smooth = _continuous(turns)
-    for column, name in enumerate(bones):
-        armature.pose.bones[name].rotation_mode = "QUATERNION"
-        path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].rotation_quaternion'
-        for index in range(4):
-            curve = _new_curve(curves, path, index, name)
-            curve.keyframe_points.add(len(frames))
-            values = np.empty((len(frames), 2), np.float32)
-            values[:, 0], values[:, 1] = frames, smooth[:, column, index]
-            curve.keyframe_points.foreach_set("co", values.ravel())
-            for point in curve.keyframe_points:
-                point.interpolation = "LINEAR"
-            curve.update()
-    track = data.nla_tracks.new()
-    track.name = TRACK
-    strip = track.strips.new(action.name, int(frames[0]), action)
-    strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
+    # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
+    modes = rotations.free_modes(armature, bones, rotations.KEYED)
+    before = rotations.kept(armature, bones)
+    for name in bones:
+        armature.pose.bones[name].rotation_mode = modes[name]
+    needed = 1 if np.ptp(own, axis=0).max(initial=0.0) < STILL else len(frames)
+    _strip(data, BEFORE, _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed]))
+    action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
+    action[KEPT] = before
+    _strip(data, TRACK, action)
     return action
 
 
 def has_keys(armature) -> bool:
     """Whether its hair bones are baked."""
-    return armature.animation_data is not None and TRACK in armature.animation_data.nla_tracks
+    return bool(_tracks(armature))
 
 
 def remove(armature) -> bool:
     """Take an earlier bake off and turn the bones as they were before it; whether there was one."""
-    if not has_keys(armature):
-        return False
-    data = armature.animation_data
-    track = data.nla_tracks[TRACK]
-    actions = [s.action for s in track.strips if s.action]
-    data.nla_tracks.remove(track)
+    tracks = _tracks(armature)
+    actions = [s.action for track in tracks for s in track.strips if s.action]
+    for track in tracks:
+        armature.animation_data.nla_tracks.remove(track)
     for action in actions:
         rotations.give_back(armature, action.get(KEPT, ""))
         if not action.users:
             bpy.data.actions.remove(action)
-    return True
+    return bool(tracks)
 
 
-def _continuous(turns: np.ndarray) -> np.ndarray:
-    """The same rotations without sign flips between frames, which linear curves would swing through."""
-    result = np.array(turns, float)
-    flips = np.cumprod(np.where((result[1:] * result[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
-    result[1:] *= flips[..., None]
-    return result
+def _tracks(armature) -> list:
+    data = armature.animation_data
+    return [track for track in data.nla_tracks if track.name in (TRACK, BEFORE)] if data else []
+
+
+def _strip(data, name: str, action) -> None:
+    """Put an action on a new track above all others."""
+    track = data.nla_tracks.new()
+    track.name = name
+    strip = track.strips.new(action.name, int(action.frame_range[0]), action)
+    strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
+
+
+def _action(armature, label: str, modes: dict[str, str], frames: np.ndarray, turns: np.ndarray):
+    """An action with keys (T, N, 4) at frames (T,) in the rotation mode of each bone."""
+    action = bpy.data.actions.new(label)
+    curves = _curves(action, armature)
+    for column, (name, mode) in enumerate(modes.items()):
+        path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].{rotations.CHANNELS[mode]}'
+        for index, values in enumerate(rotations.values(mode, turns[:, column]).T):
+            curve = _new_curve(curves, path, index, name)
+            curve.keyframe_points.add(len(frames))
+            keys = np.stack([frames, values], axis=1).astype(np.float32)
+            curve.keyframe_points.foreach_set("co", keys.ravel())
+            for point in curve.keyframe_points:
+                point.interpolation = "LINEAR"
+            curve.update()
+    return action
 
 
 def _curves(action, armature):

@@ -5,12 +5,14 @@ import json
 
 import bpy
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Euler, Quaternion
 
 SAME = 1e-7
 """Values that differ by less are the same turn."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
 """By rotation mode, where a bone keeps how it is turned."""
+KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
+"""Modes for keys, best first: the axis of a small turn is anywhere, so between two keys it swings."""
 
 
 def kept(armature, bones) -> str:
@@ -43,29 +45,51 @@ def give_back(armature, text: str) -> bool:
     return bool(found)
 
 
-def free_modes(armature, bones) -> dict[str, str]:
-    """For each bone a rotation mode whose values no animation writes; the last of them where all are animated."""
+def free_modes(armature, bones, modes=tuple(CHANNELS)) -> dict[str, str]:
+    """For each bone the first rotation mode whose values no animation writes; the last one where all are animated."""
     animated = _animated(armature.animation_data)
     found = {}
     for name in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
-        found[name] = next((mode for mode, channel in CHANNELS.items() if start + channel not in animated), "XYZ")
+        found[name] = next((mode for mode in modes if start + CHANNELS[mode] not in animated), modes[-1])
     return found
+
+
+def values(mode: str, turns: np.ndarray) -> np.ndarray:
+    """What a bone keeps in a rotation mode (T, 3 or 4) for turns (T, 4) wxyz over time, without the leaps that linear
+    curves would swing through.
+    """
+    same = np.array(turns, float)
+    same[1:] *= np.cumprod(np.where((same[1:] * same[:-1]).sum(axis=-1) < 0, -1.0, 1.0))[:, None]
+    if mode == "QUATERNION":
+        return same
+    found, last = [], Euler()
+    for wxyz in same:
+        if mode == "XYZ":
+            last = Quaternion(wxyz).to_euler("XYZ", last)
+            found.append(last[:])
+        else:
+            found.append(_axis_angle(wxyz))
+    return np.array(found)
 
 
 def turn(bone, mode: str, wxyz) -> bool:
     """Turn a bone in a rotation mode; whether that changed anything."""
-    values = np.array(wxyz, np.float32)
+    wanted = np.array(wxyz, np.float32)
     if mode == "AXIS_ANGLE":
-        axis, angle = Quaternion(wxyz).to_axis_angle()
-        values = np.array([angle, *axis], np.float32)
+        wanted = np.array(_axis_angle(wxyz), np.float32)
     elif mode == "XYZ":
-        values = np.array(Quaternion(wxyz).to_euler("XYZ"), np.float32)
-    if bone.rotation_mode == mode and np.abs(np.subtract(getattr(bone, CHANNELS[mode]), values)).max() <= SAME:
+        wanted = np.array(Quaternion(wxyz).to_euler("XYZ"), np.float32)
+    if bone.rotation_mode == mode and np.abs(np.subtract(getattr(bone, CHANNELS[mode]), wanted)).max() <= SAME:
         return False
     bone.rotation_mode = mode
-    setattr(bone, CHANNELS[mode], values)
+    setattr(bone, CHANNELS[mode], wanted)
     return True
+
+
+def _axis_angle(wxyz) -> list[float]:
+    axis, angle = Quaternion(wxyz).to_axis_angle()
+    return [angle, *axis]
 
 
 def _animated(data) -> set[str]:

@@ -78,6 +78,46 @@ def bones(folder: Path) -> None:
         assert apart(turns(f)[others], still[f][others]) < 1e-6
 
 
+def keyed_bones(folder: Path) -> None:
+    """Hair bones that the artist has keyed, as a key on the whole character does: the baked keys show all the same, and
+    muted give the artist's back, as they do for bones without keys.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    scene, first, second = bpy.context.scene, *(rig.pose.bones[name] for name in ("hair.01", "hair.02"))
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    track = "Neuralocks Hair"
+
+    def turns(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+
+    for keyed in (False, True):
+        first.rotation_mode, first.rotation_quaternion = "QUATERNION", (0.9, 0.3, 0.1, -0.3)
+        second.rotation_euler = (0.1, 0.2, -0.1)
+        for frame in (1, 24) if keyed else ():
+            first.rotation_quaternion[1] = second.rotation_euler[0] = 0.02 * frame
+            first.keyframe_insert("rotation_quaternion", frame=frame)
+            second.keyframe_insert("rotation_euler", frame=frame)
+        still = {frame: turns(frame) for frame in (3, 17)}
+        rig.neuralocks_character.rig_live = True
+        live = {frame: turns(frame) for frame in still}
+        assert apart(live[3], still[3]) > 0.01 and not messages(), messages()
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        for muted, expected in ((False, live), (True, still), (False, live)):
+            rig.animation_data.nla_tracks[track].mute = muted
+            for frame, matrices in expected.items():
+                assert apart(turns(frame), matrices) < SAME, (keyed, muted, frame)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert first.rotation_mode == "QUATERNION" and second.rotation_mode == "XYZ"
+        assert not rig.animation_data.nla_tracks and not [a for a in bpy.data.actions if "Hair" in a.name]
+        for frame, matrices in still.items():
+            assert apart(turns(frame), matrices) < 1e-6
+
+
 def renamed_bones(folder: Path) -> None:
     """A bone that gets another name is noticed as one more bone would be."""
     from dcc_addon import live
