@@ -43,13 +43,9 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
 def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
     """The header."""
     text = (_TEXTS / "hair.h.in").read_text(encoding="utf-8")
-    if model.dynamic:
-        history = (_TEXTS / "history.h.in").read_text(encoding="utf-8")
-    else:
-        history = ""
+    history = (_TEXTS / "history.h.in").read_text(encoding="utf-8") if model.dynamic else ""
     text = text.replace("@HISTORY@", history)
-    for name, wanted in (("DYNAMIC", model.dynamic), ("STATIC", not model.dynamic)):
-        text = re.sub(rf"@IF_{name}@\n(.*?)@END@\n", lambda m: m[1] if wanted else "", text, flags=re.S)  # noqa: B023
+    text = _parts_for(model, text)
     chains = model.chains
     size = np.float32(np.sin(model.max_angle / 2))
     layers = _padded(model.layers, len(chains))
@@ -138,10 +134,13 @@ def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str
     return "\n".join(lines)
 
 
+def _parts_for(model: RigModel, text: str) -> str:
+    """A template without its marks, and for a quasi-static model without what lies between @IF_DYNAMIC@ and @END@."""
+    return re.sub(r"@IF_DYNAMIC@\n(.*?)@END@\n", r"\1" if model.dynamic else "", text, flags=re.S)
+
+
 def _example(model: RigModel, header: str, prefix: str) -> str:
-    text = (_TEXTS / "example.c.in").read_text(encoding="utf-8")
-    for name, wanted in (("DYNAMIC", model.dynamic), ("STATIC", not model.dynamic)):
-        text = re.sub(rf"@IF_{name}@\n(.*?)@END@\n", lambda m: m[1] if wanted else "", text, flags=re.S)  # noqa: B023
+    text = _parts_for(model, (_TEXTS / "example.c.in").read_text(encoding="utf-8"))
     names = {"HEADER": header, "STEM": Path(header).stem, "PREFIX": prefix, "UPPER": prefix.upper()}
     return re.sub("@([A-Z]+)@", lambda m: names[m[1]], text)
 

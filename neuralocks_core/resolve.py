@@ -61,6 +61,11 @@ class Resolver:
             return None
         return Collider(self.body.posed(self._skinning(joints), shape), self.body.triangles)
 
+    def prepare(self) -> None:
+        """Make now, once for all frames, what the first one would have to wait for."""
+        if self.body is not None:
+            _ = self.clear
+
     def apply(
         self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None, each: Callable = map
     ) -> None:

@@ -51,8 +51,7 @@ class GroomPoser:
             from neuralocks_core.resolve import Resolver
 
             self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
-            if self._resolver.body is not None:  # the hair may be out of its reach
-                self._resolver.clear  # noqa: B018  (made when first asked for)
+            self._resolver.prepare()
         give_back()  # 150 MB of a large groom
 
     @property
