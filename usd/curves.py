@@ -36,6 +36,16 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     return chosen
 
 
+def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
+    """Those of the curves that are empty, unless all are: exporters leave such prims behind."""
+    empty = []
+    for prim in prims:
+        points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
+        if points is None or not len(points):
+            empty.append(prim)
+    return empty if len(empty) < len(prims) else []
+
+
 def rest_points(prim: Usd.Prim) -> np.ndarray:
     """(P, 3) float32 points at rest in the prim's own space and units.
 

@@ -13,10 +13,10 @@ from neuralocks_core.rig.rigging import assemble_rig
 
 from .attach import attach, rig_joint
 from .border import Border, open_stage
-from .curves import find_curves, read_groom
+from .curves import find_curves, read_groom, without_points
 from .damage import names_damage
 from .groom import USD
-from .notes import composition_notes, groom_notes, head_width, left_out, out_of_range, rig_notes, too_far
+from .notes import composition_notes, groom_notes, head_width, left_out, no_points, out_of_range, rig_notes, too_far
 from .placement import Placement
 from .rig_source import read_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
@@ -88,7 +88,9 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
             f"{rigs[0].path}: the skeleton has no animation; bind a SkelAnimation to it (skel:animationSource)"
         )
     grooms, far, curves = [], [], find_curves(stage)
-    for prim in curves:
+    empty = without_points(curves)
+    spoils += [no_points(str(prim.GetPath())) for prim in empty]
+    for prim in (prim for prim in curves if prim not in empty):
         try:
             groom = _curves(prim, rigs, border, head, spoils, stops, far)
             grooms += [groom] if groom else []

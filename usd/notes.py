@@ -36,6 +36,16 @@ def left_out(error) -> str:
     return f"{error} (this skeleton is left out)"
 
 
+def no_points(path: str) -> str:
+    """Of an empty prim of curves beside others."""
+    return f"{path}: the curves have no points; left out"
+
+
+def stands_still(path: str, rig: StageRig) -> str:
+    """Of a groom whose character is not animated, beside others."""
+    return f"{path}: {rig.path}, which carries it, has no animation; left out"
+
+
 def too_far(path: str, found: Attachment) -> str:
     """Why the curves of a prim are not taken for hair."""
     return (

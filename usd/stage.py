@@ -12,9 +12,9 @@ from neuralocks_core.groom import Groom
 
 from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
-from .curves import find_curves, read_groom
+from .curves import find_curves, read_groom, without_points
 from .damage import names_damage
-from .notes import composition_notes, groom_notes, left_out, nothing_found, rig_notes, too_far
+from .notes import composition_notes, groom_notes, left_out, no_points, nothing_found, rig_notes, stands_still, too_far
 from .placement import Placement
 from .rig_source import StageRig, read_rig
 
@@ -93,7 +93,9 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs, path)
     found, far = [], []
-    for prim in curves:
+    empty = [] if grooms else without_points(curves)
+    notes += [no_points(str(prim.GetPath())) for prim in empty]
+    for prim in (prim for prim in curves if prim not in empty):
         placement = Placement(prim)
         attachment = attach(prim, rigs, placement, head, notes)
         if attachment.far and not grooms:
@@ -105,6 +107,10 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     if not found:
         raise NeuralocksError(far[0])
     notes += far
+    still = [item for item in found if not item.attachment.rig.source.animated]
+    if still and len(still) < len(found) and not grooms:
+        found = [item for item in found if item.attachment.rig.source.animated]
+        notes += [stands_still(item.path, item.attachment.rig) for item in still]
     carrying = {id(g.attachment.rig) for g in found}
     used = tuple(rig for rig in rigs if id(rig) in carrying)
     for rig in used:

@@ -132,6 +132,33 @@ def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_p
     assert len(inspect(path)["stops"]) == 1
 
 
+def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    UsdGeom.BasisCurves.Define(stage, "/Hero/Empty")
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot, facts = read_shot(path), inspect(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] == [groom["path"] for groom in facts["grooms"]]
+    assert any("/Hero/Empty" in note for note in shot.notes) and any("/Hero/Empty" in note for note in facts["spoils"])
+    with pytest.raises(NeuralocksError, match="no points"):
+        read_shot(path, ["/Hero/Empty"])
+
+
+def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_path):
+    for name, frames in (("hero", 9), ("doll", 0)):
+        write_shot(tmp_path, Recipe(frames=frames), name)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("hero", "doll"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{name}.usda", "/Hero")
+    stage.GetRootLayer().Save()
+    shot = read_shot(tmp_path / "shot.usda")
+    assert [item.path for item in shot.grooms] == ["/hero/Hair"]
+    assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
+    with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
+        read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
+
+
 def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
     stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
     skin = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr().Get())
