@@ -66,10 +66,10 @@ class Inputs:
     """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
 
     def __init__(self, model, real, strands: int):
-        from neuralocks_core.strand_session import strand_inputs
+        from neuralocks_core.strand_session import StrandSession, strand_inputs
 
         take = np.arange(strands) % len(real.rest)
-        session = model.prepare(real)
+        session = StrandSession(model, real)
         self.strand = strand_inputs(real, session.codes)[take]
         edges = np.zeros_like(real.rest)
         edges[:, 1:] = np.diff(real.rest, axis=1)

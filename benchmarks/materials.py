@@ -25,6 +25,7 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.random_motion import scripted_clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
@@ -113,7 +114,7 @@ def answered(
     groom: StrandSet = scene.grooms[0]
     clip = _clip(scene, kind)
     sampler = BoundarySampler(strand_model.spec, scene.character, clip)
-    session, log = strand_model.prepare(groom), material.log_ratios()
+    session, log = StrandSession(strand_model, groom), material.log_ratios()
     session.anchor(sampler.held_bind(log))
     return np.stack([session.displacement(v)[drawn] for v in sampler.vectors(clip.times, log)])
 

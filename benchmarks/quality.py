@@ -27,6 +27,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import strand_set
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
@@ -91,7 +92,7 @@ class Bench:
         """The network's displacement (T, n, 24, 3)."""
         key = (id(model), style)
         if key not in sessions:
-            sessions[key] = model.prepare(self.styles[style])
+            sessions[key] = StrandSession(model, self.styles[style])
         clip = replace(clip, shape=np.tile(self.shape, (len(clip.times), 1)))
         sampler = model.sampler(self.character, clip)
         sessions[key].anchor(sampler.held_bind(shape=self.shape))

@@ -18,8 +18,10 @@ from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
-from neuralocks_core.strand_session import StrandSession, chunks
-from neuralocks_core.strands import StrandSet
+
+CHUNK = 512
+"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
+so that results do not depend on the machine."""
 
 
 class StrandModel:
@@ -49,10 +51,6 @@ class StrandModel:
     def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
         """From a file; the shipped model where `path` is None."""
         return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
-
-    def prepare(self, strands: StrandSet) -> StrandSession:
-        """Compute once what depends on the strands alone."""
-        return StrandSession(self, strands)
 
     def sampler(self, character: Character, clip: Clip) -> BoundarySampler:
         """Boundary vectors as this model reads them."""
@@ -90,6 +88,11 @@ class StrandModel:
     def map(self, function: Callable, items) -> Iterable:
         """Results of calls on this model's threads, in order; a single one is made where it stands."""
         return map(function, items) if len(items) < 2 else self._pool.map(function, items)
+
+
+def chunks(count: int, start: int = 0) -> list[slice]:
+    """The chunks of `count` strands, from the one that holds `start` on."""
+    return [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
 
 
 def graph_session(file: model_file.ModelFile, name: str):

@@ -6,20 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property, partial
 from threading import Lock
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neuralocks_core.clumping import COLUMN, Locks
 from neuralocks_core.locks import lock_codes
+from neuralocks_core.runtime import CHUNK, StrandModel
 from neuralocks_core.strands import K, StrandSet, scalp_local
-
-if TYPE_CHECKING:
-    from neuralocks_core.runtime import StrandModel
-
-CHUNK = 512
-"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
-so that results do not depend on the machine."""
 
 
 class StrandSession:
@@ -90,7 +83,7 @@ class StrandSession:
     @cached_property
     def _locks(self) -> tuple[Locks, StrandSession]:
         locks = Locks.of(self.strands)
-        return locks, self.model.prepare(locks.strands)
+        return locks, StrandSession(self.model, locks.strands)
 
     def _tail(self, output, frame, strands: slice = slice(None), out=None, gather=None) -> np.ndarray:
         start, stop, _ = strands.indices(len(self.strands.rest))
@@ -145,11 +138,6 @@ class StrandSession:
 
         self.model.by_chunk(work, len(result))
         return result
-
-
-def chunks(count: int, start: int = 0) -> list[slice]:
-    """The chunks of `count` strands, from the one that holds `start` on."""
-    return [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
 
 
 def _edges(rest: np.ndarray) -> np.ndarray:

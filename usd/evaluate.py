@@ -207,6 +207,7 @@ class _Subject:
         """The model's answer for each pose as if it were held, if there is a model."""
         from neuralocks_core.errors import NeuralocksError
         from neuralocks_core.runtime import StrandModel
+        from neuralocks_core.strand_session import StrandSession
 
         rig = self.item.attachment.rig
         try:
@@ -215,7 +216,7 @@ class _Subject:
             if model is not None:
                 raise
             return None
-        session = model.prepare(self.strands)
+        session = StrandSession(model, self.strands)
         sampler = model.sampler(self.character, rig.clip)
         ratios = material.log_ratios()
         session.anchor(sampler.held_bind(ratios))

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import chunks
+from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import StrandSet
 
 from .memory import give_back
@@ -43,7 +43,7 @@ class GroomPoser:
         self._material = (material or Material()).log_ratios()
         self._strength = strength
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
-        self._session = model.prepare(self._placer.strands)
+        self._session = StrandSession(model, self._placer.strands)
         self._session.anchor(self._sampler.held_bind(self._material))
         self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
         self._resolver = None

@@ -9,8 +9,8 @@ from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.resolve import Resolver
-from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import chunks
+from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import strands_on
 
 from .history import SampledBoundary
@@ -37,7 +37,7 @@ class LiveHair:
         say(0.4)
         self._carrier = Carrier(groom, self._strands)
         say(0.6)
-        self._session = model.prepare(self._strands)
+        self._session = StrandSession(model, self._strands)
         say(1.0)
         self._resolver: Resolver | None = None
         self._sampler: BoundarySampler | None = None

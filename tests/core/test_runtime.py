@@ -16,7 +16,7 @@ from neuralocks_core.clumping import COLUMN, Locks
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import strand_inputs
+from neuralocks_core.strand_session import StrandSession, strand_inputs
 from neuralocks_core.strands import strand_set
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -59,7 +59,7 @@ def strands():
 def test_split_inference_equals_the_whole_network(path, net, strands):
     vector, bind = np.random.default_rng(1).normal(size=(2, SPEC.size)).astype(np.float32)
     vector[CLUMPING] = bind[CLUMPING] = 0
-    session = StrandModel.load(path).prepare(strands)
+    session = StrandSession(StrandModel.load(path), strands)
     session.anchor(bind)
     with torch.no_grad():
         inputs = torch.tensor(strand_inputs(strands, session.codes))
@@ -71,15 +71,15 @@ def test_split_inference_equals_the_whole_network(path, net, strands):
 
 def test_parts_of_a_groom_give_the_same_bits(path, strands):
     vector = np.random.default_rng(2).normal(size=SPEC.size).astype(np.float32)
-    whole = StrandModel.load(path, threads=2).prepare(strands).displacement(vector)
-    session = StrandModel.load(path, threads=1).prepare(strands)
+    whole = StrandSession(StrandModel.load(path, threads=2), strands).displacement(vector)
+    session = StrandSession(StrandModel.load(path, threads=1), strands)
     parts = [session.displacement(vector, slice(a, b)) for a, b in ((0, 1), (1, 1999), (1999, 4100), (4100, 5000))]
     assert np.array_equal(np.concatenate(parts), whole)
 
 
 def test_the_held_bind_pose_is_exactly_the_groom(path, strands):
     bind = np.random.default_rng(3).normal(size=SPEC.size).astype(np.float32)
-    session = StrandModel.load(path).prepare(strands)
+    session = StrandSession(StrandModel.load(path), strands)
     session.anchor(bind)
     assert not session.displacement(bind).any()
 
@@ -91,7 +91,7 @@ def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
         pytest.skip("hair that stretches has no lengths to keep")
     rng = np.random.default_rng(5)
     vector, bind = (0.3 * rng.normal(size=(2, SPEC.size))).astype(np.float32)
-    session = StrandModel.load(path).prepare(strands)
+    session = StrandSession(StrandModel.load(path), strands)
     ways, strays, factors = [], [], []
     counts = np.bincount(strands.lock)[strands.lock][:, None, None]
     for ratio in (-1.0, 0.0, 1.0):
@@ -117,7 +117,7 @@ def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
 
 
 def test_what_strands_share_is_computed_once_a_frame(path, strands, monkeypatch):
-    session = StrandModel.load(path).prepare(strands)
+    session = StrandSession(StrandModel.load(path), strands)
     vector = np.zeros(SPEC.size, np.float32)
     vector[CLUMPING] = 1.0
     session.anchor(vector)
@@ -132,7 +132,7 @@ def test_lengths_are_kept(path, strands):
     if path.stem == "displacement":
         pytest.skip("only the direction output keeps lengths by construction")
     vector = 3 * np.random.default_rng(4).normal(size=SPEC.size).astype(np.float32)
-    points = strands.rest + StrandModel.load(path).prepare(strands).displacement(vector)
+    points = strands.rest + StrandSession(StrandModel.load(path), strands).displacement(vector)
     before = np.linalg.norm(np.diff(strands.rest, axis=1), axis=2)
     assert np.abs(np.linalg.norm(np.diff(points, axis=1), axis=2) - before).max() < 1e-6
 

@@ -15,6 +15,7 @@ torch = pytest.importorskip("torch", reason="the extra 'train' is not installed"
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.regression import RegressionOptions
@@ -86,7 +87,7 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     assert messages[-1][0] == 1000
     assert "motion error" in messages[-1][2]
     sampler = StrandModel.load(path).sampler(person(), scripted_clip(person(), "shake"))
-    session = StrandModel.load(path).prepare(scene.grooms[0])
+    session = StrandSession(StrandModel.load(path), scene.grooms[0])
     session.anchor(sampler.held_bind())
     tips = np.stack([session.displacement(v)[:, -1] for v in sampler.vectors(np.arange(0, 2, 0.1))])
     assert np.ptp(tips, axis=0).max() > 0.03
