@@ -6,11 +6,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from neuralocks_core import model as model_file
+from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.files import atomic_write
+from neuralocks_core.measures import MEASURES
 
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
-STRANDS = {
+GRAPHS = {
     "encoder.onnx": "once a groom: `shape` (S, 72), root-relative points of 24 vertices in scalp axes [m] "
     "-> `code` (S, 32)",
     "strand.onnx": "once a groom: `strand` (S, 70): root UV 2, own code 32, mean code of its lock 32, root normal 3, "
@@ -22,24 +24,26 @@ STRANDS = {
     "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
     "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
     "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
+    "rig.onnx": "`features` (B, F) of B characters: pose, gravity and history of the boundary vector -> `turns` (B, joints, 4) "
+    "wxyz, joints as in the model's `chains`: local rotation now = local rotation in the bind pose * turn. The C header of "
+    "`neuralocks rig export-c` makes the features, too",
 }
-
 
 BOUNDARY = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), (3, 3) without "
     "scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m",
-    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j",
+    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 but for upper arms",
     "gravity": "T(R_head(t)) g / 9.81",
     "shape": "ten lengths of the bind body [m], as in `held`",
     "material": "logarithms of bend / 0.001, weight, damping / 10; 0",
-    "history": "step k = 0 ... steps - 1 is 9 numbers: f_k, s_k, c_k. With p the head joint's place and t_k = t - k dt: "
+    "history": "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the head joint's place and t_k = t - k dt: "
     "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
     "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
     "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
     "its `bin weights`. In a held pose all is 0. A bake reads poses between samples from a natural cubic spline of the place "
     "and of the quaternion's components; before the first sample the head goes on in a straight line and does not turn",
 }
-"""How each part of the boundary vector is made, for the default kind of history."""
+"""How each part of the boundary vector is made, for a model whose `linear` is "gravity", as those shipped."""
 
 
 def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None) -> list[Path]:
@@ -60,21 +64,16 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     file = model_file.read(model)
     folder = Path(folder)
     description = {"units": UNITS, "graphs": _graphs(file), "model": file.meta}
-    if file.kind == "strands":
-        from neuralocks_core.boundary import BoundarySpec
-        from neuralocks_core.measures import MEASURES
-
-        spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
-        parts = {name: [part.start, part.stop] for name, part in spec.slices.items()}
-        description["boundary vector"] = {
-            "length": spec.size,
-            "parts": parts,
-            "pose joints": spec.pose_joints,
-            "shape": MEASURES,
-            "steps": spec.steps,
-            "bin weights": [float(weight) for weight in spec.bin_weights],
-            "how": BOUNDARY,
-        }
+    spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
+    description["boundary vector"] = {
+        "length": spec.size,
+        "parts": {name: [part.start, part.stop] for name, part in spec.slices.items()},
+        "pose joints": spec.pose_joints,
+        "shape": MEASURES,
+        "steps": spec.steps,
+        "bin weights": [float(weight) for weight in spec.bin_weights],
+        "how": BOUNDARY,
+    }
     tables = {}
     if shot is not None:
         from .groom_tables import ARRAYS, export_grooms
@@ -95,7 +94,7 @@ def _graphs(file: model_file.ModelFile) -> dict:
     for name in file.graphs:
         session = graph_session(file, name)
         result[name] = {
-            "what": STRANDS.get(name, ""),
+            "what": GRAPHS[name],
             "inputs": {i.name: i.shape for i in session.get_inputs()},
             "outputs": {o.name: o.shape for o in session.get_outputs()},
         }
