@@ -16,7 +16,17 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom, without_points
 from .damage import names_damage
 from .groom import USD
-from .notes import composition_notes, groom_notes, head_width, left_out, no_points, out_of_range, rig_notes, too_far
+from .notes import (
+    composition_notes,
+    few,
+    groom_notes,
+    head_width,
+    left_out,
+    no_points,
+    out_of_range,
+    rig_notes,
+    too_far,
+)
 from .placement import Placement
 from .rig_source import read_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
@@ -89,14 +99,14 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         )
     grooms, far, curves = [], [], find_curves(stage)
     empty = without_points(curves)
-    spoils += [no_points(str(prim.GetPath())) for prim in empty]
+    spoils += few([no_points(str(prim.GetPath())) for prim in empty])
     for prim in (prim for prim in curves if prim not in empty):
         try:
             groom = _curves(prim, rigs, border, head, spoils, stops, far)
             grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))
-    (spoils if grooms else stops).extend(far)
+    (spoils if grooms else stops).extend(few(far))
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:

@@ -36,6 +36,13 @@ def left_out(error) -> str:
     return f"{error} (this skeleton is left out)"
 
 
+def few(lines: list[str], most: int = 3) -> list[str]:
+    """Alike lines about prims, of which a set may have hundreds: the first ones, and how many more there are."""
+    return (
+        lines if len(lines) <= most + 1 else [*lines[:most], f"{len(lines) - most} more prims are left out like that"]
+    )
+
+
 def no_points(path: str) -> str:
     """Of an empty prim of curves beside others."""
     return f"{path}: the curves have no points; left out"

@@ -14,7 +14,17 @@ from .attach import Attachment, attach, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom, without_points
 from .damage import names_damage
-from .notes import composition_notes, groom_notes, left_out, no_points, nothing_found, rig_notes, stands_still, too_far
+from .notes import (
+    composition_notes,
+    few,
+    groom_notes,
+    left_out,
+    no_points,
+    nothing_found,
+    rig_notes,
+    stands_still,
+    too_far,
+)
 from .placement import Placement
 from .rig_source import StageRig, read_rig
 
@@ -94,7 +104,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     _check_animated(rigs, path)
     found, far = [], []
     empty = [] if grooms else without_points(curves)
-    notes += [no_points(str(prim.GetPath())) for prim in empty]
+    notes += few([no_points(str(prim.GetPath())) for prim in empty])
     for prim in (prim for prim in curves if prim not in empty):
         placement = Placement(prim)
         attachment = attach(prim, rigs, placement, head, notes)
@@ -106,7 +116,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         notes += groom_notes(found[-1].path, groom)
     if not found:
         raise NeuralocksError(far[0])
-    notes += far
+    notes += few(far)
     still = [item for item in found if not item.attachment.rig.source.animated]
     if still and len(still) < len(found) and not grooms:
         found = [item for item in found if item.attachment.rig.source.animated]

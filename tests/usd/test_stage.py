@@ -125,6 +125,13 @@ def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_p
     assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
     assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
     assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
+    for number in range(30):
+        Sdf.CopySpec(stage.GetRootLayer(), "/Set/Grass", stage.GetRootLayer(), f"/Set/Grass{number}")
+    stage.GetRootLayer().Save()
+    assert len([note for note in read_shot(path).notes if "Grass" in note or "28 more" in note]) == 4
+    stage.RemovePrim("/Set")
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Set")
+    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
     stage.RemovePrim("/Hero/Hair")
     stage.GetRootLayer().Save()
     with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
