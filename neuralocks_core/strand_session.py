@@ -32,6 +32,7 @@ class StrandSession:
         self._strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
         self._anchor = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None
+        # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
         self._turn = Lock()
 
     def anchor(self, vector: np.ndarray) -> None:
@@ -94,7 +95,8 @@ class StrandSession:
         def work(chunk: slice) -> None:
             values = self._chunk(output, chunk, frame)
             if gather is not None:
-                gather(values, chunk)
+                with self._turn:
+                    gather(values, chunk)
             a, b = max(chunk.start, start), min(chunk.stop, stop)
             result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
 
@@ -109,12 +111,11 @@ class StrandSession:
 
         def work(chunk: slice) -> None:
             values = self._chunk("displacement", chunk, frame)
-            if gather is not None:
-                gather(values, chunk)
-            if not valid[chunk].all():
-                values[~valid[chunk]] = 0
-            # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
             with self._turn:
+                if gather is not None:
+                    gather(values, chunk)
+                if not valid[chunk].all():
+                    values[~valid[chunk]] = 0
                 function(chunk, values.reshape(-1, K, 3))
 
         self.model.by_chunk(work, len(self.strands.rest))
