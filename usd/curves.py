@@ -75,9 +75,9 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     points = rest_points(prim)
     counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
     scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
-    uv = _uniform(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), len(counts), 2)
-    guides = _uniform(prim, ("groom_guide",), len(counts), 1)
-    group = _uniform(prim, ("groom_group_id",), len(counts), 1)
+    uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)
+    guides = _per_strand(prim, ("groom_guide",), counts, 1)
+    group = _per_strand(prim, ("groom_group_id",), counts, 1)
     with np.errstate(invalid="ignore", over="ignore"):  # Groom says where a value is not finite
         placed = transformed(points, to_bind).astype(np.float32)
     return Groom(
@@ -107,9 +107,12 @@ def _widths(
     return None
 
 
-def _uniform(prim: Usd.Prim, names, count: int, width: int) -> np.ndarray | None:
-    """A per-strand primvar (count, width), or (count,) for width 1: the first of `names` that fits."""
-    api = UsdGeom.PrimvarsAPI(prim)
+def _per_strand(prim: Usd.Prim, names, counts: np.ndarray, width: int) -> np.ndarray | None:
+    """A primvar of each strand (S, width), or (S,) for width 1: the first of `names` that fits.
+
+    One value counts for all strands; of values of each vertex, as some tools write them, the root's is taken.
+    """
+    api, strands = UsdGeom.PrimvarsAPI(prim), len(counts)
     for name in names:
         primvar = api.GetPrimvar(name)
         if not primvar or not primvar.HasValue():
@@ -118,13 +121,15 @@ def _uniform(prim: Usd.Prim, names, count: int, width: int) -> np.ndarray | None
             values = np.asarray(rest_primvar(primvar))
         except (TypeError, ValueError):
             continue
-        values = (
-            np.repeat(values[None], count, axis=0)
-            if values.shape == () or values.size == width == 1 and count > 1
-            else values
-        )
-        if values.dtype.kind in "biuf" and values.size == count * width and np.isfinite(values).all():
-            return values.reshape(count, width) if width > 1 else values.reshape(count)
+        if values.dtype.kind not in "biuf" or values.size % width or not np.isfinite(values).all():
+            continue
+        values = values.reshape(-1, width) if width > 1 else values.reshape(-1)
+        if len(values) == 1:
+            values = np.repeat(values, strands, axis=0)
+        elif len(values) == counts.sum() != strands and counts.min() > 0:
+            values = values[np.cumsum(counts) - counts]
+        if len(values) == strands:
+            return values
     return None
 
 

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Curves as tools write them, read as grooms."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from usd.curves import read_groom
+
+COUNTS = [2, 3, 2]
+POINTS = np.arange(21, dtype=np.float32).reshape(7, 3)
+ROOTS = np.array([[0, 0], [0.2, 0.4], [0.5, 1]], np.float32)
+EVERY = np.stack([np.arange(7), 2 * np.arange(7)], axis=1).astype(np.float32) / 10
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "kind", "values", "indices", "expected"),
+    [
+        ("uniform", Sdf.ValueTypeNames.TexCoord2fArray, ROOTS, None, ROOTS),
+        ("uniform", Sdf.ValueTypeNames.TexCoord2hArray, ROOTS, [2, 1, 0], ROOTS[::-1]),
+        ("vertex", Sdf.ValueTypeNames.TexCoord2fArray, EVERY, None, ROOTS),
+        ("constant", Sdf.ValueTypeNames.TexCoord2fArray, ROOTS[1:2], None, ROOTS[[1, 1, 1]]),
+        ("vertex", Sdf.ValueTypeNames.TexCoord2fArray, EVERY[:5], None, None),
+        ("vertex", Sdf.ValueTypeNames.TexCoord3fArray, np.ones((7, 3), np.float32), None, None),
+    ],
+)
+def test_texture_coordinates_of_roots(interpolation, kind, values, indices, expected):
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(POINTS))
+    curves.CreateCurveVertexCountsAttr(COUNTS)
+    primvar = UsdGeom.PrimvarsAPI(curves).CreatePrimvar("st", kind, interpolation)
+    primvar.Set([tuple(map(float, row)) for row in values])
+    if indices:
+        primvar.SetIndices(indices)
+    read = read_groom(curves.GetPrim(), np.eye(4), []).root_uv
+    assert (read is None) == (expected is None)
+    assert expected is None or np.allclose(read, expected, atol=1e-3)
