@@ -10,7 +10,7 @@ import pytest
 from pxr import Sdf, Usd
 
 from usd.border import Border
-from usd.override import write_header
+from usd.override import used_files, write_header
 
 SHOT = """#usda 1.0
 (
@@ -84,3 +84,13 @@ def test_an_output_folder_behind_a_link_leads_to_the_shot_from_the_name_it_was_g
     (tmp_path / "cache").symlink_to(real)
     _header(shot, tmp_path / "cache" / "hair.usda")
     assert Usd.Stage.Open(str(tmp_path / "cache" / "hair.usda")).GetPrimAtPath("/Hero/Hair")
+
+
+def test_a_layer_inside_a_package_is_of_the_packages_file(shot, tmp_path):
+    package = tmp_path / "show.usdz"
+    with Usd.ZipFileWriter.CreateNew(str(package)) as archive:
+        archive.AddFile(str(shot), "shot.usda")
+        archive.AddFile(str(shot.parent / "hero.usda"), "hero.usda")
+    stage = Usd.Stage.CreateInMemory()
+    stage.DefinePrim("/Hero").GetReferences().AddReference(f"{package}[hero.usda]")
+    assert stage.GetPrimAtPath("/Hero/Hair") and used_files(stage) == [str(package)]
