@@ -88,7 +88,7 @@ def test_an_output_folder_behind_a_link_leads_to_the_shot_from_the_name_it_was_g
 
 def test_a_layer_inside_a_package_is_of_the_packages_file(shot, tmp_path):
     package = tmp_path / "show.usdz"
-    with Usd.ZipFileWriter.CreateNew(str(package)) as archive:
+    with Sdf.ZipFileWriter.CreateNew(str(package)) as archive:
         archive.AddFile(str(shot), "shot.usda")
         archive.AddFile(str(shot.parent / "hero.usda"), "hero.usda")
     stage = Usd.Stage.CreateInMemory()
