@@ -16,12 +16,12 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .behind import Behind
 from .damage import names_damage
 from .override import OverrideWriter, reload_open, to_text, used_files
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
 from .stencils import Stencils
+from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
 """Points that are read back and written at a time."""
@@ -94,7 +94,7 @@ def _write(shot: Shot, codes, poser, spool: Spool, velocities: bool, say) -> int
     plans = [Stencils(item, codes, velocities) for item in shot.grooms]
     total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
     say(0, total, "reading")
-    with Behind() as behind:
+    with WriteBehind() as behind:
         for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
             behind.put(writer.groom, item, velocities)
             store, made = _Store(spool, writer, item, number, plan), None

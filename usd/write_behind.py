@@ -5,7 +5,7 @@ import queue
 import threading
 
 
-class Behind:
+class WriteBehind:
     """Runs calls one after another on a thread.
 
     `put` waits until the call before is done, so that no more than the arrays of one call are held. The first error of
@@ -26,7 +26,7 @@ class Behind:
             raise self._error
         self._calls.put((function, arguments))
 
-    def __enter__(self) -> "Behind":
+    def __enter__(self) -> "WriteBehind":
         self._thread.start()
         return self
 
