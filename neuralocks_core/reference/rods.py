@@ -106,12 +106,12 @@ def simulate(
         rods,
         material,
         check_neighbours(neighbours, strands),
-        margin,
-        collision,
-        gravity,
-        tolerance * gravity,
-        volume,
-        device,
+        margin=margin,
+        collision=collision,
+        gravity=gravity,
+        tolerance=tolerance * gravity,
+        volume=volume,
+        device=device,
     )
     if body is not None:
         first, faces = check_body(body, triangles, frames)

@@ -37,6 +37,7 @@ class Stepper:
         rods: RestRods,
         material: dict[str, np.ndarray],
         neighbours: np.ndarray,
+        *,
         margin: float,
         collision: float,
         gravity: float,
