@@ -60,15 +60,15 @@ class StrandSet:
     def subset(self, strands: np.ndarray) -> StrandSet:
         """The same for the given strands only ((N,) indices or (S,) mask). Lock numbers stay as they are."""
         return StrandSet(
-            self.rest[strands],
-            self.valid[strands],
-            self.uv[strands],
-            self.root_frame[strands],
-            self.lock[strands],
-            self.length[strands],
-            self.head_origin,
-            self.head_centre,
-            self.facing,
+            rest=self.rest[strands],
+            valid=self.valid[strands],
+            uv=self.uv[strands],
+            root_frame=self.root_frame[strands],
+            lock=self.lock[strands],
+            length=self.length[strands],
+            head_origin=self.head_origin,
+            head_centre=self.head_centre,
+            facing=self.facing,
         )
 
 

@@ -76,7 +76,11 @@ def attach(
         joint, why = _carrier(rig, shares, exact=True)
         notes += _spread(rig, path, joint, shares)
         found = Attachment(
-            rig, _with_head(rig, joint), rig.to_bind @ geom_bind(prim), f"{why} (its own skel binding)", True
+            rig=rig,
+            character=_with_head(rig, joint),
+            to_bind=rig.to_bind @ geom_bind(prim),
+            how=f"{why} (its own skel binding)",
+            skinned=True,
         )
     else:
         found = _on_mesh(prim, rigs, placement, notes) or _by_name(prim, rigs, placement, head)
@@ -110,7 +114,11 @@ def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, notes: 
     joint, why = _carrier(rig, shares)
     notes += _spread(rig, str(prim.GetPath()), joint, shares)
     return Attachment(
-        rig, _with_head(rig, joint), to_bind, f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)", False
+        rig=rig,
+        character=_with_head(rig, joint),
+        to_bind=to_bind,
+        how=f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)",
+        skinned=False,
     )
 
 
@@ -140,7 +148,9 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     to_bind = min(_ways(rig, None, placement), key=lambda way: round(away(rig, way), 3))
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
-    return Attachment(rig, rig.character, to_bind, how, False, nearest if out_of_reach else 0.0)
+    return Attachment(
+        rig=rig, character=rig.character, to_bind=to_bind, how=how, skinned=False, far=nearest if out_of_reach else 0.0
+    )
 
 
 def _trunk(rig: StageRig) -> float:

@@ -128,7 +128,18 @@ def read_rig(
         border.to_core @ posed @ trim,
         np.concatenate([np.zeros((len(posed), 0)), *(shares(w, knots[name]) for name, w in used.items())], axis=1),
     )
-    return StageRig(source.path, source, border, meshes, to_bind, character, clip, time_codes, notes, by_hand)
+    return StageRig(
+        path=source.path,
+        source=source,
+        border=border,
+        meshes=meshes,
+        to_bind=to_bind,
+        character=character,
+        clip=clip,
+        time_codes=time_codes,
+        notes=notes,
+        by_hand=by_hand,
+    )
 
 
 def _time_codes(source: JointSource, border: Border) -> np.ndarray:

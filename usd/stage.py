@@ -127,7 +127,16 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         _check_animated([rig], path)
         notes += rig.notes + rig_notes(rig)
     first, last = frame_range(stage, used)
-    return Shot(path, stage, border, used, tuple(found), first, last, tuple(dict.fromkeys(notes)))
+    return Shot(
+        path=path,
+        stage=stage,
+        border=border,
+        rigs=used,
+        grooms=tuple(found),
+        first=first,
+        last=last,
+        notes=tuple(dict.fromkeys(notes)),
+    )
 
 
 @names_damage

@@ -176,7 +176,16 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh 
         triangles = triangles[:, ::-1]
     indices, weights = joint_influences(prim, len(points), source)
     shapes = read_blend_shapes(prim, len(points), notes)
-    return SkinnedMesh(prim, geom_bind(prim), points, triangles, indices, weights, shapes, Placement(prim))
+    return SkinnedMesh(
+        prim=prim,
+        geom_bind=geom_bind(prim),
+        points=points,
+        triangles=triangles,
+        indices=indices,
+        weights=weights,
+        shapes=shapes,
+        placement=Placement(prim),
+    )
 
 
 def rest_value(attribute: Usd.Attribute):

@@ -44,18 +44,18 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     write_scene(
         Path(path),
         SceneArrays(
-            motion.metres_per_unit,
-            motion.rate,
-            motion.frames,
-            rig.paths,
-            bind,
-            rest,
-            motion.translation,
-            motion.rotation,
-            motion.scale,
-            _skins(armature, scene, sampled),
-            motion.shape,
-            [_hair(hair, label, sampled) for hair, label in zip(hairs, labels, strict=True)],
+            metres_per_unit=motion.metres_per_unit,
+            rate=motion.rate,
+            frames=motion.frames,
+            joints=rig.paths,
+            bind=bind,
+            rest=rest,
+            translation=motion.translation,
+            rotation=motion.rotation,
+            scale=motion.scale,
+            skins=_skins(armature, scene, sampled),
+            shape=motion.shape,
+            hair=[_hair(hair, label, sampled) for hair, label in zip(hairs, labels, strict=True)],
         ),
     )
     return {hair.name_full: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
@@ -71,14 +71,14 @@ def _hair(hair, label: str, sampled):
         radius = np.full(1, curves.RADIUS)
     basis = BASES.get(curves.kind(data))
     return HairArrays(
-        label,
-        curves.points(data),
-        curves.counts(data),
-        2 * radius,
-        sampled.bind_places[hair.name_full],
-        sampled.motion.places[hair.name_full],
-        sampled.character.head,
-        Spline("cubic", basis, "pinned") if basis else Spline(),
+        name=label,
+        points=curves.points(data),
+        counts=curves.counts(data),
+        widths=2 * radius,
+        bind_place=sampled.bind_places[hair.name_full],
+        places=sampled.motion.places[hair.name_full],
+        joint=sampled.character.head,
+        spline=Spline("cubic", basis, "pinned") if basis else Spline(),
     )
 
 

@@ -132,7 +132,15 @@ class _Recording:
         unit = self._scene.unit_settings.scale_length
         untrimmed = places[""][0] @ rig.rest
         motion = Motion.from_world(
-            self.frames, rate, unit, rig.parents, untrimmed, self._joints, np.array(self._shapes), places, self.name
+            frames=self.frames,
+            rate=rate,
+            metres_per_unit=unit,
+            parents=rig.parents,
+            bind=untrimmed,
+            joints=self._joints,
+            shape=np.array(self._shapes),
+            places=places,
+            subject=self.name,
         )
         head, binds = rig.humanoid()["head"], self._binds
         for other in self._tracked:

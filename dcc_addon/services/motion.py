@@ -138,15 +138,15 @@ class Motion:
             own = _matrices(translation[:, level], rotation[:, level], scale[:, level])
             stored[:, level] = own if above[0] < 0 else stored[:, above] @ own
         return cls(
-            np.asarray(frames, float),
-            float(rate),
-            float(metres_per_unit),
-            parents,
-            translation,
-            rotation,
-            scale,
-            np.asarray(shape, np.float32),
-            dict(places),
+            frames=np.asarray(frames, float),
+            rate=float(rate),
+            metres_per_unit=float(metres_per_unit),
+            parents=parents,
+            translation=translation,
+            rotation=rotation,
+            scale=scale,
+            shape=np.asarray(shape, np.float32),
+            places=dict(places),
         )
 
     @property

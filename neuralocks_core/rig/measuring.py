@@ -46,7 +46,17 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
         chain[row] = chain[parent] if parent >= 0 else (parents[:row] < 0).sum()
     _check_scale(skeleton, joints)
     axes = character.bind_to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
-    return HairChains(names, joints, parents, chain, places[joints], axes, bone_joint, bone_end, bones)
+    return HairChains(
+        names=names,
+        joints=joints,
+        parents=parents,
+        chain=chain,
+        origins=places[joints],
+        axes=axes,
+        bone_joint=bone_joint,
+        bone_end=bone_end,
+        bones=bones,
+    )
 
 
 def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict]:

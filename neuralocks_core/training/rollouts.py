@@ -152,16 +152,16 @@ class RolloutMaker:
         planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
         vectors, bind = self.vectors(draw, scene.spec)
         return Rollout(
-            draw.groom,
-            draw.strands,
-            rest.astype(np.float32),
-            draw.first,
-            vectors,
-            bind,
-            np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
-            np.clip(planes, -1000, 1000).astype(np.float16),
-            float(np.median(result.residual)),
-            np.stack([m.log_ratios() for m in draw.materials]),
+            groom=draw.groom,
+            strands=draw.strands,
+            rest=rest.astype(np.float32),
+            first=draw.first,
+            vectors=vectors,
+            bind=bind,
+            moved=np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
+            planes=np.clip(planes, -1000, 1000).astype(np.float16),
+            residual=float(np.median(result.residual)),
+            materials=np.stack([m.log_ratios() for m in draw.materials]),
         )
 
     def reread(self, index: int, rollout: Rollout, spec: BoundarySpec) -> Rollout:
