@@ -226,6 +226,8 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     if "upper_chest" in joints and joints["upper_chest"] in between:
         between = between[: between.index(joints["upper_chest"])]
     named = [joint for joint in between if "neck" in keys[joint]]
+    # `MCH-ROT-neck` over `neck` is a control rig's help, and does not turn with it.
+    named = [joint for joint in named if keys[joint] == "neck"] or named
     neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
     put("neck", neck, f"between head and chest, '{leaf(names[neck])}'" if neck is not None else "")
     if "upper_chest" in joints:

@@ -20,6 +20,12 @@ def rig(text: str) -> tuple[list[str], list[int]]:
 
 
 RIGS = {
+    "Rigify, generated": (
+        "MCH_torso_parent\n torso\n  MCH_spine_003\n   spine_fk_003\n    MCH_ROT_neck\n     neck\n      MCH_ROT_head\n"
+        "       head\n    ORG_spine_003\n     ORG_shoulder_L\n      ORG_upper_arm_L\n     ORG_shoulder_R\n"
+        "      ORG_upper_arm_R",
+        {"head": "head", "neck": "neck", "upper_chest": "spine_fk_003", "left_upper_arm": "ORG_upper_arm_L"},
+    ),
     "MotionBuilder": (
         "Hips\n LeftUpLeg\n RightUpLeg\n LowerBack\n  Spine1\n   Neck\n    Neck1\n     Head\n      HeadTop_End\n"
         "   LeftShoulder\n    LeftArm\n     LeftForeArm\n   RightShoulder\n    RightArm",
