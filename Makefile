@@ -35,6 +35,8 @@ clean:
 	rm -rf build dist out .pytest_cache .ruff_cache .hypothesis
 
 $(BIN)/python:
+	@command -v "$(PYTHON)" > /dev/null || \
+	    { echo "python: there is no $(PYTHON); install 3.11 or newer, or: make PYTHON=/path/to/it"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "python: $$($(PYTHON) --version 2>&1) is too old; install 3.11 or newer, or: make PYTHON=/path/to/it"; exit 1; }
 	$(PYTHON) -m venv $(VENV)

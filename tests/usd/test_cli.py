@@ -80,6 +80,19 @@ def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
     assert "vertices in the body" in done.stdout.decode("cp1252") and b"u2500" not in done.stdout
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
+    command = [sys.executable, "-m", "usd", "inspect", str(write_shot(tmp_path))]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and done.stderr.startswith("error: output: ") and "Traceback" not in done.stderr
+    read, write = os.pipe()
+    os.close(read)  # as `neuralocks inspect | head` does once it has its lines
+    with open(write, "w") as gone:
+        done = subprocess.run(command, cwd=ROOT, stdout=gone, stderr=subprocess.PIPE, text=True)
+    assert done.stderr == ""
+
+
 def test_the_version_is_told(capsys):
     assert status("--version") == 0
     assert capsys.readouterr().out.split()[0] == "neuralocks"
