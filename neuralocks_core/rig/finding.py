@@ -40,9 +40,14 @@ def find_chains(
     tops = _by_pattern(character, patterns) if patterns else _by_itself(character, meshes)
     if not tops:
         others = ", ".join(leaf(skeleton.names[j]) for j in skeleton.children[head][:8]) or "nothing"
+        remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
+        elsewhere = [j for j in np.flatnonzero(~skeleton.below(head)) if says_hair(skeleton.names[j])]
+        carrier = skeleton.parents[elsewhere[0]] if elsewhere else -1
+        if carrier >= 0:
+            first, above = leaf(skeleton.names[elsewhere[0]]), leaf(skeleton.names[carrier])
+            remedy = f"'{first}' hangs from '{above}': name that with --head {above}"
         raise NoHairChains(
-            f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); "
-            "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
+            f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); {remedy}"
         )
     return measured_chains(character, sorted(tops), meshes)
 

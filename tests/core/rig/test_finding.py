@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chains are found by themselves on rigs of any naming, and what cannot be used is named in one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -121,3 +123,13 @@ def test_a_model_for_other_chains_is_refused():
     with pytest.raises(NeuralocksError, match="elsewhere"):
         chains.check_same(longer)
     assert HairChains.from_json(chains.to_json()).names == chains.names
+
+
+def test_hair_that_hangs_from_the_neck_is_named_with_its_carrier():
+    """The remedy is what works."""
+    who = character(tail("ponytail", 3, parent="neck"))
+    with pytest.raises(NeuralocksError, match="'ponytail_1' hangs from 'neck': name that with --head neck"):
+        find_chains(who)
+    neck = next(j for j, name in enumerate(who.skeleton.names) if name.endswith("/neck"))
+    carried = replace(who, humanoid=replace(who.humanoid, joints={**who.humanoid.joints, "head": neck}))
+    assert find_chains(carried).names == ("ponytail_1", "ponytail_2")
