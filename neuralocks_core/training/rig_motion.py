@@ -64,7 +64,6 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)
     true = _ends(rig, truth)
-    rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
     times = motions[0].start + np.arange(true.shape[1]) / RATE
     joints = np.stack([m.at(times) for m in motions])
     heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
@@ -75,9 +74,24 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
     candidates = {SPRINGS: springs[best], DEFAULTS: springs[fits.index(SpringSettings())]}
     for name, model in models.items():
         candidates[name] = np.stack([_model_turns(rig, model, m, times) for m in motions])
+    result = _errors(rig, candidates, true, kinds) | {"motion_depth": {}}
+    if rig.character.body is not None and len(rig.points):
+        say(2, 4, "measuring what lies in the body in motion")
+        result["motion_depth"] = _depths(rig, {"simulation": truth, **candidates}, joints)
+    say(3, 4, "comparing frame rates and teleports")
+    result["spring_settings"] = asdict(fits[best])
+    result["rates"] = _rates(rig, models, fits[best])
+    result["teleport"] = _teleports(rig, models, fits[best])
+    result["cost"] = {SPRINGS: _spring_cost(rig)} | {name: _network_cost(model) for name, model in models.items()}
+    return result
+
+
+def _errors(rig: HairRig, candidates: dict[str, np.ndarray], true: np.ndarray, kinds) -> dict[str, dict]:
+    """Errors and motion ratios of turns (C, T, N, 4) by name, one clip a kind, against true bone ends (C, T, M, 3) [m]."""
+    rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
     carried = np.square(rest - true).sum(-1).mean(axis=(1, 2))
     speed = np.linalg.norm(np.diff(true, axis=1), axis=-1).mean()
-    result = {"motion_error": {}, "motion_error_by_kind": {}, "motion_ratio": {}, "motion_depth": {}}
+    result = {"motion_error": {}, "motion_error_by_kind": {}, "motion_ratio": {}}
     for name, turns in candidates.items():
         ends = _ends(rig, turns)
         values = np.square(ends - true).sum(-1).mean(axis=(1, 2))
@@ -86,19 +100,17 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         result["motion_error_by_kind"][name] = {k: round(float(v), 3) for k, v in zip(kinds, by_kind)}
         ratio = np.linalg.norm(np.diff(ends, axis=1), axis=-1).mean() / speed
         result["motion_ratio"][name] = round(float(ratio), 3)
-    if rig.character.body is not None and len(rig.points):
-        outside = rest_distances(rig, rig.points) > 0
-        say(2, 4, "measuring what lies in the body in motion")
-        few = joints[:, ::8].reshape(-1, *joints.shape[2:])
-        for name, turns in {"simulation": truth, **candidates}.items():
-            matrices = quaternion_matrices(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
-            points = skin(rig.chains, *pose_chains(rig.chains, matrices), rig.points[outside], rig.weights[outside])
-            result["motion_depth"][name] = depths(posed_distances(rig, few, points))
-    say(3, 4, "comparing frame rates and teleports")
-    result["spring_settings"] = asdict(fits[best])
-    result["rates"] = _rates(rig, models, fits[best])
-    result["teleport"] = _teleports(rig, models, fits[best])
-    result["cost"] = {SPRINGS: _spring_cost(rig)} | {name: _network_cost(model) for name, model in models.items()}
+    return result
+
+
+def _depths(rig: HairRig, candidates: dict[str, np.ndarray], joints: np.ndarray) -> dict[str, dict]:
+    """`depths` of turns (C, T, N, 4) by name at every eighth of the poses (C, T, J, 4, 4)."""
+    outside = rest_distances(rig, rig.points) > 0
+    few, result = joints[:, ::8].reshape(-1, *joints.shape[2:]), {}
+    for name, turns in candidates.items():
+        matrices = quaternion_matrices(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
+        points = skin(rig.chains, *pose_chains(rig.chains, matrices), rig.points[outside], rig.weights[outside])
+        result[name] = depths(posed_distances(rig, few, points))
     return result
 
 
