@@ -222,7 +222,7 @@ def test_the_headers_history_is_that_of_the_bake(tmp_path, rate):
     ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, wanted.shape[1])
     late = t > 2
     error = np.sqrt(np.square(ours - wanted)[late].mean() / np.square(wanted[late]).mean())
-    assert error < 0.1, error
+    assert error < 0.03, error
 
 
 @pytest.mark.parametrize(
