@@ -25,6 +25,8 @@ NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
+ALIKE = 2e-3
+"""Bodies are alike if hair sits on them equally well up to this [m]."""
 MOST = 0.75
 """Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
 
@@ -90,6 +92,17 @@ def attach(
     return found
 
 
+def of_another(
+    prim: Usd.Prim, rigs: list[StageRig], others: list[StageRig], placement: Placement, head: str | None
+) -> StageRig | None:
+    """Which of the other skeletons clearly carries the groom, rather than one of these."""
+    try:
+        found = attach(prim, [*rigs, *others], placement, head, [])
+    except NeuralocksError:  # not clear
+        return None
+    return None if found.far else next((rig for rig in others if rig is found.rig), None)
+
+
 def rig_joint(found: Attachment) -> str:
     """Path of the carrying joint."""
     return found.rig.source.names[found.character.head]
@@ -98,28 +111,56 @@ def rig_joint(found: Attachment) -> str:
 def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, notes: list[str]) -> Attachment | None:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     roots = _some_roots(prim)
-    best = None
-    for rig in rigs:
-        for mesh in rig.meshes:
-            tree = cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind))
-            for to_bind in _ways(rig, mesh, placement):
-                distance, nearest = tree.query(transformed(roots, to_bind))
-                middle = float(np.median(distance))
-                if best is None or middle < best[0] - 1e-4:
-                    best = middle, rig, mesh, to_bind, nearest
-    if best is None or best[0] > NEAR:
+    seats = [seat for rig in rigs if (seat := _seat(roots, rig, placement)) is not None and seat.distance <= NEAR]
+    if not seats:
         return None
-    _, rig, mesh, to_bind, nearest = best
-    shares = _shares(rig, mesh.indices[nearest], mesh.weights[nearest])
+    nearest = min(seat.distance for seat in seats)
+    alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
+    # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
+    seat = min(alike, key=lambda seat: (-_kinship(prim, seat.rig), seat.way, seat.distance))
+    rig, mesh = seat.rig, seat.mesh
+    shares = _shares(rig, mesh.indices[seat.points], mesh.weights[seat.points])
     joint, why = _carrier(rig, shares)
     notes += _spread(rig, str(prim.GetPath()), joint, shares)
-    return Attachment(
-        rig=rig,
-        character=_with_head(rig, joint),
-        to_bind=to_bind,
-        how=f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)",
-        skinned=False,
-    )
+    how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
+    return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False)
+
+
+@dataclass(frozen=True)
+class _Seat:
+    """How a groom would sit on a rig's nearest mesh.
+
+    Attributes:
+        distance: of its roots from the mesh, in the median [m].
+        rig, mesh: on what.
+        to_bind: its way to bind world, (4, 4).
+        way: that way's place in `_ways`.
+        points: the mesh's nearest point to each root.
+    """
+
+    distance: float
+    rig: StageRig
+    mesh: SkinnedMesh
+    to_bind: np.ndarray
+    way: int
+    points: np.ndarray
+
+
+def _seat(roots: np.ndarray, rig: StageRig, placement: Placement) -> _Seat | None:
+    best = None
+    for mesh in rig.meshes:
+        tree = cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind))
+        for way, to_bind in enumerate(_ways(rig, mesh, placement)):
+            distance, points = tree.query(transformed(roots, to_bind))
+            middle = float(np.median(distance))
+            if best is None or middle < best.distance - 1e-4:
+                best = _Seat(middle, rig, mesh, to_bind, way, points)
+    return best
+
+
+def _kinship(prim: Usd.Prim, rig: StageRig) -> int:
+    """How many of their parents a groom and a skeleton share."""
+    return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -135,12 +176,15 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         head_at = rig.character.canonical_to_bind[:3, 3]
         return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
 
-    far = [min(away(rig, way) for way in _ways(rig, None, placement)) for rig in able]
-    order = np.argsort(far)
-    rig, nearest = able[order[0]], far[order[0]]
+    far = [(min(away(rig, way) for way in _ways(rig, None, placement)), rig) for rig in able]
+    # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
+    least = min(distance for distance, _ in far)
+    close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
+    kin = max(_kinship(prim, rig) for _, rig in close)
+    close = [(distance, rig) for distance, rig in close if _kinship(prim, rig) == kin]
+    nearest, rig = close[0]
     out_of_reach = nearest > max(REACH, _trunk(rig))
-    # The one whose head is nearest to the roots, if that is clear.
-    if len(able) > 1 and nearest > 0.5 * far[order[1]] and not out_of_reach:
+    if len(close) > 1 and not out_of_reach:
         names = ", ".join(r.path for r in able[:5])
         raise NeuralocksError(
             f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"

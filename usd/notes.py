@@ -53,6 +53,11 @@ def stands_still(path: str, rig: StageRig) -> str:
     return f"{path}: {rig.path}, which carries it, has no animation; left out"
 
 
+def another_carries(path: str, rig: StageRig) -> str:
+    """Of a groom of another skeleton than the one that was named."""
+    return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
+
+
 def too_far(path: str, found: Attachment) -> str:
     """Why the curves of a prim are not taken for hair."""
     return (

@@ -10,11 +10,12 @@ from pxr import Usd, UsdSkel
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
-from .attach import Attachment, attach, rig_joint
+from .attach import Attachment, attach, of_another, rig_joint
 from .border import Border, open_stage
 from .curves import find_curves, read_groom, without_points
 from .damage import names_damage
 from .notes import (
+    another_carries,
     composition_notes,
     few,
     groom_notes,
@@ -102,11 +103,18 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         )
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs, path)
+    # Of grooms that are not named, a skeleton that is gets its own.
+    named = skeleton is None or grooms
+    every = [] if named else _rigs(stage, border, None, head, path, joints=joints)
+    others = [rig for rig in every if rig.path != skeleton]
     found, far = [], []
     empty = [] if grooms else without_points(curves)
     notes += few([no_points(str(prim.GetPath())) for prim in empty])
     for prim in (prim for prim in curves if prim not in empty):
         placement = Placement(prim)
+        if others and (other := of_another(prim, rigs, others, placement, head)):
+            notes.append(another_carries(str(prim.GetPath()), other))
+            continue
         attachment = attach(prim, rigs, placement, head, notes)
         if attachment.far and not grooms:
             far.append(too_far(str(prim.GetPath()), attachment))
@@ -115,7 +123,9 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
         notes += groom_notes(found[-1].path, groom)
     if not found:
-        raise NeuralocksError(far[0])
+        raise NeuralocksError(
+            far[0] if far else f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
+        )
     notes += few(far)
     still = [item for item in found if not item.attachment.rig.source.animated]
     if still and len(still) < len(found) and not grooms:

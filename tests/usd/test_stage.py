@@ -104,6 +104,23 @@ def test_each_groom_finds_its_own_character(tmp_path):
     assert [g.path for g in only.grooms] == ["/B/Model/Hair"]
 
 
+@pytest.mark.parametrize("bound", ["own", "mesh", "none"])
+@pytest.mark.parametrize("places", [(2.0, 0.0), (0.0, 0.0)])
+def test_hair_at_the_origin_is_not_another_characters(tmp_path, bound, places):
+    """Hair lies there as any character's does in its bind pose."""
+    write_shot(tmp_path, Recipe(bound=bound), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, x in zip("AB", places, strict=True):
+        UsdGeom.Xform.Define(stage, f"/{name}").AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
+        stage.DefinePrim(f"/{name}/Model").GetReferences().AddReference("./asset.usda")
+    stage.GetRootLayer().Save()
+    for chosen in (None, "/A/Model/Rig", "/B/Model/Rig"):
+        shot = read_shot(tmp_path / "two.usda", skeleton=chosen)
+        pairs = [(item.path[:2], item.attachment.rig.path[:2]) for item in shot.grooms]
+        assert pairs == [(name, name) for name in ("/A", "/B") if chosen is None or chosen.startswith(name)]
+
+
 def _curves(stage, path, points):
     """Curves (n, 2, 3) [m] without a binding."""
     curves = UsdGeom.BasisCurves.Define(stage, path)
