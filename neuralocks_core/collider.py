@@ -13,6 +13,9 @@ MOST_SAMPLES = 400_000
 THREADED = 2_000
 """Points from which a search is worth sharing with other threads."""
 
+ROWS = 20_000
+"""Points whose candidates are measured at a time: those of a grid around a giant's head took gigabytes at once."""
+
 
 class Collider:
     """A mesh in one pose, asked for distances.
@@ -76,8 +79,11 @@ class Collider:
             count = min(k, self._tree.n)
             asked = points[pending]
             far, found = self._tree.query(asked, k=np.arange(1, count + 1), workers=_workers(asked))
-            nearest = self._nearest(asked, self._owner[found])
-            closest[pending], normal[pending], triangle[pending], best = nearest
+            best = np.empty(len(asked))
+            for low in range(0, len(asked), ROWS):
+                rows = slice(low, low + ROWS)
+                here, candidates = pending[rows], self._owner[found[rows]]
+                closest[here], normal[here], triangle[here], best[rows] = self._nearest(asked[rows], candidates)
             done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
             pending, k = pending[~done], 4 * k
         offset = points - closest
