@@ -5,6 +5,7 @@ import textwrap
 
 import bpy
 
+from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 
 from .operators.training import job
@@ -65,6 +66,9 @@ def _motion(layout, armature) -> None:
         row.label(text=f"{len(sampled.motion.frames)} frames", icon="CHECKMARK")
     row.prop(character, "loop", text="", icon="LOOP_FORWARDS")
     row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
+    width = None if sampled is None else sampled.character.head_width
+    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+        words(layout, f"The head is {width:.2g} m wide; check the scene's Unit Scale or the armature's scale", "ERROR")
     if character.loop and sampled is not None:
         gap = sampled.motion.gap()
         if gap > LOOP_GAP:

@@ -10,6 +10,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.rotation import rotation_part, sizes
 
+HEAD_WIDTHS = (0.08, 0.6)
+"""Between these a head's width is believed [m]; others hint at a wrong unit."""
+
 
 @dataclass(frozen=True)
 class Skeleton:
@@ -188,6 +191,13 @@ class Character:
             return None
         below = self.skeleton.below(self.head)
         return np.sum(self.body.joint_weights * below[self.body.joint_indices], axis=1) > 0.5
+
+    @cached_property
+    def head_width(self) -> float | None:
+        """Width of the head's skin in bind pose [m], if there are a head and skin on it."""
+        if "head" not in self.humanoid or (mask := self.head_mask()) is None or mask.sum() < 20:
+            return None
+        return float(np.ptp((self.body.points[mask] @ self.facing.T)[:, 0]))
 
     @cached_property
     def head_centre(self) -> np.ndarray:

@@ -20,7 +20,6 @@ from .notes import (
     composition_notes,
     few,
     groom_notes,
-    head_width,
     left_out,
     no_points,
     out_of_range,
@@ -118,7 +117,7 @@ def _rig(rig) -> dict:
     humanoid = rig.character.humanoid
     found = {name: rig.source.names[joint] for name, joint in humanoid.items()}
     body = rig.character.body
-    width = head_width(rig)
+    width = rig.character.head_width
     return {
         "path": rig.path,
         "joints": len(rig.source.names),

@@ -7,14 +7,12 @@ import numpy as np
 from pxr import Usd
 
 from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
 from .attach import Attachment, rig_joint
 from .rig_source import StageRig
-
-HEAD_WIDTHS = (0.08, 0.6)
-"""Between these a head's width is believed [m]; others hint at a wrong metersPerUnit."""
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -77,7 +75,7 @@ def rig_notes(rig: StageRig) -> list[str]:
             f"{rig.path}: no joint found for {', '.join(missing)}; "
             "the next one towards the trunk serves, or name it with --joint"
         )
-    width = head_width(rig)
+    width = rig.character.head_width
     if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
         notes.append(
             f"{rig.path}: the head is {width:.3g} m wide; "
@@ -95,14 +93,6 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
         f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, none of it within {first:g} to "
         f"{last:g}: a held pose; check --frames, the shot's range and the layer offsets"
     ]
-
-
-def head_width(rig: StageRig) -> float | None:
-    """Width of the head's skin in bind pose [m], if the rig has a head and skin on it."""
-    if "head" not in rig.character.humanoid or (mask := rig.character.head_mask()) is None or mask.sum() < 20:
-        return None
-    points = rig.character.body.points[mask] @ rig.character.facing.T
-    return float(np.ptp(points[:, 0]))
 
 
 def groom_notes(path: str, groom: Groom) -> list[str]:

@@ -89,6 +89,11 @@ def panel(folder: Path) -> None:
     said = _drawn()
     assert {"24 frames", f"Body: {skin.name}"} <= set(said), said
     assert said.count(attach) == 1
+    assert not any("wide" in line for line in said), said
+    scene.unit_settings.scale_length = 10.0
+    assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
+    assert "m wide" in " ".join(_drawn())
+    scene.unit_settings.scale_length = 1.0
     rig.neuralocks_character.loop = True
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
     scene.neuralocks.use_scene_range = False
