@@ -139,7 +139,9 @@ def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
     first = stage.GetStartTimeCode() if ranged else float(known[0])
     last = stage.GetEndTimeCode() if ranged else float(known[-1])
     wanted = time_codes(frames, first, max(first, last), subframes, hair.border.frame)
-    return sorted(set(wanted) | set(own))
+    # A frame and a sample at the same time, up to rounding, are one.
+    apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
+    return sorted({*apart, *own})
 
 
 def _rotation_samples(hair: RiggedHair) -> list[float]:

@@ -52,7 +52,8 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         if not count * subframes < MOST:
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
         count = math.floor(count) + 1
-        whole = [begin + i * step for i in range(count)]
+        # The same time is the same number in every part of a range that is baked in parts.
+        whole = [round(begin + i * step, 9) for i in range(count)]
     else:
         whole = [float(code) for code in frames]
     if not whole or not all(math.isfinite(code) for code in whole):
