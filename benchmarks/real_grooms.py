@@ -22,16 +22,16 @@ from neuralocks_core.groom import Groom
 
 SHOT = Path(__file__).resolve().parents[1] / "examples/shot/shot.usda"
 COLUMNS = {
-    "position_percent": "position, % L",
+    "position_percent": "position",
     "motion_error_median": "motion, median",
     "motion_error_rms": "motion, rms",
     "velocity_error": "velocity",
     "motion_ratio": "motion ratio",
 }
 INSIDE = {
-    "inside_at_rest_percent": "inside at rest, %",
-    "penetration_percent": "inside, %",
-    "penetration_3mm_percent": "over 3 mm, %",
+    "inside_at_rest_percent": "inside at rest %",
+    "penetration_percent": "inside %",
+    "penetration_3mm_percent": "over 3 mm %",
 }
 
 
