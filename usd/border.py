@@ -14,8 +14,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 
 LAYERS = (".usd", ".usda", ".usdc")
-SLOWEST, FASTEST = 12.0, 240.0
-"""Time codes per second between which one time code is a frame; a stage may also count seconds, or milliseconds."""
+SLOWEST, FASTEST = 12.0, 600.0
+"""Time codes per second between which one time code is a frame, of a slow-motion camera too; other stages count
+seconds, or milliseconds."""
 
 
 @dataclass(frozen=True)
