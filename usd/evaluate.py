@@ -8,9 +8,9 @@ import numpy as np
 
 from neuralocks_core import comparison, metrics
 from neuralocks_core.arclength import arc_lengths
-from neuralocks_core.energy import energies, stretch_energy
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY
+from neuralocks_core.pose_energies import energies, stretch_energy
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
 from neuralocks_core.strands import K, StrandSet, strands_on

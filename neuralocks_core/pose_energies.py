@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Energies of hair in a pose, per unit line density, for the report card (docs/architecture.md, Physics)."""
+"""Energies of hair in a pose, per unit line density, in numpy for the report card (docs/architecture.md, Physics).
+
+What training minimises is `physics/energies.py`.
+"""
 
 import numpy as np
 
 from neuralocks_core.materials import Material
 
 STRETCH = 1000.0
-"""[m^2/s^2]."""
+"""Stiffness against stretch [m^2/s^2]."""
 
 
 def energies(
