@@ -7,15 +7,25 @@ from neuralocks_core.collider import Collider
 
 _DEEP = 2e-3
 """Depth [m] from which on it is proven."""
+_FEW = 8
 _AT_ONCE = 2_000_000
 """Pairs of a point and a triangle that are held in memory."""
 
 
 def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them; what seems deep inside is proven to be."""
+    """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them, what seems deepest inside proven.
+
+    Air that seems inside seems deeper than what is: the deepest few are looked at, and more where one of them is air.
+    """
     result = Collider(vertices, triangles).distance(points)[0]
     deep = np.flatnonzero(result < -_DEEP)
-    result[deep] = np.where(enclosed(points[deep], vertices, triangles), result[deep], -result[deep])
+    deep = deep[np.argsort(result[deep], kind="stable")]
+    for first in range(0, len(deep), _FEW):
+        some = deep[first : first + _FEW]
+        air = some[~enclosed(points[some], vertices, triangles)]
+        result[air] *= -1
+        if not len(air):
+            break
     return result
 
 
