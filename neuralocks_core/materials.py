@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Material:
         clumping: stiffness of the ties between neighbours (adhesion) [1/s^2].
 
     Raises:
-        NeuralocksError: a value is not finite or outside RANGES.
+        NeuralocksError: a value is no number, not finite or outside RANGES.
     """
 
     bend: float = 1e-3
@@ -45,7 +46,9 @@ class Material:
     def __post_init__(self):
         for name, value in asdict(self).items():
             low, high = RANGES[name]
-            if not np.isfinite(value) or not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise NeuralocksError(f"material {name}: {value!r} is no number; give one from {low:g} to {high:g}")
+            if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # single precision's ends
                 raise NeuralocksError(
                     f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"
                 )

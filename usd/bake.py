@@ -115,7 +115,12 @@ def as_material(material) -> Material:
         return material
     if isinstance(material, dict):
         material = [f"{name}={value}" for name, value in material.items()]
-    return Material.parse([material] if isinstance(material, str) else list(material or ()))
+    words = [material] if isinstance(material, str) else material or ()
+    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
+        raise NeuralocksError(
+            f"material: {material!r} is none; give a Material, words such as 'bend=2x', or a dict of them"
+        )
+    return Material.parse(words)
 
 
 def described(shot: Shot) -> list[dict]:

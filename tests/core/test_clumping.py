@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.clumping import Locks
-from neuralocks_core.materials import RANGES, Material, constants
+from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.strands import K, StrandSet
 
 LENGTHS = np.array([0.02, 0.1, 0.3, 0.6])
@@ -25,13 +25,6 @@ def locks():
 
 def of(locks, **material):
     return locks.spread(Material(**material).log_ratios())
-
-
-def test_constants_are_those_whose_ratios_are_given():
-    for clumping in (0.0, 7.0, 240.0):
-        material = Material(3e-4, 1.7, 5.0, clumping)
-        back = constants(material.log_ratios())
-        assert back == pytest.approx((3e-4, 1.7, 5.0, clumping), rel=1e-5, abs=1e-5) and back[3] >= 0
 
 
 def test_the_default_changes_nothing(locks):

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The four numbers of a material: what is taken, what is refused in words, what the network reads."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import RANGES, Material, constants
+
+
+def test_the_network_reads_zeros_for_the_default():
+    assert not Material().log_ratios().any()
+
+
+@pytest.mark.parametrize("clumping", [0.0, 7.0, 240.0])
+def test_constants_are_those_whose_ratios_are_given(clumping):
+    back = constants(Material(3e-4, 1.7, 5.0, clumping).log_ratios())
+    assert back == pytest.approx((3e-4, 1.7, 5.0, clumping), rel=1e-5, abs=1e-5) and back[3] >= 0
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_ends_of_a_range_are_taken_and_what_lies_beyond_is_refused(name):
+    low, high = RANGES[name]
+    # A slider holds its factor in single precision.
+    for value in (low, high, np.float32(low), np.float32(high / getattr(Material(), name)) * getattr(Material(), name)):
+        assert np.isfinite(Material(**{name: value}).log_ratios()).all()
+    for value in (low - 1e-3 * high, 1.001 * high, np.inf, np.nan):
+        with pytest.raises(NeuralocksError, match=f"material {name}: .* is outside {low:g} to {high:g}"):
+            Material(**{name: value})
+
+
+@pytest.mark.parametrize("value", ["1", None, True, [1.0]])
+def test_what_is_no_number_is_refused_in_words(value):
+    with pytest.raises(NeuralocksError, match="material bend: .* is no number; give one from 0.0002 to 0.005"):
+        Material(bend=value)
