@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine to read.")]
 Grooms = Annotated[
-    list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All if left out.")
+    list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All hair if left out.")
 ]
 Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
 Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]

@@ -68,12 +68,11 @@ def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[Stran
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
-    sets = []
-    for prim in prims:
-        notes: list[str] = []
-        attachment = attach(prim, [rig], Placement(prim), head, notes)
-        sets.append(_strands(read_groom(prim, attachment.to_bind, notes), attachment.character, seed))
-    return sets
+    notes: list[str] = []
+    found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
+    # Beside hair, the grass of a set is none.
+    near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
+    return [_strands(read_groom(prim, a.to_bind, notes), a.character, seed) for prim, a in near]
 
 
 def _library(character: Character, seed: int) -> list[StrandSet]:
