@@ -7,7 +7,8 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
-from .live_strands import EDITING
+from .live_strands import EDITING, live_hairs
+from .scene import blur
 from .scene.sampling import bodies_of, ensure
 from .session import session
 
@@ -64,6 +65,7 @@ def on_undo(scene, *_):
 @persistent
 def before_save(*_):
     """The saved file holds the hair at rest, so that it opens right without the add-on."""
+    blur.end()
     for scene in bpy.data.scenes:
         live.show_rest(scene)
 
@@ -84,6 +86,14 @@ def before_render(scene, *_):
         except NeuralocksError as error:
             session.messages[armature.name_full] = str(error)
     live.refresh(scene, wait=True)
+    for hair in live_hairs(scene):
+        blur.begin(hair, scene)
+
+
+@persistent
+def after_render(*_):
+    """The render has ended, or was cancelled."""
+    blur.end()
 
 
 def _mark_stale() -> None:
@@ -114,6 +124,8 @@ HANDLERS = {
     "save_post": after_save,
     "save_post_fail": after_save,
     "render_init": before_render,
+    "render_complete": after_render,
+    "render_cancel": after_render,
 }
 
 

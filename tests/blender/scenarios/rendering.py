@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import apart, make_live, messages
+from tests.blender.checks import apart, make_live, messages, points_at
 
 
 def rendered(folder: Path) -> None:
@@ -64,3 +64,42 @@ def rendered(folder: Path) -> None:
     for frame, (bones, points) in view.items():
         assert apart(got[frame][0], bones) < 1e-6, frame
         assert apart(got[frame][1], points) < 1e-6, frame
+
+
+def motion_blur(folder: Path) -> None:
+    """Renderers take live hair for deformed, so they ask for it within the shutter, and get what is shown there; nothing
+    is left on it afterwards, nor in a file that is saved meanwhile.
+    """
+    if bpy.app.version < (4, 0):
+        return
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands, plain, scene = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Plain"), bpy.context.scene
+    scene.neuralocks.subframes = 3
+    make_live(rig, strands)
+    shown = {frame: points_at(strands, int(frame), frame % 1) for frame in (3.75, 4.0, 4.25)}
+    got, deformed = {}, []
+
+    class Shutter(bpy.types.RenderEngine):
+        bl_idname, bl_label = "SHUTTER", "Shutter"
+
+        def render(self, graph):
+            deformed.extend(hair.evaluated_get(graph).is_deform_modified(scene, "RENDER") for hair in (strands, plain))
+            for frame in shown:
+                self.frame_set(int(frame), subframe=frame % 1)
+                got[frame] = scenes.points(strands, graph)
+            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "meanwhile.blend"), copy=True)
+
+    bpy.utils.register_class(Shutter)
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "SHUTTER", 8, 8
+    scene.frame_set(4)
+    bpy.ops.render.render()
+    bpy.utils.unregister_class(Shutter)
+    assert deformed == [True, False]
+    for frame, points in shown.items():
+        assert apart(got[frame], points) < 1e-6, frame
+    assert not strands.modifiers and not bpy.data.node_groups and not messages(), messages()
+    with bpy.data.libraries.load(str(folder / "meanwhile.blend")) as (saved, _):
+        assert not saved.node_groups
