@@ -7,6 +7,9 @@ import numpy as np
 
 from .armature import matrix
 
+MOVERS = {"GeometryNodeDeformCurvesOnSurface", "GeometryNodeXPBDSolver"}
+"""Nodes at the heart of the modifiers that Blender puts on new hair, Surface Deform and since 5.2 Hair Dynamics."""
+
 
 def world(thing, graph) -> np.ndarray:
     """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded is not evaluated: its place
@@ -38,14 +41,16 @@ def _left_out(thing, graph) -> bool:
 
 
 def mute_deformers(hair) -> None:
-    """Switch off, and remember, modifiers that make the hair follow the surface: the live view has already done that."""
+    """Switch off, and remember, modifiers that make the hair follow the surface or simulate it: the live view has already
+    done that.
+    """
     settings = hair.neuralocks_hair
     if settings.muted:
         return
     found = {}
     for modifier in hair.modifiers:
         cached = modifier.type == "MESH_SEQUENCE_CACHE"
-        if cached or (modifier.type == "NODES" and _follows_surface(modifier.node_group)):
+        if cached or (modifier.type == "NODES" and _moves_hair(modifier.node_group)):
             found[modifier.name] = [modifier.show_viewport, modifier.show_render]
             modifier.show_viewport = modifier.show_render = False
     settings.muted = json.dumps(found) if found else ""
@@ -65,12 +70,12 @@ def unmute_deformers(hair) -> None:
     settings.muted = ""
 
 
-def _follows_surface(tree, depth: int = 0) -> bool:
+def _moves_hair(tree, depth: int = 0) -> bool:
     if tree is None or depth > 8:
         return False
     for node in tree.nodes:
-        if node.bl_idname == "GeometryNodeDeformCurvesOnSurface":
+        if node.bl_idname in MOVERS:
             return True
-        if node.bl_idname == "GeometryNodeGroup" and _follows_surface(node.node_tree, depth + 1):
+        if node.bl_idname == "GeometryNodeGroup" and _moves_hair(node.node_tree, depth + 1):
             return True
     return False

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, messages
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at
 
 
 def particles(_folder: Path) -> None:
@@ -123,3 +123,34 @@ def ways_of_parenting(folder: Path) -> None:
     assert set(character.body.joint_indices[character.body.joint_weights > 0]) == {character.head}
     on_surface.neuralocks_hair.live = False
     assert deform.show_viewport and deform.show_render
+
+
+def new_hair(folder: Path) -> None:
+    """Hair as Blender adds it, with the modifier of its own that moves it on its surface: that rests while hair is live,
+    which is as it is baked.
+    """
+    rig = scenes.armature()
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    groomed = scenes.hair(rig, 20, name="Groomed")
+    skin.data.uv_layers.new(name="UVMap")
+    bpy.context.view_layer.objects.active = skin
+    if bpy.app.version < (4, 0):
+        return
+    assert bpy.ops.object.curves_empty_hair_add() == {"FINISHED"}
+    strands = bpy.context.active_object
+    strands.name = "Strands"
+    own = [modifier.name for modifier in strands.modifiers]
+    assert own
+    strands.data.add_curves([24] * 20)
+    for point, same in zip(strands.data.points, groomed.data.points):
+        point.position = same.position
+    bpy.data.objects.remove(groomed)
+    make_live(rig, strands)
+    assert not any(modifier.show_viewport or modifier.show_render for modifier in strands.modifiers), own
+    live = points_at(strands, 9)
+    assert not messages(), messages()
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "new.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "new.usdc", "/Character/Hair_Strands", 9), live) < SAME
+    strands.neuralocks_hair.live = False
+    assert all(modifier.show_viewport and modifier.show_render for modifier in strands.modifiers)
