@@ -80,6 +80,10 @@ def panel(folder: Path) -> None:
     scenes.dance(rig)
     scene.neuralocks.armature = rig
     assert {"Head: head", "Not sampled"} <= set(_drawn())
+    scene.unit_settings.scale_length = 10.0
+    assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
+    assert "m wide" in " ".join(_drawn())
+    scene.unit_settings.scale_length = 1.0
     strands = scenes.hair(rig, 10)
     strands.neuralocks_hair.armature = None
     scene.neuralocks.hair = strands
@@ -90,10 +94,6 @@ def panel(folder: Path) -> None:
     assert {"24 frames", f"Body: {skin.name}"} <= set(said), said
     assert said.count(attach) == 1
     assert not any("wide" in line for line in said), said
-    scene.unit_settings.scale_length = 10.0
-    assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
-    assert "m wide" in " ".join(_drawn())
-    scene.unit_settings.scale_length = 1.0
     rig.neuralocks_character.loop = True
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
     scene.neuralocks.use_scene_range = False
