@@ -6,7 +6,7 @@ after the same history.
 """
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import torch
@@ -25,6 +25,8 @@ _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
 _COLLISION = 1.5e-4
 """Of the skinned mesh's contact [m^2/s^2] against squared errors [m^2]."""
+_ROOM = 0.006
+"""Kept from the body over the material's margin while learning [m]: the network cannot hit the mark to the millimetre."""
 
 
 def train_dynamic(
@@ -62,7 +64,7 @@ def train_dynamic(
     say = progress or (lambda done, total, message: None)
     spec = rig_spec(dynamic=True)
     features, turns = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
-    held = HeldPoses(rig, material, 256, rng, spec)
+    held = HeldPoses(rig, replace(material, margin=material.margin + _ROOM), 256, rng, spec)
     with torch.no_grad():
         wanted = held.energy.pose(torch.as_tensor(turns.reshape(-1, len(rig.chains), 4)))[2]
     wanted = wanted.reshape(*turns.shape[:2], -1, 3)

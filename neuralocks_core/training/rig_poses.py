@@ -51,8 +51,8 @@ class PosePool:
         """Whether there is a body to collide with."""
         return self._patch is not None
 
-    def renew(self, count: int) -> None:
-        """Put new poses in the place of the oldest."""
+    def renew(self, count: int) -> np.ndarray:
+        """Put new poses in the place of the oldest; which these were, (count,)."""
         character = self.rig.character
         skinning = _random_skinning(character, count, self._rng)
         rows = (self._oldest + np.arange(count)) % self.count
@@ -62,7 +62,7 @@ class PosePool:
         turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
         self.relative[rows] = facing @ turns @ facing.T
         if self._patch is None:
-            return
+            return rows
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
         for row, matrices in zip(rows, skinning):
@@ -72,6 +72,7 @@ class PosePool:
             self._trees[row] = cKDTree(self._points[row], balanced_tree=False, compact_nodes=False)
             if self.bodies is not None:
                 self.bodies[row] = body
+        return rows
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
         """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
