@@ -10,7 +10,7 @@ from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import StrandSet
 
-from .memory import give_back
+from .memory import preparing
 from .placing import GroomPlacer
 from .stage import StageGroom
 
@@ -39,20 +39,20 @@ class GroomPoser:
     ):
         self.item, self._rig, self._model = item, item.attachment.rig, model
         character = item.attachment.character
-        self._placer = GroomPlacer(item)
         self._material = (material or Material()).log_ratios()
         self._strength = strength
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
-        self._session = StrandSession(model, self._placer.strands)
-        self._session.anchor(self._sampler.held_bind(self._material))
-        self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
         self._resolver = None
-        if resolve and character.body is not None:
-            from neuralocks_core.resolve import Resolver
+        with preparing():  # leaves 150 MB of a large groom
+            self._placer = GroomPlacer(item)
+            self._session = StrandSession(model, self._placer.strands)
+            self._session.anchor(self._sampler.held_bind(self._material))
+            self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
+            if resolve and character.body is not None:
+                from neuralocks_core.resolve import Resolver
 
-            self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
-            self._resolver.prepare()
-        give_back()  # 150 MB of a large groom
+                self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
+                self._resolver.prepare()
 
     @property
     def strands(self) -> StrandSet:
