@@ -5,7 +5,7 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_MMAP_THRESHOLD = -3  # M_MMAP_THRESHOLD of malloc.h
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
 SMALL, LARGE = 1 << 20, 32 << 20
 """Bytes from which on memory is asked of the system by itself: while something is prepared, and else. It costs a third
 more time where frames are computed.
@@ -20,6 +20,7 @@ def preparing() -> Iterator[None]:
         yield
     finally:
         _tell("mallopt", _MMAP_THRESHOLD, LARGE)
+        _tell("mallopt", _TRIM_THRESHOLD, 2 * LARGE)  # as it would have grown by itself
         _tell("malloc_trim", 0)
 
 
