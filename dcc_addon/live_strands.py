@@ -72,7 +72,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         sampled.stale = session.wanting = True  # the hair object has been moved since
     to_local = np.linalg.inv(core @ place)
     time = frame / sampled.motion.rate
-    wanted = time, joints, to_local, material(settings), settings.motion, settings.resolve
+    wanted = time, joints, to_local, material(settings), typed(settings, "motion"), settings.resolve
     prepared = prepare(hair, armature, sampled, wanted, wait)
     if prepared is None:
         show_rest(hair)
@@ -146,16 +146,23 @@ def material(settings) -> np.ndarray:
     """Log-ratios (4,) of the sliders."""
     base = Material()
     return Material(
-        base.bend * settings.bend,
-        base.weight * settings.weight,
-        base.damping * settings.damping,
-        base.clumping * settings.clumping,
+        base.bend * typed(settings, "bend"),
+        base.weight * typed(settings, "weight"),
+        base.damping * typed(settings, "damping"),
+        base.clumping * typed(settings, "clumping"),
     ).log_ratios()
+
+
+def typed(settings, name: str) -> float:
+    """A slider's value as somebody would type it, and not as single precision has it: a bake made elsewhere with the
+    number that is shown is then the same.
+    """
+    return round(getattr(settings, name), 6)
 
 
 def material_words(settings) -> list[str]:
     """The sliders as `NAME=VALUE` words of the command line."""
-    return [f"{name}={getattr(settings, name):.9g}x" for name in ("bend", "weight", "damping", "clumping")]
+    return [f"{name}={typed(settings, name):.9g}x" for name in ("bend", "weight", "damping", "clumping")]
 
 
 def rest(hair) -> None:

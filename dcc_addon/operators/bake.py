@@ -9,7 +9,7 @@ from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..live_strands import material_words
+from ..live_strands import material_words, typed
 from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
@@ -94,7 +94,7 @@ def bake_steps(context, armature, hairs, path: str):
                 frames=f"{first}:{last}",
                 subframes=scene.neuralocks.subframes + 1,
                 material=material_words(settings),
-                strength=settings.motion,
+                strength=typed(settings, "motion"),
                 resolve=settings.resolve,
                 loop=sampled.clip.loop,
                 progress=say,
@@ -108,7 +108,7 @@ def bake_steps(context, armature, hairs, path: str):
 def _look(hair) -> tuple:
     """What hair that is baked together has in common."""
     settings = hair.neuralocks_hair
-    return *material_words(settings), settings.motion, settings.resolve, settings.model
+    return *material_words(settings), typed(settings, "motion"), settings.resolve, settings.model
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
