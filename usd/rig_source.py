@@ -160,7 +160,7 @@ def _time_codes(source: JointSource, border: Border) -> np.ndarray:
     if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
         raise NeuralocksError(
             f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
-            "remove stray keys"
+            "remove stray keys, or samples and joints that the shot does not need"
         )
     begin = np.ceil(first) if frame == 1 else first
     frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
