@@ -6,6 +6,7 @@ and live hair, which a handler moves, often has none.
 import bpy
 
 from . import curves
+from .nodes import geometry_nodes
 
 NAME = "Neuralocks Motion Blur"
 
@@ -32,13 +33,6 @@ def _nothing():
     """Geometry nodes that hand over what they get."""
     tree = bpy.data.node_groups.get(NAME)
     if tree is None:
-        tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
-        if hasattr(tree, "interface"):
-            for way in ("INPUT", "OUTPUT"):
-                tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-        else:
-            tree.inputs.new("NodeSocketGeometry", "Geometry")
-            tree.outputs.new("NodeSocketGeometry", "Geometry")
-        source, target = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-        tree.links.new(source.outputs[0], target.inputs[0])
+        tree, source, target = geometry_nodes(NAME)
+        tree.links.new(source, target)
     return tree

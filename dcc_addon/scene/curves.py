@@ -10,6 +10,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from .nodes import geometry_nodes
+
 REST = "neuralocks_rest"
 TYPES = ("CATMULL_ROM", "POLY", "BEZIER", "NURBS")
 """By the number that Blender keeps in the attribute `curve_type`."""
@@ -160,13 +162,10 @@ def _by_conversion(name, strands, points_of, empty):
     mesh.from_pydata([tuple(p) for p in points_of.tolist()], [tuple(e) for e in edges.tolist()], [])
     holder = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(holder)
-    tree = bpy.data.node_groups.new("neuralocks_to_curves", "GeometryNodeTree")
-    tree.inputs.new("NodeSocketGeometry", "Geometry")
-    tree.outputs.new("NodeSocketGeometry", "Geometry")
-    source, target = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    tree, source, target = geometry_nodes("neuralocks_to_curves")
     convert = tree.nodes.new("GeometryNodeMeshToCurve")
-    tree.links.new(source.outputs[0], convert.inputs[0])
-    tree.links.new(convert.outputs[0], target.inputs[0])
+    tree.links.new(source, convert.inputs[0])
+    tree.links.new(convert.outputs[0], target)
     holder.modifiers.new("convert", "NODES").node_group = tree
     for other in bpy.context.selected_objects:
         other.select_set(False)

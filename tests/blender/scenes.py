@@ -193,16 +193,12 @@ def translation(offset):
 
 def surface_deform(hair):
     """The modifier that Blender puts on new hair: curves follow their deformed surface."""
-    tree = bpy.data.node_groups.new("Surface Deform", "GeometryNodeTree")
-    if hasattr(tree, "interface"):
-        for way in ("INPUT", "OUTPUT"):
-            tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    else:
-        tree.inputs.new("NodeSocketGeometry", "Geometry")
-        tree.outputs.new("NodeSocketGeometry", "Geometry")
+    from dcc_addon.scene.nodes import geometry_nodes
+
+    tree, source, target = geometry_nodes("Surface Deform")
     deform = tree.nodes.new("GeometryNodeDeformCurvesOnSurface")
-    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], deform.inputs[0])
-    tree.links.new(deform.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    tree.links.new(source, deform.inputs[0])
+    tree.links.new(deform.outputs[0], target)
     modifier = hair.modifiers.new("Surface Deform", "NODES")
     modifier.node_group = tree
     return modifier
