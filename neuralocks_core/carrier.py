@@ -142,17 +142,11 @@ class Carrier:
         if self._facing is not None:
             displacement = self._in_bind_axes(displacement)
         rest = self._groom.points[self._ends[start] : self._ends[stop]]
-        if self._blocks:
-            block = self._blocks[start // BLOCK]
-            columns = block.columns
-        else:
-            columns = np.transpose
+        block = self._blocks[start // BLOCK] if self._blocks else None
+        columns = block.columns if block else np.transpose
         points, placed = _scratch.arrays(*[columns(rest).shape] * 2)
         points[:] = columns(rest)
-        if self._blocks:
-            moved = block.moved(displacement, start % BLOCK, points)
-        else:
-            moved = displacement.reshape(-1, 3).T
+        moved = block.moved(displacement, start % BLOCK, points) if block else displacement.reshape(-1, 3).T
         if onto is None:
             for axis, centre in zip(points, placing.centre):
                 axis -= centre

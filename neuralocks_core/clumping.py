@@ -9,12 +9,11 @@ import numpy as np
 
 from neuralocks_core.locks import lock_means
 from neuralocks_core.materials import RANGES, Material, constants
+from neuralocks_core.motion import GRAVITY
 from neuralocks_core.strands import K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
-GRAVITY = 9.81
-"""[m/s^2]"""
 CANTILEVER = 12.36
 """Fourth power of 1.8751, the first root of a clamped rod's cos cosh = -1."""
 
@@ -59,7 +58,7 @@ class Locks:
             facing=strands.facing,
         )
         length = np.maximum(strands.length.astype(np.float64), 1e-3)
-        return cls(lock, strands.rest, strands.lock, CANTILEVER / np.square(np.square(length)), GRAVITY / length)
+        return cls(lock, strands.rest, strands.lock, CANTILEVER / np.square(np.square(length)), -GRAVITY[1] / length)
 
     def spread(self, log_ratios: np.ndarray) -> np.ndarray:
         """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more of it.

@@ -21,6 +21,8 @@ class StrandSession:
     Attributes:
         strands: the groom.
         codes: latent codes z_rest, (S, 32).
+        strand_part: the first layer's part of each strand, (S, 256) float32.
+        anchor_offsets: the answers that an anchored model's are measured from, (S, 72) float32; see `anchor`.
     """
 
     def __init__(self, model: StrandModel, strands: StrandSet):
@@ -29,8 +31,8 @@ class StrandSession:
         shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
         self.codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
         inputs = strand_inputs(strands, self.codes)
-        self._strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
-        self._anchor = np.zeros((count, 3 * K), np.float32)
+        self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
+        self.anchor_offsets = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None
         # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
         self._turn = Lock()
@@ -44,8 +46,8 @@ class StrandSession:
         vector, _ = self._without_clumping(vector)
         if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
             return
-        self._anchor[:] = 0
-        self._anchor[:] = self._tail("offsets", self.model.frame(vector))
+        self.anchor_offsets[:] = 0
+        self.anchor_offsets[:] = self._tail("offsets", self.model.frame(vector))
         self._anchored_at = vector
 
     def displacement(
@@ -125,9 +127,9 @@ class StrandSession:
         return self.model.run(
             "tail.onnx",
             output,
-            strand_part=self._strand_part[chunk],
-            anchor=self._anchor[chunk],
-            edges=_edges(self.strands.rest[chunk]),
+            strand_part=self.strand_part[chunk],
+            anchor=self.anchor_offsets[chunk],
+            edges=rest_edges(self.strands.rest[chunk]),
             **frame,
         )
 
@@ -141,7 +143,7 @@ class StrandSession:
         return result
 
 
-def _edges(rest: np.ndarray) -> np.ndarray:
+def rest_edges(rest: np.ndarray) -> np.ndarray:
     """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
     edges = np.zeros(rest.shape, np.float32)
     np.subtract(rest[:, 1:], rest[:, :-1], out=edges[:, 1:])

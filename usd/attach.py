@@ -243,7 +243,11 @@ def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[st
     """What to say of hair that one joint cannot carry: fur all over a body."""
     names = [name.split("/")[-1] for name in rig.source.names]
     # What hangs below a head is its face; what hangs below a spine is everything.
-    own = _below(rig, joint) if joint == rig.character.humanoid.get("head") else np.arange(len(names)) == joint
+    own = (
+        rig.character.skeleton.below(joint)
+        if joint == rig.character.humanoid.get("head")
+        else np.arange(len(names)) == joint
+    )
     share = shares[own].sum()
     if share >= MOST:
         return []
@@ -253,15 +257,6 @@ def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[st
         f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
         f"({', '.join(others)}) will leave the skin: split the groom by joint"
     ]
-
-
-def _below(rig: StageRig, joint: int) -> np.ndarray:
-    """Which joints (J,) are this one or hang below it."""
-    parents = rig.source.parents
-    below = np.zeros(len(parents), bool)
-    for other in range(len(parents)):
-        below[other] = other == joint or (parents[other] >= 0 and below[parents[other]])
-    return below
 
 
 def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:

@@ -14,8 +14,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import strand_inputs
-from neuralocks_core.strands import StrandSet, scalp_local
+from neuralocks_core.strand_session import StrandSession, rest_edges
 
 from .placing import GroomPlacer
 from .stage import StageGroom, read_shot
@@ -70,10 +69,16 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
     """ARRAYS of one groom, and the joints whose motion its boundary vector is made of."""
     character = item.attachment.character
     sampler = model.sampler(character, item.attachment.rig.clip)
-    strands = GroomPlacer(item).strands
-    held = sampler.held_bind()
+    strands, held = GroomPlacer(item).strands, sampler.held_bind()
+    session = StrandSession(model, strands)
+    session.anchor(held)
     skeleton = character.skeleton
-    arrays = _of_strands(strands, model, held) | {
+    arrays = {
+        "rest": strands.rest,
+        "valid": strands.valid,
+        "strand_part": session.strand_part,
+        "anchor": session.anchor_offsets,
+        "edges": rest_edges(strands.rest),
         "held": held,
         "facing": character.facing,
         "canonical_to_head": character.inverse_bind[character.head] @ character.canonical_to_bind,
@@ -81,18 +86,3 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
         "stance": sampler.stance,
     }
     return arrays, [skeleton.names[joint] for joint in sampler.joints]
-
-
-def _of_strands(strands: StrandSet, model: StrandModel, held: np.ndarray) -> dict[str, np.ndarray]:
-    count = len(strands.rest)
-    shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
-    codes = model.run("encoder.onnx", "code", shape=shape)
-    strand_part = model.run("strand.onnx", "strand_part", strand=strand_inputs(strands, codes))
-    edges = np.zeros((count, shape.shape[1]), np.float32)
-    edges[:, 3:] = np.diff(strands.rest, axis=1).reshape(count, -1)
-    anchor = np.zeros_like(edges)
-    if model.anchored:
-        anchor = model.run(
-            "tail.onnx", "offsets", strand_part=strand_part, anchor=anchor, edges=edges, **model.frame(held)
-        )
-    return {"rest": strands.rest, "valid": strands.valid, "strand_part": strand_part, "anchor": anchor, "edges": edges}

@@ -25,7 +25,7 @@ def metres_per_unit(unit: str | float) -> float:
 
 
 def upward_axis(up: str) -> str:
-    """ "Y" or "Z", of either in either case.
+    """The axis "Y" or "Z", of either letter in either case.
 
     Raises:
         NeuralocksError: it is neither.
