@@ -11,25 +11,17 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 
-from .attach import attach, rig_joint
+from .attach import rig_joint
 from .border import Border, open_stage
-from .curves import find_curves, read_groom, without_points
+from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
-from .notes import (
-    composition_notes,
-    few,
-    groom_notes,
-    left_out,
-    no_points,
-    out_of_range,
-    rig_notes,
-    too_far,
-)
+from .hair_search import HairSearch
+from .notes import composition_notes, few, groom_notes, left_out, not_animated, out_of_range, rig_notes
 from .placement import Placement
-from .rig_source import read_rig
+from .rig_source import StageRig, find_skeletons, read_each_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
-from .stage import find_skeletons, frame_range
+from .stage import frame_range
 
 
 def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:
@@ -73,16 +65,13 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
-    rigs, errors = [], []
-    for prim in find_skeletons(stage):
-        try:
-            rigs.append(read_rig(stage, prim, border, head, all_shapes=True, joints=joints))
-        except NeuralocksError as error:
-            errors.append(str(error))
+    rigs, errors = read_each_rig(stage, find_skeletons(stage), border, head, all_shapes=True, joints=joints)
     if rigs:
         spoils += [left_out(error) for error in errors]
     else:
-        stops += errors
+        stops += [str(error) for error in errors] or [
+            f"{path.name}: holds no UsdSkel skeleton; export the character with its armature"
+        ]
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
         spoils += rig.notes + rig_notes(rig)
@@ -90,22 +79,10 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
-    if not rigs and not stops:
-        stops.append(f"{path.name}: holds no UsdSkel skeleton; export the character with its armature")
-    elif rigs and not moving:
-        stops.append(
-            f"{rigs[0].path}: the skeleton has no animation; bind a SkelAnimation to it (skel:animationSource)"
-        )
-    grooms, far, curves = [], [], find_curves(stage)
-    empty = without_points(curves)
-    spoils += few([no_points(str(prim.GetPath())) for prim in empty])
-    for prim in (prim for prim in curves if prim not in empty):
-        try:
-            groom = _curves(prim, rigs, border, head, spoils, stops, far)
-            grooms += [groom] if groom else []
-        except NeuralocksError as error:
-            stops.append(str(error))
-    (spoils if grooms else stops).extend(few(far))
+    elif rigs:
+        stops.append(not_animated(rigs[0]))
+    curves = find_curves(stage)
+    grooms = _grooms(curves, rigs, border, head, spoils, stops)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:
@@ -113,7 +90,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
 
 
-def _rig(rig) -> dict:
+def _rig(rig: StageRig) -> dict:
     humanoid = rig.character.humanoid
     found = {name: rig.source.names[joint] for name, joint in humanoid.items()}
     body = rig.character.body
@@ -134,7 +111,7 @@ def _rig(rig) -> dict:
     }
 
 
-def _chains(rig, spoils: list[str]) -> list[dict]:
+def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
     """Hair joints of rigged mesh hair; none is nothing to report."""
     try:
         chains = assemble_rig(rig.character, core_meshes(rig)).chains
@@ -151,23 +128,35 @@ def _chains(rig, spoils: list[str]) -> list[dict]:
     ]
 
 
-def _height(rig) -> float | None:
+def _height(rig: StageRig) -> float | None:
     if "head" not in rig.character.humanoid:
         return None
     return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
 
 
-def _curves(prim, rigs, border, head, spoils, stops, far) -> dict | None:
-    """Facts about curves; None for what is not hair, of which `far` is told."""
+def _grooms(curves, rigs, border: Border, head: str | None, spoils: list[str], stops: list[str]) -> list[dict]:
+    """Facts about the curves that are hair; what stops one of them does not keep the others from being told."""
+    search, grooms = HairSearch(rigs, head, spoils), []
+    for prim in search.filled(curves):
+        try:
+            groom = _groom(prim, search if rigs else None, border, spoils, stops)
+            grooms += [groom] if groom else []
+        except NeuralocksError as error:
+            stops.append(str(error))
+    (spoils if grooms else stops).extend(few(search.far))
+    return grooms
+
+
+def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], stops: list[str]) -> dict | None:
+    """Facts about one groom, without a search also where no skeleton is; None where the curves are no hair."""
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
     to_bind, joint = border.to_core @ placement.reference, {}
-    if rigs:
+    if search is not None:
         try:
-            found = attach(prim, rigs, placement, head, spoils)
-            if found.far:
-                far.append(too_far(facts["path"], found))
+            found = search.attachment(prim, placement)
+            if found is None:
                 return None
             to_bind = found.to_bind
             joint = {"joint": rig_joint(found), "carried by": found.how}

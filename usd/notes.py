@@ -46,6 +46,14 @@ def no_points(path: str) -> str:
     return f"{path}: the curves have no points; left out"
 
 
+def not_animated(rig: StageRig) -> str:
+    """Why a skeleton cannot be baked; where it has an animation that UsdSkel ignores, what is wrong with that."""
+    animation = rig.source.animation
+    said = [] if animation is None else [note for note in rig.notes if note.startswith(f"{animation.GetPath()}: ")]
+    why = f" ({said[0].split(': ', 1)[1].split(';')[0]})" if said else ""
+    return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
+
+
 def stands_still(path: str, rig: StageRig) -> str:
     """Of a groom whose character is not animated, beside others."""
     return f"{path}: {rig.path}, which carries it, has no animation; left out"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdSkel
 
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
@@ -140,6 +140,25 @@ def read_rig(
         notes=notes,
         by_hand=by_hand,
     )
+
+
+def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Skeleton prims in stage order."""
+    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+
+
+def read_each_rig(
+    stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, **options
+) -> tuple[list[StageRig], list[NeuralocksError]]:
+    """`read_rig` of several skeletons: those that can be used, and what is wrong with the others."""
+    rigs, errors = [], []
+    for prim in prims:
+        try:
+            rigs.append(read_rig(stage, prim, border, head, **options))
+        except NeuralocksError as error:
+            errors.append(error)
+    return rigs, errors
 
 
 def _time_codes(source: JointSource, border: Border) -> np.ndarray:

@@ -15,7 +15,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from .border import Border, open_stage, transformed
 from .damage import names_damage
 from .notes import nothing_found
-from .rig_source import StageRig, read_rig
+from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import rest_primvar
 
 
@@ -59,7 +59,7 @@ def read_rigged_hair(
     """
     stage = open_stage(path)
     border = Border.of(stage)
-    prims = [p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdSkel.Skeleton)]
+    prims = find_skeletons(stage)
     if skeleton:
         prims = [p for p in prims if str(p.GetPath()) == skeleton or p.GetName() == skeleton]
         if len(prims) != 1:

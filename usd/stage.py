@@ -5,29 +5,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdSkel
+from pxr import Usd
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
-from .attach import Attachment, attach, of_another, rig_joint
+from .attach import Attachment, rig_joint
 from .border import Border, open_stage
-from .curves import find_curves, read_groom, without_points
+from .curves import find_curves, read_groom
 from .damage import names_damage
-from .notes import (
-    another_carries,
-    composition_notes,
-    few,
-    groom_notes,
-    left_out,
-    no_points,
-    nothing_found,
-    rig_notes,
-    stands_still,
-    too_far,
-)
+from .hair_search import HairSearch
+from .notes import composition_notes, few, groom_notes, left_out, not_animated, nothing_found, rig_notes, stands_still
 from .placement import Placement
-from .rig_source import StageRig, read_rig
+from .rig_source import StageRig, find_skeletons, read_each_rig
 
 
 @dataclass(frozen=True)
@@ -102,39 +92,22 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
             stage, path, "groom (no BasisCurves prim)", "add one, or import a hair file with 'neuralocks import'"
         )
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
-    _check_animated(rigs, path)
+    _check_animated(rigs)
     # Of grooms that are not named, a skeleton that is gets its own.
-    named = skeleton is None or grooms
-    every = [] if named else _rigs(stage, border, None, head, path, joints=joints)
+    every = [] if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
     others = [rig for rig in every if rig.path != skeleton]
-    found, far = [], []
-    empty = [] if grooms else without_points(curves)
-    notes += few([no_points(str(prim.GetPath())) for prim in empty])
-    for prim in (prim for prim in curves if prim not in empty):
-        placement = Placement(prim)
-        if others and (other := of_another(prim, rigs, others, placement, head)):
-            notes.append(another_carries(str(prim.GetPath()), other))
-            continue
-        attachment = attach(prim, rigs, placement, head, notes)
-        if attachment.far and not grooms:
-            far.append(too_far(str(prim.GetPath()), attachment))
-            continue
-        groom = read_groom(prim, attachment.to_bind, notes)
-        found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
-        notes += groom_notes(found[-1].path, groom)
+    search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
+    found = _grooms(search, curves, notes)
     if not found:
         raise NeuralocksError(
-            far[0] if far else f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
+            search.far[0] if search.far else f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
         )
-    notes += few(far)
-    still = [item for item in found if not item.attachment.rig.source.animated]
-    if still and len(still) < len(found) and not grooms:
-        found = [item for item in found if item.attachment.rig.source.animated]
-        notes += [stands_still(item.path, item.attachment.rig) for item in still]
-    carrying = {id(g.attachment.rig) for g in found}
-    used = tuple(rig for rig in rigs if id(rig) in carrying)
+    notes += few(search.far)
+    if not grooms:
+        found = _moving(found, notes)
+    used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
     for rig in used:
-        _check_animated([rig], path)
+        _check_animated([rig])
         notes += rig.notes + rig_notes(rig)
     first, last = frame_range(stage, used)
     return Shot(
@@ -174,10 +147,27 @@ def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
     return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
 
 
-def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
-    """Skeleton prims in stage order."""
-    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
-    return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> list[StageGroom]:
+    """The curves that are hair, read in bind-world metres."""
+    found = []
+    for prim in search.filled(curves):
+        placement = Placement(prim)
+        attachment = search.attachment(prim, placement)
+        if attachment is not None:
+            path, groom = str(prim.GetPath()), read_groom(prim, attachment.to_bind, notes)
+            found.append(StageGroom(path, prim, groom, attachment, placement))
+            notes += groom_notes(path, groom)
+    return found
+
+
+def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
+    """The grooms whose skeleton is animated, with a note on the others; all where none is."""
+    moving = [item for item in grooms if item.attachment.rig.source.animated]
+    if not moving:
+        return grooms
+    still = [item for item in grooms if not item.attachment.rig.source.animated]
+    notes += [stands_still(item.path, item.attachment.rig) for item in still]
+    return moving
 
 
 def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None) -> list[StageRig]:
@@ -189,12 +179,7 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None)
             raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
     if not prims:
         raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
-    rigs, errors = [], []
-    for prim in prims:
-        try:
-            rigs.append(read_rig(stage, prim, border, head, all_shapes=all_shapes, joints=joints))
-        except NeuralocksError as error:
-            errors.append(error)
+    rigs, errors = read_each_rig(stage, prims, border, head, all_shapes=all_shapes, joints=joints)
     if errors and (not rigs or skeleton):
         raise errors[0]
     for error in errors:
@@ -202,17 +187,6 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None)
     return rigs
 
 
-def _check_animated(rigs: list[StageRig], path: Path) -> None:
+def _check_animated(rigs: list[StageRig]) -> None:
     if not any(rig.source.animated for rig in rigs):
-        raise NeuralocksError(
-            f"{rigs[0].path}: the skeleton has no animation{_why(rigs[0])}; "
-            "bind a SkelAnimation to it (skel:animationSource)"
-        )
-
-
-def _why(rig: StageRig) -> str:
-    return (
-        f" ({rig.source.notes[-1].split(': ', 1)[1].split(';')[0]})"
-        if rig.source.notes and not rig.source.animated
-        else ""
-    )
+        raise NeuralocksError(not_animated(rigs[0]))

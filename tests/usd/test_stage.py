@@ -252,6 +252,21 @@ def test_rigs_are_read_without_grooms_or_animation(tmp_path):
         read_shot(path)
 
 
+def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
+    """And not with a mesh, of which something is said later."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttribute("scales").Clear()
+    mesh = UsdSkel.BindingAPI.Apply(UsdGeom.Mesh.Define(stage, "/Hero/Empty").GetPrim())
+    mesh.CreateSkeletonRel().SetTargets(["/Hero/Rig"])
+    mesh.CreateJointIndicesPrimvar(True, 1).Set([3])
+    mesh.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match=r"no animation \(no scales, so UsdSkel ignores the animation\)") as raised:
+        read_shot(path)
+    assert str(raised.value) in inspect(path)["stops"]
+
+
 @pytest.mark.parametrize("bound", ["own", "mesh"])
 def test_values_at_a_single_time_are_values_at_rest(tmp_path, bound):
     """Exporters of single frames write all that may vary as one sample, transforms and weights too."""
