@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading stages: poses as UsdSkel evaluates them, skin as UsdSkel deforms it, and which joint carries what."""
+"""Reading stages: poses as UsdSkel evaluates them, skin as UsdSkel deforms it, times and joints as they are meant."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
@@ -16,7 +16,7 @@ from usd.border import Border
 from usd.inspect import inspect
 from usd.stage import read_rigs, read_shot
 
-from .shots import HEAD, POSITIONS, Recipe, strand_points, write_shot
+from .shots import HEAD, POSITIONS, Recipe, write_shot
 
 BODY = Path(__file__).parents[2] / "examples" / "shot" / "shot.usda"
 
@@ -64,147 +64,6 @@ def test_the_shipped_body_is_posed_as_usd_skel_deforms_it():
         assert cache.GetSkinningQuery(mesh).ComputeSkinnedPoints(query.ComputeSkinningTransforms(code), points, code)
         posed = rig.character.posed_body(rig.joints_at(code))
         assert np.abs(posed - np.asarray(points)).max() < 1e-4
-
-
-@pytest.mark.parametrize(
-    ("bound", "words"), [("own", "own skel binding"), ("mesh", "on which it sits"), ("none", "name")]
-)
-def test_what_carries_the_groom_is_said(tmp_path, bound, words):
-    shot = read_shot(write_shot(tmp_path, Recipe(bound=bound)))
-    assert shot.grooms[0].joint == "hips/spine/neck/head"
-    assert words in shot.grooms[0].attachment.how
-    assert np.abs(shot.grooms[0].groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-6
-
-
-def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
-    free = read_shot(write_shot(tmp_path, Recipe(bound="none"), "free"), head="neck")
-    assert free.grooms[0].joint == "hips/spine/neck"
-    bound = read_shot(write_shot(tmp_path, Recipe(), "bound"), head="neck")
-    assert bound.grooms[0].joint == "hips/spine/neck/head"
-    assert any("--head neck is not used" in note for note in bound.notes)
-
-
-def test_each_groom_finds_its_own_character(tmp_path):
-    write_shot(tmp_path, Recipe(bound="mesh"), "asset")
-    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
-    UsdGeom.SetStageMetersPerUnit(stage, 1)
-    UsdGeom.SetStageUpAxis(stage, "Y")
-    for name, x in (("A", 0.0), ("B", 2.0)):
-        prim = UsdGeom.Xform.Define(stage, f"/{name}")
-        prim.AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
-        model = stage.DefinePrim(f"/{name}/Model")
-        model.GetReferences().AddReference("./asset.usda")
-    stage.GetRootLayer().Save()
-    shot = read_shot(tmp_path / "two.usda")
-    assert [(g.path, g.attachment.rig.path) for g in shot.grooms] == [
-        ("/A/Model/Hair", "/A/Model/Rig"),
-        ("/B/Model/Hair", "/B/Model/Rig"),
-    ]
-    only = read_shot(tmp_path / "two.usda", skeleton="/B/Model/Rig", grooms=["/B"])
-    assert [g.path for g in only.grooms] == ["/B/Model/Hair"]
-
-
-@pytest.mark.parametrize("bound", ["own", "mesh", "none"])
-@pytest.mark.parametrize("places", [(2.0, 0.0), (0.0, 0.0)])
-def test_hair_at_the_origin_is_not_another_characters(tmp_path, bound, places):
-    """Hair lies there as any character's does in its bind pose."""
-    write_shot(tmp_path, Recipe(bound=bound), "asset")
-    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
-    UsdGeom.SetStageMetersPerUnit(stage, 1)
-    for name, x in zip("AB", places, strict=True):
-        UsdGeom.Xform.Define(stage, f"/{name}").AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
-        stage.DefinePrim(f"/{name}/Model").GetReferences().AddReference("./asset.usda")
-    stage.GetRootLayer().Save()
-    for chosen in (None, "/A/Model/Rig", "/B/Model/Rig"):
-        shot = read_shot(tmp_path / "two.usda", skeleton=chosen)
-        pairs = [(item.path[:2], item.attachment.rig.path[:2]) for item in shot.grooms]
-        assert pairs == [(name, name) for name in ("/A", "/B") if chosen is None or chosen.startswith(name)]
-
-
-def _curves(stage, path, points):
-    """Curves (n, 2, 3) [m] without a binding."""
-    curves = UsdGeom.BasisCurves.Define(stage, path)
-    curves.CreateTypeAttr("linear")
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
-    curves.CreateCurveVertexCountsAttr([2] * len(points))
-
-
-def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
-    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
-    roots = np.random.default_rng(0).uniform(-4, 4, (50, 1, 3)) * [1, 0, 1] + [6, 0, 0]
-    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
-    stage.GetRootLayer().Save()
-    path = stage.GetRootLayer().realPath
-    shot = read_shot(path)
-    assert [item.path for item in shot.grooms] == ["/Hero/Hair"]
-    assert sum("/Set/Grass" in note and "--groom" in note for note in shot.notes) == 1
-    facts = inspect(path)
-    assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
-    assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
-    assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
-    for number in range(30):
-        Sdf.CopySpec(stage.GetRootLayer(), "/Set/Grass", stage.GetRootLayer(), f"/Set/Grass{number}")
-    stage.GetRootLayer().Save()
-    assert len([note for note in read_shot(path).notes if "Grass" in note or "28 more" in note]) == 4
-    stage.RemovePrim("/Set")
-    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Set")
-    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
-    stage.RemovePrim("/Hero/Hair")
-    stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
-        read_shot(path)
-    assert len(inspect(path)["stops"]) == 1
-
-
-def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
-    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
-    UsdGeom.BasisCurves.Define(stage, "/Hero/Empty")
-    stage.GetRootLayer().Save()
-    path = stage.GetRootLayer().realPath
-    shot, facts = read_shot(path), inspect(path)
-    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] == [groom["path"] for groom in facts["grooms"]]
-    assert any("/Hero/Empty" in note for note in shot.notes) and any("/Hero/Empty" in note for note in facts["spoils"])
-    with pytest.raises(NeuralocksError, match="no points"):
-        read_shot(path, ["/Hero/Empty"])
-
-
-def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_path):
-    for name, frames in (("hero", 9), ("doll", 0)):
-        write_shot(tmp_path, Recipe(frames=frames), name)
-    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
-    UsdGeom.SetStageMetersPerUnit(stage, 1)
-    for name in ("hero", "doll"):
-        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{name}.usda", "/Hero")
-    stage.GetRootLayer().Save()
-    shot = read_shot(tmp_path / "shot.usda")
-    assert [item.path for item in shot.grooms] == ["/hero/Hair"]
-    assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
-    with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
-        read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
-
-
-def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
-    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
-    skin = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr().Get())
-    _curves(stage, "/Hero/Fur", np.stack([skin, skin + [0, 0.02, 0]], axis=1))
-    stage.GetRootLayer().Save()
-    notes = read_shot(stage.GetRootLayer().realPath).notes
-    assert sum("will leave the skin" in note for note in notes) == 1
-    assert any(note.startswith("/Hero/Fur: only 50%") and "(head)" in note for note in notes)
-
-
-def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
-    """As exported by tools that bake a head constraint into the groom's transform."""
-    path = write_shot(tmp_path, Recipe(bound="mesh"))
-    rig = read_shot(path).rigs[0]
-    stage = Usd.Stage.Open(str(path))
-    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
-    for frame in range(1, 10):
-        op.Set(Gf.Matrix4d(rig.character.carrying(rig.joints_at(frame)).T.tolist()), frame)
-    stage.GetRootLayer().Save()
-    item = read_shot(path).grooms[0]
-    assert item.joint.endswith("head")
-    assert np.abs(item.groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-5
 
 
 def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
@@ -262,7 +121,9 @@ def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
     mesh.CreateJointIndicesPrimvar(True, 1).Set([3])
     mesh.CreateJointWeightsPrimvar(True, 1).Set([1.0])
     stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match=r"no animation \(no scales, so UsdSkel ignores the animation\)") as raised:
+    with pytest.raises(
+        NeuralocksError, match=r"no animation \(no scales, so UsdSkel ignores the animation\)"
+    ) as raised:
         read_shot(path)
     assert str(raised.value) in inspect(path)["stops"]
 
