@@ -93,7 +93,7 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
             f"{path}: {len(indices)} joint indices and {len(weights)} weights for {rows} points of {size}; "
             "export the skin again"
         )
-    order = [str(name) for name in UsdSkel.BindingAPI(prim).GetJointsAttr().Get() or ()] or list(source.names)
+    order = [str(name) for name in _in_effect(prim, "skel:joints") or ()] or list(source.names)
     unknown = [name for name in order if name not in source.names]
     if unknown:
         raise NeuralocksError(
@@ -113,11 +113,26 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
 
 def geom_bind(prim: Usd.Prim) -> np.ndarray:
     """Transform (4, 4) from the prim's points to authored bind space."""
-    value = rest_value(UsdSkel.BindingAPI(prim).GetGeomBindTransformAttr())
+    value = _in_effect(prim, "primvars:skel:geomBindTransform")
     matrix = np.eye(4) if value is None else column_matrix(value)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
         raise NeuralocksError(f"{prim.GetPath()}: its geomBindTransform is not finite or flat; bind it again")
     return matrix
+
+
+def _in_effect(prim: Usd.Prim, name: str):
+    """The value at rest of a binding property: the prim's own, else that of the nearest prim above with a binding, as
+    UsdSkel has it. None if there is none.
+    """
+    above = prim
+    while above and not above.IsPseudoRoot():
+        attribute = above.GetAttribute(name)
+        if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
+            value = rest_value(attribute)
+            if value is not None:
+                return value
+        above = above.GetParent()
+    return None
 
 
 def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
@@ -156,9 +171,20 @@ def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] |
 
 
 def _drawn(prim: Usd.Prim) -> bool:
-    imageable = UsdGeom.Imageable(prim)
-    hidden = imageable.ComputeVisibility(Usd.TimeCode.EarliestTime()) == UsdGeom.Tokens.invisible
-    return not hidden and imageable.ComputePurpose() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+    imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+    return imageable.ComputePurpose() not in unseen and _ever_visible(prim)
+
+
+def _ever_visible(prim: Usd.Prim) -> bool:
+    """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
+    switches = []
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if above.IsA(UsdGeom.Imageable):
+            switches.append(UsdGeom.Imageable(above).GetVisibilityAttr())
+        above = above.GetParent()
+    times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
+    return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
 
 
 def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh | None:
