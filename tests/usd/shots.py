@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small shots for tests: one humanoid with a head of hair, written in any unit, up axis and nesting."""
+"""Small shots for tests: one humanoid with a head of hair, written in any unit, up axis and nesting; bakes read back."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from usd.border import open_stage
 
 JOINTS = (
     "hips", "hips/spine", "hips/spine/neck", "hips/spine/neck/head",
@@ -186,3 +188,22 @@ def _groom(stage, root, to_stage, skeleton, recipe: Recipe) -> None:
         binding.CreateJointIndicesPrimvar(True, 1).Set(Vt.IntArray([HEAD]))
         binding.CreateJointWeightsPrimvar(True, 1).Set(Vt.FloatArray([1.0]))
         binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+
+
+def world_points(path, code, prim="/Hero/Hair"):
+    """(P, 3) points of a groom in world space, metres, Y up, as a renderer places them."""
+    stage = open_stage(path)
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
+    matrix = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim())).T
+    points = np.asarray(curves.GetPointsAttr().Get(code), float) @ matrix[:3, :3].T + matrix[:3, 3]
+    if UsdGeom.GetStageUpAxis(stage) == "Z":
+        points = points @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).T
+    return points * UsdGeom.GetStageMetersPerUnit(stage)
+
+
+def samples(path, *names, at=None, prim="/Hero/Hair"):
+    """Values of the groom's attributes at a time code (default time for None)."""
+    stage = open_stage(path)
+    code = Usd.TimeCode.Default() if at is None else Usd.TimeCode(at)
+    values = [np.asarray(stage.GetPrimAtPath(prim).GetAttribute(name).Get(code)) for name in names]
+    return values if len(values) > 1 else values[0]

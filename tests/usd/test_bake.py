@@ -1,12 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bake's contract: what it authors, that only shot, model and time matter, and that kills leave no trace."""
+"""The bake's contract: what it authors, and that units, axes and places do not matter."""
 
 import os
-import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,28 +13,7 @@ from usd.border import open_stage
 from usd.inspect import inspect
 from usd.stage import read_shot
 
-from .shots import CENTRE, HEAD, Recipe, strand_points, write_shot
-
-ROOT = Path(__file__).parents[2]
-
-
-def world_points(path, code, prim="/Hero/Hair"):
-    """(P, 3) points of a groom in world space, metres, Y up, as a renderer places them."""
-    stage = open_stage(path)
-    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
-    matrix = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim())).T
-    points = np.asarray(curves.GetPointsAttr().Get(code), float) @ matrix[:3, :3].T + matrix[:3, 3]
-    if UsdGeom.GetStageUpAxis(stage) == "Z":
-        points = points @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).T
-    return points * UsdGeom.GetStageMetersPerUnit(stage)
-
-
-def samples(path, *names, at=None, prim="/Hero/Hair"):
-    """Values of the groom's attributes at a time code (default time for None)."""
-    stage = open_stage(path)
-    code = Usd.TimeCode.Default() if at is None else Usd.TimeCode(at)
-    values = [np.asarray(stage.GetPrimAtPath(prim).GetAttribute(name).Get(code)) for name in names]
-    return values if len(values) > 1 else values[0]
+from .shots import CENTRE, HEAD, Recipe, samples, strand_points, world_points, write_shot
 
 
 @pytest.fixture(scope="module")
@@ -170,121 +144,6 @@ def test_a_moving_root_moves_the_hair_and_its_history(tmp_path, model):
     assert np.ptp(shift, axis=0).max() > 1e-3  # acceleration changes the hair, not only its place
 
 
-def test_velocities_are_those_of_the_points(tmp_path, model):
-    shot = write_shot(tmp_path, Recipe(unit=0.01))
-    result = bake(shot, tmp_path / "bake.usdc", model)
-    at = {code: samples(result.path, "points", at=code).astype(float) for code in range(1, 10)}
-    middle = (8 * (at[6] - at[4]) - (at[7] - at[3])) * 24 / 12
-    first, second = (-3 * at[1] + 4 * at[2] - at[3]) * 12, (at[3] - at[1]) * 12
-    for code, expected in ((5, middle), (1, first), (2, second)):
-        assert np.allclose(samples(result.path, "velocities", at=code), expected, atol=5e-3)
-    # A half frame to both sides says nearly the same, in the middle of a smooth motion.
-    few = bake(shot, tmp_path / "few.usdc", model, frames=[4.5, 5.5]).path
-    near = (samples(few, "points", at=5.5).astype(float) - samples(few, "points", at=4.5)) * 24
-    assert np.linalg.norm(near - middle) < 0.1 * np.linalg.norm(near)
-
-
-@pytest.mark.parametrize("rate", [1.0, 1000.0])
-def test_frames_are_the_shots_where_its_time_codes_are_seconds_or_milliseconds(tmp_path, model, rate):
-    shots = [write_shot(tmp_path, Recipe(rate=24, frames=9), "frames"), tmp_path / "counted.usda"]
-    stage = Usd.Stage.Open(Usd.Stage.Open(str(shots[0])).Flatten())
-    stage.SetTimeCodesPerSecond(rate)
-    stage.SetFramesPerSecond(rate if rate > 24 else 24)
-    stage.SetStartTimeCode(rate / 24)
-    stage.SetEndTimeCode(9 * rate / 24)
-    motion = stage.GetPrimAtPath("/Hero/Rig/Motion")
-    for attribute in motion.GetAttributes():
-        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()}
-        if values:
-            attribute.Clear()
-        for code, value in values.items():
-            attribute.Set(value, code * rate / 24)
-    stage.GetRootLayer().Export(str(shots[1]))
-    read = [read_shot(shot).rigs[0].clip for shot in shots]
-    assert len(read[1].times) == 9 and np.allclose(read[0].times, read[1].times)
-    assert np.abs(read[0].joints - read[1].joints).max() < 1e-6
-    bakes = [bake(shot, shot.with_suffix(".usdc"), model, subframes=2) for shot in shots]
-    assert np.allclose(np.array(bakes[1].frames) * 24 / rate, bakes[0].frames)
-    for code, seconds in zip(bakes[0].frames, bakes[1].frames, strict=True):
-        frames, counted = (
-            samples(done.path, "points", "velocities", at=at) for done, at in zip(bakes, (code, seconds))
-        )
-        assert np.abs(frames[0] - counted[0]).max() < 1e-5
-        assert np.abs(frames[1] - counted[1]).max() < 1e-3 * np.abs(frames[1]).max() + 1e-5
-
-
-def test_order_chunks_and_jobs_give_the_same_bytes(tmp_path, model):
-    shot = write_shot(tmp_path, Recipe(strands=1500, vertices=9))
-    whole = bake(shot, tmp_path / "bake.usdc", model, jobs=2, subframes=2).path.read_bytes()
-    again = bake(shot, tmp_path / "bake.usdc", model, jobs=1, subframes=2).path.read_bytes()
-    codes = [t + s for t in range(1, 10) for s in (0, 0.5)]
-    np.random.default_rng(0).shuffle(codes)
-    shuffled = bake(shot, tmp_path / "bake.usdc", model, frames=codes).path.read_bytes()
-    assert whole == again == shuffled
-    part = bake(shot, tmp_path / "part.usdc", model, frames="4:6")
-    for code in (4.0, 5.0, 6.0):
-        one, other = (
-            samples(p, "points", "velocities", "extent", at=code) for p in (tmp_path / "bake.usdc", part.path)
-        )
-        assert [a.tobytes() for a in one] == [a.tobytes() for a in other]
-
-
-def test_large_grooms_are_written_in_blocks_that_leave_no_trace(tmp_path, model, monkeypatch):
-    shot = write_shot(tmp_path, Recipe(strands=60, vertices=9))
-    whole = bake(shot, tmp_path / "bake.usdc", model).path.read_bytes()
-    monkeypatch.setattr("usd.samples.BLOCK", 100)
-    assert bake(shot, tmp_path / "bake.usdc", model).path.read_bytes() == whole
-
-
-def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
-    shot = write_shot(tmp_path, Recipe(frames=30, strands=2000, vertices=16))
-    out = tmp_path / "bake.usdc"
-    whole = bake(shot, out, model).path.read_bytes()
-    out.unlink()
-    command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
-    spool = tmp_path / ".bake.usdc.baking"
-    while len(list(spool.glob("*.frame"))) < 3 and process.poll() is None:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert not out.exists() and spool.exists(), "the bake was over before it could be killed"
-    result = bake(shot, out, model)
-    assert result.resumed >= 3
-    assert out.read_bytes() == whole
-    assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "bake.usdc"}
-
-
-def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model):
-    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
-
-    def stop(done, total, message):
-        if done == 4:
-            raise KeyboardInterrupt
-
-    for again, taken in ((model, 4), (still_model, 0)):
-        with pytest.raises(KeyboardInterrupt):
-            bake(shot, out, model, progress=stop)
-        assert not out.exists()
-        assert abs(bake(shot, out, again).resumed - taken) <= 1
-        out.unlink()
-
-
-def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, model, monkeypatch):
-    shot, out, own = write_shot(tmp_path), tmp_path / "bake.usdc", tmp_path / "posing.py"
-
-    def stop(done, total, message):
-        if done == 4:
-            raise KeyboardInterrupt
-
-    own.write_text("one")
-    monkeypatch.setattr("usd.samples.program_files", lambda: [own])
-    with pytest.raises(KeyboardInterrupt):
-        bake(shot, out, model, progress=stop)
-    own.write_text("another")
-    assert bake(shot, out, model).resumed == 0
-
-
 def test_frames_without_animation_are_said(tmp_path, still_model):
     """A shot at 1001 whose animation stayed at 1: nothing is wrong with any file, and nothing moves."""
     shot = write_shot(tmp_path)
@@ -308,14 +167,6 @@ def test_material_and_strength_reach_the_network(tmp_path, model):
 def test_a_bake_of_a_bake_is_the_bake(baked, tmp_path, model):
     again = bake(baked[1].path, tmp_path / "again.usdc", model, frames=[5])
     assert np.abs(world_points(again.path, 5.0) - world_points(baked[1].path, 5.0)).max() < 1e-6
-
-
-def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
-    first = bake(write_shot(tmp_path), tmp_path / "first.usdc", model, frames=[4, 5])
-    again = bake(first.path, tmp_path / "again.usdc", model, frames=[5], velocities=False, material=["weight=2"])
-    stage = Usd.Stage.Open(str(again.path))
-    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
-    assert curves.GetPointsAttr().GetTimeSamples() == [5] and not curves.GetVelocitiesAttr().HasValue()
 
 
 def test_a_groom_inside_an_instance_is_baked(tmp_path, model):

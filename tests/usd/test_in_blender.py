@@ -9,8 +9,7 @@ import pytest
 
 from usd.bake import bake
 
-from .shots import Recipe, write_shot
-from .test_bake import samples, world_points
+from .shots import Recipe, samples, world_points, write_shot
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = sorted(ROOT.glob(".venv-blender-*/bin/python"))

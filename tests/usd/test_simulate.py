@@ -6,8 +6,7 @@ import pytest
 
 from usd.simulate import simulate
 
-from .shots import Recipe, write_shot
-from .test_bake import samples, world_points
+from .shots import Recipe, samples, world_points, write_shot
 
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
