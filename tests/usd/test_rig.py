@@ -3,95 +3,17 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rig import RigModel, rig_spec
-from neuralocks_core.rig.network import feature_columns, input_limits
 from usd.rig_bake import bake_rig
 from usd.rig_layer import NAME
-from usd.rig_picture import rigged_scene
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
-
-
-def model_for(hair, dynamic=False) -> RigModel:
-    """Random weights for the chains of a stage."""
-    rng = np.random.default_rng(0)
-    spec = rig_spec(dynamic)
-    size, layers = len(feature_columns(spec)), []
-    for out in (16, 16, 3 * len(hair.rig.chains)):
-        layers.append((rng.normal(0, 0.4 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
-        size = out
-    return RigModel(hair.rig.chains, spec, tuple(layers), input_limits(spec))
-
-
-def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0) -> Path:
-    """A head with one tail of three joints and an end, nodding; in any unit and up axis."""
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)
-    UsdGeom.SetStageUpAxis(stage, "Z" if z_up else "Y")
-    stage.SetTimeCodesPerSecond(rate)
-    root = UsdSkel.Root.Define(stage, "/Who")
-    stage.SetDefaultPrim(root.GetPrim())
-    skeleton = UsdSkel.Skeleton.Define(stage, "/Who/Rig")
-    joints = ["hips", "hips/head"]
-    places = [(0, 1, 0), (0, 1.5, 0)]
-    for i in range(4):
-        joints.append(f"{joints[-1]}/hair_{i}")
-        places.append((0, 1.55 - 0.07 * i, -0.1 - 0.02 * i))
-    turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if z_up else np.eye(3)
-    world = [np.block([[turn, (scale * turn @ np.array(p))[:, None]], [np.zeros(3), 1]]) for p in places]
-
-    def rows(matrices):
-        return Vt.Matrix4dArray([Gf.Matrix4d(*np.asarray(m).T.ravel().tolist()) for m in matrices])
-
-    local = [world[0]] + [np.linalg.inv(a) @ b for a, b in zip(world, world[1:])]
-    skeleton.CreateJointsAttr(joints)
-    if bind:
-        skeleton.CreateBindTransformsAttr(rows(world))
-    skeleton.CreateRestTransformsAttr(rows(local))
-    mesh = UsdGeom.Mesh.Define(stage, "/Who/Hair")
-    points = np.repeat(np.array(places[2:5]), 3, axis=0) + np.tile(0.01 * np.eye(3), (3, 1))
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((scale * points @ turn.T).astype(np.float32)))
-    mesh.CreateFaceVertexCountsAttr([3, 3, 3])
-    mesh.CreateFaceVertexIndicesAttr(list(range(9)))
-    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    binding.CreateJointIndicesPrimvar(False, 1).Set([2] * 3 + [3] * 3 + [4] * 3)
-    binding.CreateJointWeightsPrimvar(False, 1).Set([weights] * 9)
-    motion = UsdSkel.Animation.Define(stage, "/Who/Motion")
-    motion.CreateJointsAttr(joints)
-    motion.CreateScalesAttr([Gf.Vec3h(1)] * 6)
-    motion.CreateTranslationsAttr([Gf.Vec3f(*map(float, m[:3, 3])) for m in local])
-    motion.CreateRotationsAttr()
-    for frame in range(frames + 1):
-        angle = 0.5 * np.sin(2 * np.pi * frame / frames) if head_moves else 0.0
-        turns = [Gf.Quatf(1)] * 6
-        first = Gf.Quatf(*map(float, (np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0))) if z_up else Gf.Quatf(1)
-        turns[0] = first
-        turns[1] = Gf.Quatf(float(np.cos(angle / 2)), float(np.sin(angle / 2)), 0, 0)
-        motion.GetRotationsAttr().Set(turns, frame + 1)
-    motion.CreateBlendShapesAttr(["smile"])
-    motion.CreateBlendShapeWeightsAttr().Set([0.25], 3)
-    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([motion.GetPath()])
-    stage.SetStartTimeCode(1)
-    stage.SetEndTimeCode(frames + 1)
-    stage.GetRootLayer().Save()
-    return path
-
-
-def hair_turns(path, codes):
-    """Rotations (T, 3, 4) of the three moving joints as UsdSkel has them."""
-    stage = Usd.Stage.Open(str(path))
-    animation = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{NAME}"))
-    rotations = animation.GetRotationsAttr()
-    return np.array([[[q.GetReal(), *q.GetImaginary()] for q in list(rotations.Get(c))[2:5]] for c in codes])
+from .rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 
 def test_the_body_stays_sample_for_sample(tmp_path):
@@ -250,48 +172,6 @@ def test_the_example_and_its_command_line(tmp_path):
         [*command, "--model", str(tmp_path / "no.neuralocks")], capture_output=True, text=True, cwd=EXAMPLE.parents[1]
     )
     assert done.returncode == 1 and done.stderr.count("\n") == 1
-
-
-def test_a_picture_of_mesh_hair(tmp_path):
-    """Whole locks are hair, their roots on the head too, and nothing of the body is; hair that moves is drawn elsewhere."""
-    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
-    from PIL import Image
-
-    from usd.picture import preview
-
-    baked = tmp_path / "baked.usda"
-    bake_rig(EXAMPLE / "shot.usda", baked)
-    stage = Usd.Stage.Open(str(baked))  # a cable in the set, which is no hair
-    cable = UsdGeom.BasisCurves.Define(stage, "/Set/Cable")
-    cable.CreatePointsAttr([(3, 0, 0), (3, 4, 0)])
-    cable.CreateCurveVertexCountsAttr([2])
-    stage.GetRootLayer().Save()
-    rigged = read_rigged_hair(baked)
-    scene, meshes = rigged_scene(rigged), rigged.source.meshes
-    begin = 0
-    for mesh in meshes:
-        end = begin + len(mesh.points)
-        assert (scene.mesh_hair[begin:end] == ("hair" in mesh.prim.GetName().lower())).all()
-        begin = end
-    picture = np.asarray(Image.open(preview(baked, tmp_path / "hair.png", size=(120, 160))).convert("RGB"), float)
-    assert picture.shape == (160, 6 * 124 - 4, 3)
-    brown = picture[..., 0] - picture[..., 2] > 30
-    panels = [brown[:, i * 124 : i * 124 + 120] for i in range(6)]
-    assert all(panel.mean() > 0.02 for panel in panels)
-    assert (panels[0] != panels[4]).mean() > 0.02
-
-
-def test_joints_without_a_mesh_have_no_picture(tmp_path):
-    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
-    from usd.picture import preview
-
-    path = small_shot(tmp_path / "shot.usda")
-    stage = Usd.Stage.Open(str(path))
-    stage.RemovePrim("/Who/Hair")
-    stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="no mesh"):
-        preview(path, tmp_path / "hair.png")
-    assert not (tmp_path / "hair.png").exists()
 
 
 def test_a_vrm_avatar_through_blender(tmp_path):

@@ -9,7 +9,7 @@ import torch
 
 from neuralocks_core.physics import self_collision as volume
 from neuralocks_core.physics.adhesion import adhesion
-from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
+from neuralocks_core.physics.bend_twist import Cosserat, bend_twist
 from neuralocks_core.physics.body_collision import LINEAR, body_collision
 from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
 from neuralocks_core.physics.gravity import gravity
@@ -17,43 +17,9 @@ from neuralocks_core.physics.hair_style import hair_style
 from neuralocks_core.physics.inertia import damping, inertia
 from neuralocks_core.physics.rods import rods
 from neuralocks_core.physics.stretch import stretch
-from neuralocks_core.physics.transport import loop_frames, scan_frames
+from tests.core.physics.strands import moved, neighbours, rotation, straight
 
 G = torch.tensor([0.0, -9.81, 0.0], dtype=torch.float64)
-
-
-@pytest.fixture
-def curls():
-    """Four curly strands of 12 vertices, float64."""
-    t = torch.linspace(0, 1, 12, dtype=torch.float64)
-    shift = torch.arange(4.0, dtype=torch.float64)[:, None]
-    helix = [0.02 * torch.cos(9 * t + shift), -0.2 * t + 0 * shift, 0.02 * torch.sin(9 * t + shift) + 0.004 * shift]
-    return torch.stack(helix, -1)
-
-
-def _rotation(angle=0.7):
-    c, s = math.cos(angle), math.sin(angle)
-    about_y = torch.tensor([[c, 0, s], [0, 1, 0], [-s, 0, c]], dtype=torch.float64)
-    about_x = torch.tensor([[1, 0, 0], [0, c, -s], [0, s, c]], dtype=torch.float64)
-    return about_x @ about_y
-
-
-def _straight(vertices=24, length=0.24, direction=(0.0, -1.0, 0.0)):
-    along = torch.linspace(0, length, vertices, dtype=torch.float64)
-    return (along[:, None] * torch.tensor(direction, dtype=torch.float64))[None]
-
-
-def _moved(curls, seed=1, amount=0.004):
-    generator = torch.Generator().manual_seed(seed)
-    return curls + amount * torch.randn(curls.shape, generator=generator, dtype=torch.float64)
-
-
-def _neighbours(strands=4, vertices=12):
-    index = torch.arange(strands * vertices).reshape(strands, vertices)
-    pairs = torch.stack([index.roll(1, 0), index.roll(-1, 0)], -1).to(torch.int32)
-    pairs[:, 5, 1] = -1
-    pairs[:, 0] = -1
-    return pairs
 
 
 def _potentials(rest):
@@ -72,8 +38,8 @@ def _potentials(rest):
         "damping": lambda x: damping(x, rest, r, 1 / 30, 10.0),
         "body": lambda x: body_collision(x, r, planes),
         "style": lambda x: hair_style(x, r, distance),
-        "adhesion": lambda x: adhesion(x, r, _neighbours()),
-        "adhesion of the paper": lambda x: adhesion(x, r, _neighbours(), rest_distance=False),
+        "adhesion": lambda x: adhesion(x, r, neighbours()),
+        "adhesion of the paper": lambda x: adhesion(x, r, neighbours(), rest_distance=False),
         "volume": lambda x: volume.self_collision(x, r, dense),
         "volume of the paper": lambda x: volume.self_collision(x, r, dense, relative=False),
     }
@@ -84,7 +50,7 @@ NAMES = tuple(_potentials(torch.zeros(4, 12, 3, dtype=torch.float64) + torch.ara
 
 @pytest.mark.parametrize("name", NAMES)
 def test_gradients_are_those_of_finite_differences(curls, name):
-    start = _moved(curls).requires_grad_()
+    start = moved(curls).requires_grad_()
     energy = _potentials(curls)[name]
     assert energy(start).abs().max() > 0, "an energy that is zero here tests nothing"
     assert torch.autograd.gradcheck(energy, (start,), eps=1e-7, atol=1e-5, rtol=1e-4)
@@ -92,7 +58,7 @@ def test_gradients_are_those_of_finite_differences(curls, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_batch_of_frames_is_each_frame_alone(curls, name):
-    frames = torch.stack([_moved(curls, seed) for seed in range(3)])
+    frames = torch.stack([moved(curls, seed) for seed in range(3)])
     energy = _potentials(curls)[name]
     torch.testing.assert_close(energy(frames), torch.stack([energy(frame) for frame in frames]))
 
@@ -104,78 +70,26 @@ def test_the_rest_shape_has_no_energy(curls):
 
 def test_moving_without_deforming_costs_nothing(curls):
     away = curls + torch.tensor([0.3, -0.2, 0.5], dtype=torch.float64)
-    turned = curls @ _rotation().T
+    turned = curls @ rotation().T
     for name in ("stretch", *(f"bend {form.value}" for form in Cosserat), "adhesion", "adhesion of the paper"):
         energy = _potentials(curls)[name]
         torch.testing.assert_close(energy(away), energy(curls), atol=1e-12, rtol=1e-9)
     # The whole space turned, rest shape and all, is the same strand.
-    x = _moved(curls)
+    x = moved(curls)
     for name in ("stretch", "adhesion", "volume", *(f"bend {form.value}" for form in Cosserat)):
-        here, there = _potentials(curls)[name](x), _potentials(turned)[name](x @ _rotation().T)
+        here, there = _potentials(curls)[name](x), _potentials(turned)[name](x @ rotation().T)
         torch.testing.assert_close(there, here, atol=1e-12, rtol=1e-6)
 
 
-def test_an_arch_bent_from_straight_has_the_energy_of_its_curvature():
-    """k/2 integral of 1/R^2: per inner vertex 2 k / l (2 sin(l / 2R) / 2)^2, which tends to k l / 2 R^2."""
-    radius, count = 0.1, 200
-    angle = torch.linspace(0, 1.5, count, dtype=torch.float64)
-    arch = radius * torch.stack([1 - torch.cos(angle), -torch.sin(angle), 0 * angle], -1)[None]
-    chord = float((arch[0, 1] - arch[0, 0]).norm())
-    first = (arch[0, 1] - arch[0, 0]) / chord
-    straight = arch[:, :1] + torch.arange(count, dtype=torch.float64)[:, None] * chord * first
-    for form in (Cosserat.EXACT, Cosserat.LOOP, Cosserat.DIRECT):
-        energy = bend_twist(arch, rods(straight), 2.0, form)
-        expected = 0.5 * 2.0 / radius**2 * radius * 1.5 * (count - 2) / (count - 1)
-        assert energy.item() == pytest.approx(expected, rel=1e-4)
-
-
-def test_the_two_exact_transports_agree_and_are_orthogonal_to_the_tangent(curls):
-    edges = torch.nn.functional.normalize(_moved(curls).diff(dim=-2), dim=-1)
-    torch.testing.assert_close(scan_frames(edges), loop_frames(edges), atol=1e-14, rtol=0)
-    strain = bend_difference(_moved(curls), curls, Cosserat.SCAN)
-    torch.testing.assert_close(strain, bend_difference(_moved(curls), curls, Cosserat.LOOP), atol=1e-13, rtol=0)
-
-
-def test_transported_frames_turn_the_root_edge_into_each_edge(curls):
-    from neuralocks_core.physics.transport import conjugate, direct_frames, product
-
-    edges = torch.nn.functional.normalize(curls.diff(dim=-2), dim=-1)
-    root = torch.nn.functional.pad(edges[..., :1, :].expand_as(edges), (1, 0))
-    for frames in (scan_frames(edges), direct_frames(edges)):
-        turned = product(product(frames, root), conjugate(frames))[..., 1:]
-        torch.testing.assert_close(turned, edges, atol=1e-12, rtol=0)
-
-
-def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
-    """The strain's part along the edge, in the edge's own frame, is twist; a curl that is drawn has none of it."""
-    t = torch.linspace(0, 1, 24, dtype=torch.float64)
-    curl = torch.stack([0.03 * torch.cos(19 * t), -0.2 * t, 0.03 * torch.sin(19 * t)], -1)[None]
-    straight = _straight()
-    root = torch.nn.functional.normalize(curl.diff(dim=-2), dim=-1)[:, :1]
-    along = [
-        (bend_difference(curl, straight, form) * root).sum(-1).abs().max().item()
-        for form in (Cosserat.EXACT, Cosserat.DIRECT)
-    ]
-    assert along[0] < 1e-9 and along[1] > 0.05
-
-
-def test_folding_back_is_finite_in_value_and_gradient():
-    back = torch.tensor([[0.0, 0, 0], [0, -1, 0], [0, -2, 0], [0, -1, 0], [0, 0, 0], [0, -1, 0]])[None] * 0.01
-    for form in Cosserat:
-        x = back.clone().requires_grad_()
-        bend_twist(x, rods(_straight(6, 0.05).float()), form=form).sum().backward()
-        assert x.grad.isfinite().all()
-
-
 def test_a_stretched_strand_by_hand():
-    r = rods(_straight(3, 0.2))
-    x = _straight(3, 0.22)
+    r = rods(straight(3, 0.2))
+    x = straight(3, 0.22)
     assert stretch(x, r, 50.0).item() == pytest.approx(2 * 25.0 * 0.1 * 0.1**2)
     assert stretch(x, r, 50.0, per_edge=True).item() == pytest.approx(2 * 25.0 * 0.01**2)
 
 
 def test_gravity_pulls_down_and_a_standing_strand_is_held():
-    standing = _straight(direction=(0.0, 1.0, 0.0))
+    standing = straight(direction=(0.0, 1.0, 0.0))
     for supported in (False, True):
         x = standing.clone().requires_grad_()
         gravity(x, rods(standing, supported=supported), G).sum().backward()
@@ -185,7 +99,7 @@ def test_gravity_pulls_down_and_a_standing_strand_is_held():
 
 
 def test_hanging_hair_needs_no_support_and_the_bind_pose_is_an_equilibrium(curls):
-    assert rods(_straight()).support[:, 1:].abs().max() < 1e-15
+    assert rods(straight()).support[:, 1:].abs().max() < 1e-15
     # With the support the net load on every vertex is what tension along its own edges balances: for a strand whose
     # edges may turn but not stretch, no direction change lowers the energy at rest.
     r = rods(curls)
@@ -206,7 +120,7 @@ def test_the_support_is_the_reference_solvers(curls):
 
 def test_free_fall_has_no_inertia_force_against_gravity():
     """Minimising inertia + gravity over one step gives x_t = 2 x_{t-1} - x_{t-2} + dt^2 g."""
-    dt, rest = 1 / 30, _straight()
+    dt, rest = 1 / 30, straight()
     r = rods(rest, supported=False)
     before2, before = rest, rest + dt * 0.2
     x = (2 * before - before2 + dt * dt * G).requires_grad_()
@@ -215,7 +129,7 @@ def test_free_fall_has_no_inertia_force_against_gravity():
 
 
 def test_the_past_takes_gradient_only_when_asked():
-    rest = _straight()
+    rest = straight()
     before = rest.clone().requires_grad_()
     assert not inertia(rest + 0.01, before, rest, rods(rest), 1 / 30).requires_grad
     inertia(rest + 0.01, before, rest, rods(rest), 1 / 30, detach=False).sum().backward()
@@ -223,7 +137,7 @@ def test_the_past_takes_gradient_only_when_asked():
 
 
 def test_damping_takes_half_of_the_rates_power_over_a_step():
-    rest = _straight()
+    rest = straight()
     x = (rest + 0.003).requires_grad_()
     r = rods(rest)
     damping(x, rest, r, 0.1, 5.0).sum().backward()
@@ -231,7 +145,7 @@ def test_damping_takes_half_of_the_rates_power_over_a_step():
 
 
 def test_the_body_pushes_outward_with_a_bounded_force_and_not_at_the_root():
-    rest = _straight(direction=(1.0, 0.0, 0.0))
+    rest = straight(direction=(1.0, 0.0, 0.0))
     planes = torch.tensor([0.0, 1.0, 0.0, 0.0], dtype=torch.float64).expand(1, 24, 4)
     r = rods(rest)
 
@@ -247,7 +161,7 @@ def test_the_body_pushes_outward_with_a_bounded_force_and_not_at_the_root():
 
 
 def test_the_style_fades_with_the_distance_to_the_body():
-    rest = _straight()
+    rest = straight()
     x = rest + 0.01
     far = torch.linspace(0, 0.06, 24, dtype=torch.float64)[None]
     r = rods(rest)
@@ -256,14 +170,14 @@ def test_the_style_fades_with_the_distance_to_the_body():
 
 
 def test_each_frame_of_a_batch_may_have_neighbours_of_its_own(curls):
-    r, x = rods(curls), torch.stack([_moved(curls, 1), _moved(curls, 2)])
-    both = torch.stack([_neighbours(), _neighbours().flip(-1)])
+    r, x = rods(curls), torch.stack([moved(curls, 1), moved(curls, 2)])
+    both = torch.stack([neighbours(), neighbours().flip(-1)])
     expected = torch.stack([adhesion(x[i], r, both[i]) for i in range(2)])
     torch.testing.assert_close(adhesion(x, r, both), expected)
 
 
 def test_adhesion_by_hand_and_lagged_force_is_half():
-    rest = torch.cat([_straight(), _straight() + torch.tensor([0.005, 0, 0])])
+    rest = torch.cat([straight(), straight() + torch.tensor([0.005, 0, 0])])
     r, k = rods(rest), 60.0
     pair = torch.arange(48).reshape(2, 24, 1).flip(0).to(torch.int32)
     x = rest.clone()
@@ -303,7 +217,7 @@ def test_the_sum_names_only_what_acts(curls):
         gravity=G,
         planes=torch.zeros(4, 12, 4, dtype=torch.float64),
         distance=torch.zeros(4, 12, dtype=torch.float64),
-        neighbours=_neighbours(),
+        neighbours=neighbours(),
         rest_density=torch.ones(4, 12, dtype=torch.float64),
         before=curls,
         before2=curls,

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bending and twisting: curvature, transported frames, and what each form gets wrong."""
+
+import pytest
+import torch
+
+from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
+from neuralocks_core.physics.rods import rods
+from neuralocks_core.physics.transport import loop_frames, scan_frames
+from tests.core.physics.strands import moved, straight
+
+
+def test_an_arch_bent_from_straight_has_the_energy_of_its_curvature():
+    """k/2 integral of 1/R^2: per inner vertex 2 k / l (2 sin(l / 2R) / 2)^2, which tends to k l / 2 R^2."""
+    radius, count = 0.1, 200
+    angle = torch.linspace(0, 1.5, count, dtype=torch.float64)
+    arch = radius * torch.stack([1 - torch.cos(angle), -torch.sin(angle), 0 * angle], -1)[None]
+    chord = float((arch[0, 1] - arch[0, 0]).norm())
+    first = (arch[0, 1] - arch[0, 0]) / chord
+    straight = arch[:, :1] + torch.arange(count, dtype=torch.float64)[:, None] * chord * first
+    for form in (Cosserat.EXACT, Cosserat.LOOP, Cosserat.DIRECT):
+        energy = bend_twist(arch, rods(straight), 2.0, form)
+        expected = 0.5 * 2.0 / radius**2 * radius * 1.5 * (count - 2) / (count - 1)
+        assert energy.item() == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_two_exact_transports_agree_and_are_orthogonal_to_the_tangent(curls):
+    edges = torch.nn.functional.normalize(moved(curls).diff(dim=-2), dim=-1)
+    torch.testing.assert_close(scan_frames(edges), loop_frames(edges), atol=1e-14, rtol=0)
+    strain = bend_difference(moved(curls), curls, Cosserat.SCAN)
+    torch.testing.assert_close(strain, bend_difference(moved(curls), curls, Cosserat.LOOP), atol=1e-13, rtol=0)
+
+
+def test_transported_frames_turn_the_root_edge_into_each_edge(curls):
+    from neuralocks_core.physics.transport import conjugate, direct_frames, product
+
+    edges = torch.nn.functional.normalize(curls.diff(dim=-2), dim=-1)
+    root = torch.nn.functional.pad(edges[..., :1, :].expand_as(edges), (1, 0))
+    for frames in (scan_frames(edges), direct_frames(edges)):
+        turned = product(product(frames, root), conjugate(frames))[..., 1:]
+        torch.testing.assert_close(turned, edges, atol=1e-12, rtol=0)
+
+
+def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
+    """The strain's part along the edge, in the edge's own frame, is twist; a curl that is drawn has none of it."""
+    t = torch.linspace(0, 1, 24, dtype=torch.float64)
+    curl = torch.stack([0.03 * torch.cos(19 * t), -0.2 * t, 0.03 * torch.sin(19 * t)], -1)[None]
+    uncurled = straight()
+    root = torch.nn.functional.normalize(curl.diff(dim=-2), dim=-1)[:, :1]
+    along = [
+        (bend_difference(curl, uncurled, form) * root).sum(-1).abs().max().item()
+        for form in (Cosserat.EXACT, Cosserat.DIRECT)
+    ]
+    assert along[0] < 1e-9 and along[1] > 0.05
+
+
+def test_folding_back_is_finite_in_value_and_gradient():
+    back = torch.tensor([[0.0, 0, 0], [0, -1, 0], [0, -2, 0], [0, -1, 0], [0, 0, 0], [0, -1, 0]])[None] * 0.01
+    for form in Cosserat:
+        x = back.clone().requires_grad_()
+        bend_twist(x, rods(straight(6, 0.05).float()), form=form).sum().backward()
+        assert x.grad.isfinite().all()
