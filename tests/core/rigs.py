@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small humanoid for tests: six joints, and motions whose answers are known."""
+"""A small humanoid for tests: six joints, hair, and motions whose answers are known."""
 
 import numpy as np
 
 from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.strands import StrandSet, strand_set
 
 NAMES = ("hips", "hips/spine", "hips/spine/neck", "hips/spine/neck/head", "hips/spine/arm_L", "hips/spine/arm_R")
 PARENTS = (-1, 0, 1, 2, 1, 1)
@@ -38,3 +40,16 @@ def moved(times, offset=None, head_turn=None, loop=False) -> Clip:
     if head_turn is not None:
         joints[:, HEAD, :3, :3] = head_turn(times)
     return Clip(times, joints, loop=loop)
+
+
+def straight_hair(count=200, seed=0) -> StrandSet:
+    """Strands that leave the upper half of the humanoid's head and hang."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(count, 3))
+    normal[:, 1] = np.abs(normal[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    s = np.linspace(0, 1, 24)
+    points = normal[:, None] * (0.09 + 0.05 * s[:, None]) + (s**1.3)[:, None] * [0, -0.2, 0]
+    points += bind()[HEAD, :3, 3]
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(count, 24), np.full(1, 1e-4, np.float32))
+    return strand_set(groom, bind()[HEAD, :3, 3], np.zeros(3))

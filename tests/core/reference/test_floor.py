@@ -8,7 +8,7 @@ pytest.importorskip("warp", reason="the reference needs warp")
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.reference import simulate, stateless_floor
-from tests.core.reference.test_rods import carried, groom, shaken, sphere
+from tests.core.reference.swinging_heads import carried, groom, shaken, sphere
 
 
 def test_floor_falls_with_history():

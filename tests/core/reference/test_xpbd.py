@@ -8,7 +8,7 @@ pytest.importorskip("warp", reason="the reference needs warp")
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.reference import simulate, simulate_xpbd
-from tests.core.reference.test_rods import carried, edge_lengths, groom, shaken, sphere
+from tests.core.reference.swinging_heads import carried, edge_lengths, groom, shaken, sphere
 
 
 def test_small_steps_and_newton_agree():

@@ -18,8 +18,7 @@ from neuralocks_core.training.moments import MomentPool, nearest_planes
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.selfsupervised import paper_boundary, train_on_moments
-from tests.core.rigs import HEAD, bind, person
-from tests.core.training.test_train import straight_hair
+from tests.core.rigs import HEAD, bind, person, straight_hair
 
 SPEC = BoundarySpec(bins=(1,) * 8)
 

@@ -6,10 +6,8 @@ import pytest
 
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.groom import Groom
 from neuralocks_core.random_motion import scripted_clip
-from neuralocks_core.strands import strand_set
-from tests.core.rigs import HEAD, bind, person
+from tests.core.rigs import person, straight_hair
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
@@ -21,19 +19,6 @@ from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.regression import RegressionOptions
 from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
 from neuralocks_core.training.train import train_strands
-
-
-def straight_hair(count=200, seed=0):
-    """Strands that leave the upper half of a head and hang."""
-    rng = np.random.default_rng(seed)
-    normal = rng.normal(size=(count, 3))
-    normal[:, 1] = np.abs(normal[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    s = np.linspace(0, 1, 24)
-    points = normal[:, None] * (0.09 + 0.05 * s[:, None]) + (s**1.3)[:, None] * [0, -0.2, 0]
-    points += bind()[HEAD, :3, 3]
-    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(count, 24), np.full(1, 1e-4, np.float32))
-    return strand_set(groom, bind()[HEAD, :3, 3], np.zeros(3))
 
 
 @pytest.fixture(scope="module")
