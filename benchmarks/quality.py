@@ -28,7 +28,7 @@ from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strand_session import StrandSession
-from neuralocks_core.strands import strand_set
+from neuralocks_core.strands import strands_on
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
@@ -49,11 +49,8 @@ class Bench:
         self.styles = {n: g for n, g in zip(STYLES, scene.grooms) if not styles or n in styles}
         if grooms:
             roots = np.concatenate([g.rest[g.valid, 0] for g in scene.grooms])
-            to_bind, placed = scene.character.canonical_to_bind, on_head(grooms, scene.character, roots)
-            self.styles = {
-                path.stem: strand_set(g, to_bind[:3, 3], scene.character.head_centre, scene.character.facing)
-                for path, g in placed.items()
-            }
+            placed = on_head(grooms, scene.character, roots)
+            self.styles = {path.stem: strands_on(scene.character, g) for path, g in placed.items()}
         self.body = hair_body(scene.character, reach=0.9)
         count = len(scene.character.body.shapes)
         self.shape = np.zeros(count)
@@ -85,8 +82,7 @@ class Bench:
 
     def bind_body(self) -> np.ndarray:
         """Collision vertices at rest, canonical (V, 3)."""
-        to_bind = self.character.canonical_to_bind
-        return (self.body.shaped(self.shape) - to_bind[:3, 3]) @ to_bind[:3, :3]
+        return self.character.canonical(self.body.shaped(self.shape))
 
     def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times) -> np.ndarray:
         """The network's displacement (T, n, 24, 3)."""

@@ -58,7 +58,7 @@ def rows(paths, model=None, frames=None):
 
     shot = read_shot(SHOT)
     character = shot.grooms[0].attachment.character
-    fitted = on_head(paths, character, canonical(character, roots(shot.grooms[0].groom)))
+    fitted = on_head(paths, character, character.canonical(roots(shot.grooms[0].groom)))
     with tempfile.TemporaryDirectory() as folder:
         for path, groom in fitted.items():
             scene = write_scene(Path(folder) / f"{path.stem}.usda", groom, character)
@@ -148,12 +148,6 @@ def lengths(groom: Groom) -> np.ndarray:
     from neuralocks_core.arclength import arc_lengths
 
     return arc_lengths(groom)[1]
-
-
-def canonical(character, points: np.ndarray) -> np.ndarray:
-    """Canonical coordinates (n, 3) of bind-world points."""
-    to_bind = character.canonical_to_bind
-    return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
 
 if __name__ == "__main__":

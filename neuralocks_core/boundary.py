@@ -18,7 +18,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import SEMANTIC
 from neuralocks_core.measures import MEASURES, body_measures
-from neuralocks_core.motion import GRAVITY, Clip
+from neuralocks_core.motion import GRAVITY, Clip, G
 
 POSE_JOINTS = ("neck", "upper_chest", "left_shoulder", "right_shoulder", "left_upper_arm", "right_upper_arm")
 MATERIALS = 4
@@ -190,7 +190,7 @@ class BoundarySampler:
         head = now[:, 0]
         relative = np.swapaxes(head[:, None], -1, -2) @ now[:, 2:] @ self.stance
         result[:, parts["pose"]] = relative[..., :2].swapaxes(-1, -2).reshape(len(times), -1)
-        static = np.einsum("nji,j->ni", head, GRAVITY / 9.81)
+        static = np.einsum("nji,j->ni", head, GRAVITY / G)
         result[:, parts["gravity"]] = static
         result[:, parts["shape"]] = [self._measures(shape) for shape in self.clip.shape_at(times)]
         result[:, parts["material"]] = material
@@ -203,7 +203,7 @@ class BoundarySampler:
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
-        result[parts["gravity"]] = GRAVITY / 9.81
+        result[parts["gravity"]] = GRAVITY / G
         result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
         result[parts["material"]] = material
         return result
@@ -240,7 +240,7 @@ class BoundarySampler:
         columns = []
         if spec.linear == "gravity":
             acceleration = (position[:, :-2] - 2 * position[:, 1:-1] + position[:, 2:]) / spec.dt**2
-            felt = np.einsum("nkij,nkj->nki", to_head, GRAVITY - acceleration) / 9.81
+            felt = np.einsum("nkij,nkj->nki", to_head, GRAVITY - acceleration) / G
             columns.append(_limited(felt - static[:, None], self.GRAVITY_LIMIT))
         elif spec.linear == "velocity":
             velocity = (position[:, :-2] - position[:, 1:-1]) / spec.dt

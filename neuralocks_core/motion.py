@@ -8,7 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from neuralocks_core.errors import NeuralocksError
 
-GRAVITY = np.array([0.0, -9.81, 0.0])
+G = 9.81
+"""Size of gravity [m/s^2]."""
+GRAVITY = np.array([0.0, -G, 0.0])
 """[m/s^2], Y up."""
 LARGEST_CLIP = 4_000_000
 """Joint samples held of one file's animation: 512 MB. More than that is a stray key frame, not a shot."""

@@ -34,7 +34,6 @@ class NearBody:
         self.skin: Skin | None = None
         if len(self.head.moving):
             used, triangles = np.unique(self.head.moving, return_inverse=True)
-            self._used = used
             self.skin = Skin(points[used], triangles.reshape(-1, 3))
             rows = np.repeat(np.arange(len(used)), body.joint_indices.shape[1])
             columns, weights = body.joint_indices[used].ravel(), body.joint_weights[used].ravel()

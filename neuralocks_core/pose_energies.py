@@ -7,6 +7,7 @@ What training minimises is `physics/energies.py`.
 import numpy as np
 
 from neuralocks_core.materials import Material
+from neuralocks_core.motion import G
 
 STRETCH = 1000.0
 """Stiffness against stretch [m^2/s^2]."""
@@ -41,7 +42,7 @@ def energies(
     change = curvature(points) - curvature(rest[None])
     bend = 0.5 * material.bend * (np.square(change).sum(axis=-1) / between).sum(axis=(1, 2))
     return {
-        "gravity": -9.81 * material.weight * (mass * drop).sum(axis=(1, 2)) / total,
+        "gravity": -G * material.weight * (mass * drop).sum(axis=(1, 2)) / total,
         "bend": bend / total,
     }
 

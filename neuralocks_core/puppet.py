@@ -8,7 +8,7 @@ from scipy.interpolate import BPoly
 
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
-from neuralocks_core.motion import Clip
+from neuralocks_core.motion import Clip, G
 
 UP, SIDE, FRONT = np.eye(3)[1], np.eye(3)[0], np.eye(3)[2]
 """Canonical axes: Y up, X to the character's left, Z to its front."""
@@ -133,12 +133,12 @@ def leap(
         down: time of the crouch [s].
         recover: time to stand up again [s].
     """
-    speed = np.sqrt(2 * 9.81 * height)
-    phases = [down, 2.2 * deep / speed, 2 * speed / 9.81, 2.2 * soft / speed, 0.04, recover]
+    speed = np.sqrt(2 * G * height)
+    phases = [down, 2.2 * deep / speed, 2 * speed / G, 2.2 * soft / speed, 0.04, recover]
     knots = start + np.cumsum([0, *phases])
     states = [  # height, speed, acceleration at each knot
-        *[[0, 0, 0], [-deep, 0, 0], [0, speed, -9.81]],
-        *[[0, -speed, -9.81], [-soft, 0, 0], [-soft, 0, 0], [0, 0, 0]],
+        *[[0, 0, 0], [-deep, 0, 0], [0, speed, -G]],
+        *[[0, -speed, -G], [-soft, 0, 0], [-soft, 0, 0], [0, 0, 0]],
     ]
     return BPoly.from_derivatives(knots, states)(np.clip(times, knots[0], knots[-1])), float(knots[-1])
 

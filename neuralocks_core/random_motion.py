@@ -11,7 +11,7 @@ import numpy as np
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import Clip
+from neuralocks_core.motion import Clip, G
 from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing
 
 KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
@@ -199,11 +199,11 @@ def _fall_and_stop(puppet: Puppet, dice: _Dice) -> None:
     """Free fall, as from a platform, and a hard stop."""
     times, start = puppet.times, dice.start(0.4)
     height, brake = dice.between(0.2, 0.9), dice.between(0.06, 0.2)
-    fall = np.sqrt(2 * height / 9.81)
-    speed = 9.81 * fall
+    fall = np.sqrt(2 * height / G)
+    speed = G * fall
     t = np.clip(times - start, 0, fall)
     s = np.clip(times - start - fall, 0, brake)
-    puppet.position -= (0.5 * 9.81 * t**2 + speed * (s - s**2 / (2 * brake)))[:, None] * UP
+    puppet.position -= (0.5 * G * t**2 + speed * (s - s**2 / (2 * brake)))[:, None] * UP
     puppet.bend_spine(pulse(times, start + fall, 0.15, 0.05, 0.4)[:, None] * SIDE * dice.between(0.0, 0.3))
 
 

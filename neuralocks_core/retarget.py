@@ -52,39 +52,6 @@ def retarget(motion: Motion, character: Character) -> Clip:
     return Clip(motion.clip.times, joints)
 
 
-def mirrored(clip: Clip, character: Character) -> Clip:
-    """The clip with left and right exchanged, for a rig whose bind pose is about symmetric.
-
-    A rotation R since the bind pose becomes S R S, with S the reflection of the canonical X axis, and moves to the
-    joint of the other side. Roots and hips mirror their path; all other joints keep their own bones' lengths.
-    """
-    skeleton = character.skeleton
-    twin = _twins(character)
-    flip = character.facing.T @ np.diag([-1.0, 1, 1]) @ character.facing
-    turned = clip.joints[..., :3, :3] @ np.linalg.inv(skeleton.bind[:, :3, :3])
-    joints = np.tile(np.eye(4), (*clip.joints.shape[:2], 1, 1))
-    joints[..., :3, :3] = (flip @ turned[:, twin] @ flip) @ skeleton.bind[:, :3, :3]
-    moved = clip.joints[..., :3, 3][:, twin] - skeleton.bind[twin, :3, 3]
-    joints[..., :3, 3] = skeleton.bind[:, :3, 3] + moved @ flip.T
-    hips = character.humanoid.get("hips", 0)
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0 and joint != hips:
-            bone = np.linalg.inv(skeleton.bind[parent]) @ skeleton.bind[joint, :, 3]
-            joints[:, joint, :3, 3] = (joints[:, parent] @ bone)[:, :3]
-    return Clip(clip.times, joints, clip.shape, clip.loop)
-
-
-def _twins(character: Character) -> np.ndarray:
-    """Index of each joint's mirror image (J,): the joint nearest to its reflected bind place, or itself."""
-    bind = character.skeleton.bind[:, :3, 3] @ character.facing.T
-    middle = bind[character.head, 0]
-    reflected = bind * [-1, 1, 1] + [2 * middle, 0, 0]
-    distance = np.linalg.norm(reflected[:, None] - bind[None], axis=-1)
-    twin = distance.argmin(axis=1)
-    fits = (distance[np.arange(len(twin)), twin] < 0.06) & (twin[twin] == np.arange(len(twin)))
-    return np.where(fits, twin, np.arange(len(twin)))
-
-
 def _turns(motion: Motion, source: Character, character: Character) -> dict[int, np.ndarray]:
     """World rotations (T, 3, 3) since the bind pose per joint of the character, canonical axes."""
     moved = source.relative_rotations(motion.clip.joints, np.arange(len(source.skeleton.names)))

@@ -9,7 +9,7 @@ import numpy as np
 from neuralocks_core import comparison, metrics
 from neuralocks_core.arclength import arc_lengths
 from neuralocks_core.materials import Material
-from neuralocks_core.motion import GRAVITY
+from neuralocks_core.motion import GRAVITY, G
 from neuralocks_core.pose_energies import energies, stretch_energy
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
@@ -140,7 +140,7 @@ class _Subject:
         rig = self.item.attachment.rig
         joints = np.stack([rig.joints_at(code) for code in baked.codes])
         turn = self.character.canonical_to_world(joints)[:, :3, :3]
-        down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / 9.81)
+        down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / G)
         result = {
             "strands": self.item.groom.strand_count,
             "measured": len(self.chosen),

@@ -6,8 +6,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-GRAVITY = 9.81
-"""[m/s^2], along -Y of the bind pose."""
+from neuralocks_core.motion import G
 
 
 def rest_support(rest: Tensor, mass: Tensor) -> Tensor:
@@ -28,7 +27,7 @@ def rest_support(rest: Tensor, mass: Tensor) -> Tensor:
     edge = rest.diff(dim=-2)
     edge = edge / edge.square().sum(-1, keepdim=True).clamp_min(1e-18).sqrt()
     down = torch.zeros_like(rest[..., 0, :])
-    down[..., 1] = -GRAVITY
+    down[..., 1] = -G
     pull = torch.zeros_like(down)
     support = []
     for i in range(rest.shape[-2] - 1, 0, -1):

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-
-GRAVITY = 9.81
-"""[m/s^2], along -Y of the bind pose."""
+from neuralocks_core.motion import GRAVITY
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ def _support(direction: np.ndarray, mass: np.ndarray) -> np.ndarray:
     support = np.zeros((*mass.shape, 3))
     pull = np.zeros((len(mass), 3))
     for i in range(mass.shape[1] - 1, 0, -1):
-        load = pull + mass[:, i, None] * np.array([0.0, -GRAVITY, 0.0])
+        load = pull + mass[:, i, None] * GRAVITY
         edge = direction[:, i - 1]
         carried = np.maximum((load * edge).sum(-1, keepdims=True), 0.0) * edge
         support[:, i] = carried - load

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import G
 from neuralocks_core.reference.arguments import Progress, check_body, check_material, check_neighbours
 from neuralocks_core.reference.head_motion import head_motion
-from neuralocks_core.reference.rest import GRAVITY, rest_rods
+from neuralocks_core.reference.rest import rest_rods
 
 SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
@@ -48,7 +49,7 @@ def simulate(
     bind_body: np.ndarray | None = None,
     margin: float = 0.004,
     collision: float = 1e6,
-    gravity: float = GRAVITY,
+    gravity: float = G,
     volume: float = 0.0,
     device: str = "cpu",
     progress: Progress | None = None,

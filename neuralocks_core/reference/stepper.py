@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import G
 from neuralocks_core.reference.device import start_warp
 from neuralocks_core.reference.rest import RestRods
 
@@ -54,7 +55,7 @@ class Stepper:
         self.widest, self.tolerance = margin, tolerance
         self.gravity = wp.vec3d(0.0, -gravity, 0.0)
         self.rest = self._vectors(rods.points)
-        self.support = self._vectors(rods.support * (gravity / 9.81))
+        self.support = self._vectors(rods.support * (gravity / G))
         self.constants = energy_kernels.Rods()
         self.constants.length = self._reals(rods.length)
         self.constants.mass = self._reals(rods.mass)
@@ -165,7 +166,7 @@ class Stepper:
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()
         planes[:] = self.planes.numpy()
-        residual = np.sqrt(np.mean(self.residual.numpy() ** 2)) / 9.81
+        residual = np.sqrt(np.mean(self.residual.numpy() ** 2)) / G
         return float(residual), float(self.used.numpy().mean())
 
     def _solve(self, dt: float, iterations: int, settling: int) -> None:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import G
 from neuralocks_core.reference.arguments import Progress, check_body, check_material
 from neuralocks_core.reference.device import start_warp
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
-from neuralocks_core.reference.rest import GRAVITY, RestRods, rest_rods
+from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.rods import Rollout
 
 REACH = 0.1
@@ -29,7 +30,7 @@ def simulate_xpbd(
     rest_support: bool = True,
     bind_body: np.ndarray | None = None,
     margin: float = 0.004,
-    gravity: float = GRAVITY,
+    gravity: float = G,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> Rollout:
@@ -86,7 +87,7 @@ class _Hair:
         free = (np.arange(vertices) > 1)[None]
         self.length, self.inverse_mass = self._reals(rods.length), self._reals(free / rods.mass)
         self.curl, self.home = self._vectors(rods.curl), self._vectors(rods.points)
-        self.push = self._vectors(rods.support / rods.mass[..., None] * (gravity / GRAVITY))
+        self.push = self._vectors(rods.support / rods.mass[..., None] * (gravity / G))
         self.stiffness = self._reals(np.maximum(4 * material["bend"][:, None] / rods.mass, 1e-9))
         self.weight, self.damping = self._numbers(material["weight"]), self._numbers(material["damping"])
         self.gravity = wp.vec3(0.0, -gravity, 0.0)

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.strands import K
 
 LATENT = 32
 
@@ -51,12 +52,12 @@ def train_autoencoder(
         NeuralocksError: there are no strands, or they are not finite.
     """
     shapes = np.asarray(shapes, np.float32)
-    if shapes.ndim != 3 or shapes.shape[1:] != (24, 3) or not len(shapes):
-        raise NeuralocksError(f"strand shapes: {shapes.shape} is not (n > 0, 24, 3); give resampled strands")
+    if shapes.ndim != 3 or shapes.shape[1:] != (K, 3) or not len(shapes):
+        raise NeuralocksError(f"strand shapes: {shapes.shape} is not (n > 0, {K}, 3); give resampled strands")
     if not np.isfinite(shapes).all():
         raise NeuralocksError("strand shapes: some vertices are not finite; clean the groom first")
     generator = torch.Generator().manual_seed(seed)
-    data = torch.from_numpy(shapes.reshape(len(shapes), 72)).to(device)
+    data = torch.from_numpy(shapes.reshape(len(shapes), 3 * K)).to(device)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         model = StrandAutoencoder(principal=principal).to(device)
@@ -93,12 +94,12 @@ class StrandAutoencoder(nn.Module):
 
     def __init__(self, hidden: int = 256, latent: int = LATENT, *, principal: bool = True):
         super().__init__()
-        self.encoder = _mlp(72, hidden, latent)
-        self.decoder = _mlp(latent, hidden, 72)
-        self.into = nn.Linear(72, latent, bias=False) if principal else None
-        self.back = nn.Linear(latent, 72, bias=False) if principal else None
-        self.register_buffer("mean", torch.zeros(72))
-        self.register_buffer("scale", torch.ones(72))
+        self.encoder = _mlp(3 * K, hidden, latent)
+        self.decoder = _mlp(latent, hidden, 3 * K)
+        self.into = nn.Linear(3 * K, latent, bias=False) if principal else None
+        self.back = nn.Linear(latent, 3 * K, bias=False) if principal else None
+        self.register_buffer("mean", torch.zeros(3 * K))
+        self.register_buffer("scale", torch.ones(3 * K))
 
     @torch.no_grad()
     def set_normalisation(self, shapes: Tensor) -> None:
@@ -106,7 +107,7 @@ class StrandAutoencoder(nn.Module):
         (n, 72) shapes.
         """
         self.mean.copy_(shapes.mean(0))
-        spread = (shapes - self.mean).square().reshape(-1, 24, 3).mean((0, 2)).sqrt()
+        spread = (shapes - self.mean).square().reshape(-1, K, 3).mean((0, 2)).sqrt()
         # Vertices near the root hardly vary: dividing by nothing would make noise of them.
         spread = spread.clamp_min(max(float(spread.max()) * 0.1, 1e-4))
         self.scale.copy_((1.0 / spread).repeat_interleave(3))
@@ -135,13 +136,13 @@ class StrandAutoencoder(nn.Module):
     @torch.no_grad()
     def errors(self, shapes: np.ndarray) -> np.ndarray:
         """(n, 24, 3) strands -> (n, 24) distance between each vertex and its reconstruction, metres."""
-        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 72)).to(self.mean.device)
-        return (self(flat) - flat).reshape(-1, 24, 3).norm(dim=-1).cpu().numpy()
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 3 * K)).to(self.mean.device)
+        return (self(flat) - flat).reshape(-1, K, 3).norm(dim=-1).cpu().numpy()
 
     @torch.no_grad()
     def codes(self, shapes: np.ndarray) -> np.ndarray:
         """(n, 24, 3) strands -> (n, 32) float32 codes."""
-        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 72)).to(self.mean.device)
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 3 * K)).to(self.mean.device)
         return self.encode(flat).cpu().numpy()
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from neuralocks_core.strands import K
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
 
@@ -124,7 +125,7 @@ def _encoder_graph(layers, into) -> bytes:
         graph.mlp("shape", layers, "code")
     else:
         graph.node("Add", [graph.linear("shape", into, "flat"), graph.mlp("shape", layers, "bent")], "code")
-    return graph.finish({"shape": ("S", 72)}, {"code": ("S", len(_weights(layers[-1])[1]))})
+    return graph.finish({"shape": ("S", 3 * K)}, {"code": ("S", len(_weights(layers[-1])[1]))})
 
 
 def _strand_graph(layer) -> bytes:

@@ -16,6 +16,7 @@ from torch import Tensor
 
 from neuralocks_core.locks import lock_mates, neighbours
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.motion import GRAVITY
 from neuralocks_core.physics.body_collision import MARGIN
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density
@@ -26,7 +27,6 @@ MOMENTS = 6
 """Moments taken from each random clip."""
 DEEPEST = 0.04
 """[m] A nearest surface farther than this is no contact: the plane through it means nothing there."""
-GRAVITY = np.array([0.0, -9.81, 0.0])
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class MomentPool:
         margin = np.full(rest.shape[:2], MARGIN, np.float32)
         body = self._maker.body
         if body is not None:
-            points = self._maker.canonical(body.shaped(draw.shape))
+            points = self.scene.character.canonical(body.shaped(draw.shape))
             planes, _ = nearest_planes(cKDTree(points), vertex_normals(points, body.triangles), rest)
             own = (planes[..., :3] * rest).sum(-1) - planes[..., 3]
             margin = np.minimum(margin, own).astype(np.float32)

@@ -7,7 +7,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-VERTICES = 24
+from neuralocks_core.strands import K
+
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
 CODES = slice(2, 66)
@@ -41,7 +42,7 @@ class StrandNet(nn.Module):
         frame_size: int,
         strand_size: int = 70,
         hidden: int = 256,
-        outputs: int = 3 * VERTICES,
+        outputs: int = 3 * K,
         *,
         motion: str = "linear",
     ):

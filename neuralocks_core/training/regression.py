@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.strand_session import strand_inputs
+from neuralocks_core.strands import K
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform
@@ -193,7 +194,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])
-    offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
+    offsets = offsets.unflatten(-1, (K, 3))
     moved = deform(offsets[:, :-1], batch["rest"][:, None], offsets[:, -1:], options.output)
     error = moved - batch["moved"]
     length = batch["length"][:, None, :, None]
@@ -239,13 +240,13 @@ def predicted(
     device = next(net.parameters()).device
     strands = net.strand_part(torch.from_numpy(bank.inputs[rollout.groom][chosen]).to(device))
     frames = np.concatenate([rollout.vectors, rollout.bind[None]])
-    result = np.empty((len(rollout.vectors), len(chosen), 24, 3), np.float32)
+    result = np.empty((len(rollout.vectors), len(chosen), K, 3), np.float32)
     kinds, kind = np.unique(rollout.materials, axis=0, return_inverse=True)
     for i, material in enumerate(kinds):
         group = np.flatnonzero(kind.ravel() == i)
         frames[:, bank.material] = material
         offsets = net.tail(strands[None, group], net.frame_part(torch.from_numpy(frames).to(device))[:, None])
-        offsets = offsets.reshape(*offsets.shape[:-1], 24, 3)
+        offsets = offsets.unflatten(-1, (K, 3))
         rest = torch.from_numpy(rollout.rest[group]).to(device)
         anchor = offsets[-1:] if anchored else None
         result[:, group] = deform(offsets[:-1], rest, anchor, output).cpu().numpy()

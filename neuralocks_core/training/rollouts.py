@@ -123,7 +123,7 @@ class RolloutMaker:
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
-            self._surface = cKDTree(self.canonical(scene.character.body.points))
+            self._surface = cKDTree(scene.character.canonical(scene.character.body.points))
 
     def make(self, index: int) -> Rollout:
         """Rollout number `index`."""
@@ -145,7 +145,7 @@ class RolloutMaker:
             substeps=scene.substeps,
             rest_support=scene.rest_support,
             neighbours=lock_mates(rest, groom.lock[draw.strands]),
-            bind_body=None if self.body is None else self.canonical(self.body.shaped(shape)),
+            bind_body=None if self.body is None else scene.character.canonical(self.body.shaped(shape)),
         )
         moved = result.points - rest[None].astype(np.float32)
         planes = result.planes.copy()
@@ -184,14 +184,10 @@ class RolloutMaker:
         return Draw(which, strands, tuple(by_lock[i] for i in lock), shape, *self._motion(rng, shape))
 
     def vectors(self, draw: Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
+        """Boundary vectors (T, F) of a draw, and the anchor's (F,)."""
         sampler = BoundarySampler(spec, self.scene.character, draw.clip)
         log = draw.materials[0].log_ratios()
         return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
-
-    def canonical(self, points: np.ndarray) -> np.ndarray:
-        """Canonical coordinates of bind-world points (n, 3)."""
-        to_bind = self.scene.character.canonical_to_bind
-        return (points - to_bind[:3, 3]) @ to_bind[:3, :3]
 
     def _locks(self, which: int, rng) -> np.ndarray:
         """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood."""
