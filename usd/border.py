@@ -2,13 +2,14 @@
 """Where a stage's unit, up axis and rate are converted to metres, Y up and seconds: once, here."""
 
 import math
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Tf, Usd, UsdGeom
+from pxr import Ar, Gf, Tf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
@@ -102,6 +103,23 @@ def open_stage(path) -> Usd.Stage:
     if stage is None:
         raise NeuralocksError(f"{path}: not a readable USD file; export it again")
     return stage
+
+
+def used_files(stage: Usd.Stage) -> list[str]:
+    """Files that the stage is composed of."""
+    # What lies inside a package is of the package's file.
+    paths = (layer.realPath for layer in stage.GetUsedLayers())
+    return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})
+
+
+def check_not_input(out: Path, stage: Usd.Stage) -> None:
+    """Refuse to write over a file that the stage is composed of.
+
+    Raises:
+        NeuralocksError: `out` is one of them, by whatever name.
+    """
+    if out.exists() and any(os.path.exists(path) and os.path.samefile(out, path) for path in used_files(stage)):
+        raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
 
 
 def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:

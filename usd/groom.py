@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 
-from .border import Border, open_stage, write_stage
+from .border import Border, check_not_input, open_stage, write_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .placement import Placement
@@ -45,7 +45,7 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     """
     source = Path(source)
     if source.suffix.lower() in USD:
-        found, notes = _read_usd(source, unit, up)
+        found, notes = _read_usd(source, Path(out), unit, up)
     else:
         from neuralocks_core import formats
 
@@ -122,8 +122,9 @@ def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()
 
 
 @names_damage
-def _read_usd(source: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[str]]:
+def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[tuple[Groom, Spline]], list[str]]:
     stage = open_stage(source)
+    check_not_input(out, stage)
     border = Border.of(stage)
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)

@@ -13,6 +13,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
 
+from .border import check_not_input
 from .groom import write_groom
 from .stage import read_rigs
 
@@ -41,6 +42,7 @@ def grow(
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
     """
     rig = read_rigs(character, skeleton, head)[0]
+    check_not_input(Path(out), rig.source.prim.GetStage())
     return write_groom(out, Barber(rig.character).grow(style, count, seed))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from pxr import Ar, Sdf, Tf, Usd, UsdUtils, Vt
+from pxr import Sdf, Tf, Usd, UsdUtils, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
@@ -215,10 +215,3 @@ class _named:
                 f"{self._out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
             ) from None
         return False
-
-
-def used_files(stage: Usd.Stage) -> list[str]:
-    """Files that the stage is composed of."""
-    # What lies inside a package is of the package's file.
-    paths = (layer.realPath for layer in stage.GetUsedLayers())
-    return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})

@@ -3,7 +3,6 @@
 the network.
 """
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
+from .border import check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
@@ -79,15 +79,12 @@ def bake_rig(
     out, shot = Path(out), Path(shot)
     if out.suffix not in (".usd", ".usda", ".usdc"):
         raise NeuralocksError(f"{out}: not a USD file name; end it in .usd, .usda or .usdc")
-    if out.exists() and shot.exists() and os.path.samefile(out, shot):
-        raise NeuralocksError(f"{out}: the output would overwrite the shot; choose another name")
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     hair = _read(shot, skeleton, head, model)
     source = hair.source.source
-    if str(out.resolve()) in {layer.realPath for layer in hair.stage.GetUsedLayers()}:
-        raise NeuralocksError(f"{out}: the output is part of the shot; choose another name")
+    check_not_input(out, hair.stage)
     _check_moves(hair)
     codes = _codes(hair, frames, subframes)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip

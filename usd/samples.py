@@ -16,8 +16,9 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from .border import check_not_input, used_files
 from .damage import names_damage
-from .override import OverrideWriter, reload_open, to_text, used_files
+from .override import OverrideWriter, reload_open, to_text
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
 from .stencils import Stencils
@@ -63,7 +64,7 @@ def write_samples(
         NeuralocksError: the file cannot be written. Nothing is left then, neither under its name nor beside it; only a
             stop by the user leaves the finished frames, to go on from.
     """
-    _check_not_input(out, shot)
+    check_not_input(out, shot.stage)
     _check_space(out, shot, len(codes), velocities)
     facts = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], facts))
@@ -153,11 +154,6 @@ class _Store:
                 part *= np.float32(weight)
                 result += part
             yield result
-
-
-def _check_not_input(out: Path, shot: Shot) -> None:
-    if os.path.realpath(out) in {os.path.realpath(path) for path in used_files(shot.stage)}:
-        raise NeuralocksError(f"{out}: is part of the shot itself; choose another name for the bake")
 
 
 def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Usd
 
-from usd.border import Border
-from usd.override import used_files, write_header
+from usd.border import Border, used_files
+from usd.override import write_header
 
 SHOT = """#usda 1.0
 (
