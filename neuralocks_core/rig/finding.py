@@ -13,6 +13,9 @@ from neuralocks_core.rig.hair_names import says_face, says_hair
 from neuralocks_core.rig.measuring import measured_chains
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
+CAP = 0.7
+"""Of the head's width and depth, what skin must cover to be a cap."""
+
 
 class NoHairChains(NeuralocksError):
     """No joint is hair, or none has the names that were given."""
@@ -88,20 +91,37 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         used |= drives
         if (drives & outside).any():
             body |= drives
-    tops, todo = [], list(children[head])
+    tops, todo = [], [(joint, False) for joint in children[head]]
     while todo:
-        joint = todo.pop()
+        joint, worn = todo.pop()
         tree = np.flatnonzero(skeleton.below(joint))
         hair = says_hair(names[joint])
-        if says_face(names[joint]) and not hair or meshes and not used[tree].any():
+        if meshes and not used[tree].any():
             continue
+        # Below a jaw or a hat only a name makes hair.
+        worn = worn or says_face(names[joint]) and not hair
+        below = [(child, worn) for child in children[joint]]
         # A holder that drives nothing is no bone of hair: its children are. Without meshes only a fan tells.
-        if (not used[joint] and children[joint]) if meshes else len(children[joint]) > 1:
-            todo += children[joint]
+        if (not used[joint] and below) if meshes else len(below) > 1:
+            todo += below
             continue
         strange = len(tree) > 1 and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
-        if hair or strange:
-            tops.append(joint)
+        if not hair and (worn or not strange) or used[tree[1:]].any() and _is_cap(character, joint, meshes):
+            todo += below
         else:
-            todo += children[joint]
+            tops.append(joint)
     return tops
+
+
+def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:
+    """Whether a joint drives the hair on top of the skull: skin nearly as wide and as deep as the head's own. Turned, it
+    would go through the forehead; what moves hangs from it.
+    """
+    sizes = []
+    for owner in (joint, character.head):
+        only = np.arange(len(character.skeleton.names)) == owner
+        points = np.concatenate([mesh.points[mesh.weight_on(only) > 0.5] for mesh in meshes])
+        if len(points) < 8:
+            return False
+        sizes.append(np.ptp(character.canonical(points)[:, [0, 2]], axis=0))
+    return bool((sizes[0] > CAP * sizes[1]).all())

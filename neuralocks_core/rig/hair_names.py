@@ -1,36 +1,64 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joint names that say hair, and those that say another part of the head."""
+"""Joint names that say hair, and those that say another part of the head or what it wears."""
 
 import re
 
 from neuralocks_core.joint_names import leaf
 
 _HAIR = (
-    "hair|pony|braid|bang|fringe|tress|strand|lock|curl|pigtail|twintail|ahoge|kami|mane|plait|dread|bun|forelock"
-    "|sideburn|tuft"
+    "hair|pony|braid|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|pigtail|twintail|ahoge|kami|mane|plait|dread"
+    "|bun(?!ny)|forelock|sideburn|tuft"
 )
 _FACE = (
     "eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead|pupil|iris"
-    "|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
+    "|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn|whisker|m(?:o)?ustache|bunny"
+    "|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
+    "|antenna|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
+    "|(?:bow|pin|clip|cap|hood|veil|mask|halo|bell|gem|wing|mic)s?$"
 )
-_HAIR_PARTS = ("hair", "pigtail", "twintail", "sidetail", "髪", "アホ毛", "おさげ", "ツインテ", "ポニテ", "もみあげ")
-"""Hair wherever in a name they stand; the last ones are those of MikuMikuDance rigs, in files with UTF-8 names."""
+_HAIR_ANYWHERE = re.compile(
+    "hair|pigtail|twintail|sidetail"
+    "|髪|アホ毛|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ"
+    "|头发|髮|刘海|马尾|辫|呆毛|머리카락|앞머리|뒷머리|옆머리"
+)
+"""Wherever in a name they stand; those of MikuMikuDance rigs come in files with UTF-8 names."""
+_FACE_ANYWHERE = re.compile(
+    "headphone|headset|headband|headdress|headgear|headwear"
+    "|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|耳|鼻|頬|ほほ|ひげ|髭|角"
+    "|メガネ|めがね|帽|カチューシャ|ヘッド|ピアス|イヤリング|ティアラ|マスク|ゴーグル|かんざし|簪|冠|鈴|ネコミミ"
+    "|下巴|蝴蝶结|눈|턱|혀|귀|안경|모자"
+)
+_WORN_IN_HAIR = re.compile(
+    r"hair(?:pin|clip|band|tie|bow|accessor|ornament|decor|net|flower)|ribbon"
+    r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止)|发(?:带|夹|卡)"
+)
+"""Ribbons and pins are stiff, or have an animation of their own: they ride on the hair or the head."""
 
 
 def says_hair(name: str) -> bool:
-    """Whether a joint's path or name says hair: `Hair_L.001`, `frontHair2` and `PigTail_L` do, `earring` does not."""
-    whole = _own(name).lower().replace("_", "")
-    return _begins(name, _HAIR) or any(part in whole for part in _HAIR_PARTS)
+    """Whether a joint's path or name says hair: `Hair_L.001`, `frontHair2` and `PigTail_L` do, `earring` and `hairpin` do not."""
+    whole = _whole(name)
+    if _WORN_IN_HAIR.search(whole):
+        return False
+    if _begins(name, _HAIR) or _HAIR_ANYWHERE.search(whole):
+        return True
+    # Below a head these are hair, unless another word says what is meant: `brow_tail`, まつ毛.
+    return not says_face(name) and (_begins(name, "tail") or "毛" in whole)
 
 
 def says_face(name: str) -> bool:
     """Whether a joint's path or name says a part of the face, or what a head wears."""
-    return _begins(name, _FACE)
+    whole = _whole(name)
+    return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _WORN_IN_HAIR.search(whole))
 
 
 def _begins(name: str, words: str) -> bool:
     parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", _own(name))
     return any(re.match(f"(?:{words})", part.lower()) for part in parts)
+
+
+def _whole(name: str) -> str:
+    return _own(name).lower().replace("_", "")
 
 
 def _own(name: str) -> str:

@@ -58,6 +58,35 @@ def test_hair_in_compound_and_japanese_names():
     assert find_chains(who, [body]).names == ("PigTailL_1", "左髪_1")
 
 
+@pytest.mark.parametrize(
+    "name", ["リボン", "左耳", "メガネ", "ribbon", "HairPin_L", "BunnyEar_L", "HeadBand", "brow_tail"]
+)
+def test_what_a_head_wears_is_no_hair(name):
+    """In no language, though it has a mesh of its own and an end joint; hair below it is hair by its name."""
+    who = character([*tail(name, 2), *tail("後ろ毛", 2, parent=f"{name}_1"), *tail("x", 2, parent=f"{name}_1")])
+    points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
+    meshes = [skin(who, {joint: points}) for joint in (f"{name}_1", "後ろ毛_1", "x_1")]
+    assert find_chains(who, meshes).names == ("後ろ毛_1",)
+
+
+def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
+    """Turned, it would take all hair through the forehead: the tails that hang from it move."""
+    who = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3, parent="Hair")])
+    ring = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1) * [0.1, 1, 0.1]
+    tails = skin(who, {"Hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "Hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
+
+    def driven(joint, points):
+        index = [n.rsplit("/", 1)[-1] for n in who.skeleton.names].index(joint)
+        return replace(
+            tails, points=points, joint_indices=np.full((12, 1), index), joint_weights=np.ones((12, 1)), triangles=[]
+        )
+
+    head = driven("head", ring)
+    assert find_chains(who, [head, tails, driven("Hair", ring * [1.1, 1, 1.1])]).names == ("Hair_1", "Hair_2")
+    lock = ring * [0.2, 1, 0.2]
+    assert find_chains(who, [head, tails, driven("Hair", lock)]).names == ("Hair", "Hair_1", "Hair_2")
+
+
 def test_a_branching_chain_is_one_chain():
     """Both branches hang from the joint that forks, and its bones go to both."""
     fork = tail("hair_a", 3, at=(0.02, 1.5, -0.1), parent="hair_2") + tail(
