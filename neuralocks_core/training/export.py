@@ -7,12 +7,10 @@ import numpy as np
 import torch
 from torch import nn
 
+from neuralocks_core.onnx_graph import OnnxGraph
 from neuralocks_core.strands import K
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
-
-OPSET = 17
-IR_VERSION = 8  # the oldest that goes with this opset, for the oldest onnxruntime a user may have
 
 
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction") -> dict[str, bytes]:
@@ -58,14 +56,8 @@ def _weights(layer: nn.Linear | tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarr
     return layer if isinstance(layer, tuple) else (_array(layer), layer.bias.detach().float().cpu().numpy())
 
 
-class _Graph:
-    """A chain of layers under construction; values are known by their names."""
-
-    def __init__(self, name: str):
-        from onnx import helper, numpy_helper
-
-        self.helper, self.numpy_helper = helper, numpy_helper
-        self.name, self.nodes, self.constants = name, [], []
+class _Graph(OnnxGraph):
+    """A graph of layers; weights behind a deep map of the frame are stored in float16."""
 
     def linear(self, value: str, layer, output: str | None = None, *, half: bool = False) -> str:
         """x W^T + b of a linear layer, or of its folded arrays; `half` stores W in float16."""
@@ -90,33 +82,6 @@ class _Graph:
         stored = self.constant(f"{name}.half", array.astype(np.float16))
         self.nodes.append(self.helper.make_node("Cast", [stored], [name], to=1))
         return name
-
-    def constant(self, name: str, array: np.ndarray) -> str:
-        """An array under this name, which is returned."""
-        self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
-        return name
-
-    def node(self, kind: str, inputs: list[str], output: str) -> str:
-        """One operation of ONNX; the name of its only output is returned."""
-        self.nodes.append(self.helper.make_node(kind, inputs, [output]))
-        return output
-
-    def finish(self, inputs: dict[str, tuple], outputs: dict[str, tuple]) -> bytes:
-        """The checked graph; inputs and outputs are names -> shapes, where a name in a shape is any size."""
-        import onnx
-
-        def describe(values):
-            return [self.helper.make_tensor_value_info(k, onnx.TensorProto.FLOAT, v) for k, v in values.items()]
-
-        graph = self.helper.make_graph(self.nodes, self.name, describe(inputs), describe(outputs), self.constants)
-        model = self.helper.make_model(
-            graph,
-            opset_imports=[self.helper.make_opsetid("", OPSET)],
-            ir_version=IR_VERSION,
-            producer_name="neuralocks",
-        )
-        onnx.checker.check_model(model)
-        return model.SerializeToString(deterministic=True)
 
 
 def _encoder_graph(layers, into) -> bytes:

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writing ONNX graphs node by node; needs the extra `train`."""
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+
+OPSET = 17
+
+
+class OnnxGraph:
+    """A graph under construction; values are known by their names.
+
+    Args:
+        name: of the graph.
+        ir_version: of the file; 8 is the oldest that goes with OPSET, for the oldest onnxruntime that a user may have.
+
+    Raises:
+        NeuralocksError: onnx is not installed.
+    """
+
+    def __init__(self, name: str, ir_version: int = 8):
+        try:
+            from onnx import helper, numpy_helper
+        except ImportError:
+            raise NeuralocksError(
+                "onnx: not installed, it writes the model's graph; pip install 'neuralocks[train]'"
+            ) from None
+        self.helper, self.numpy_helper = helper, numpy_helper
+        self.name, self.ir_version, self.nodes, self.constants = name, ir_version, [], []
+
+    def constant(self, name: str, array: np.ndarray) -> str:
+        """An array under this name, which is returned."""
+        self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
+        return name
+
+    def node(self, kind: str, inputs: list[str], output: str, **attributes) -> str:
+        """One operation of ONNX; the name of its only output is returned."""
+        self.nodes.append(self.helper.make_node(kind, inputs, [output], **attributes))
+        return output
+
+    def finish(self, inputs: dict[str, tuple], outputs: dict[str, tuple]) -> bytes:
+        """The checked graph; inputs and outputs are names -> shapes, where a name in a shape is any size."""
+        import onnx
+
+        def describe(values):
+            return [self.helper.make_tensor_value_info(k, onnx.TensorProto.FLOAT, v) for k, v in values.items()]
+
+        graph = self.helper.make_graph(self.nodes, self.name, describe(inputs), describe(outputs), self.constants)
+        model = self.helper.make_model(
+            graph,
+            opset_imports=[self.helper.make_opsetid("", OPSET)],
+            ir_version=self.ir_version,
+            producer_name="neuralocks",
+        )
+        onnx.checker.check_model(model)
+        return model.SerializeToString(deterministic=True)
