@@ -8,21 +8,19 @@ named like a head.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pxr import Usd, UsdGeom
-from scipy.spatial import cKDTree
+from pxr import Usd
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
 
 from .border import transformed
-from .curves import rest_points
+from .curves import moment, rest_points
 from .placement import Placement
 from .rig_source import StageRig
-from .surface import SkinnedMesh, bound_skeleton, geom_bind, joint_influences, rest_value
+from .seat import NEAR, Seat, find_seat, kinship, some_roots, ways
+from .surface import bound_skeleton, geom_bind, joint_influences
 
-NEAR = 0.03
-"""Roots this far from a mesh, in the median, still sit on it [m]."""
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
 ALIKE = 2e-3
@@ -41,6 +39,8 @@ class Attachment:
         to_bind: the prim's own space to bind world [m], (4, 4).
         how: the carrying joint and how it was found, in words.
         skinned: whether UsdSkel would deform the prim itself.
+        at_default: the same way of points that would be authored at the default time, (4, 4), where the shot has none
+            but those of a moving cache; else None.
         far: distance of the roots from the joint [m] where neither a binding nor a skin below says that it
             carries them and they lie out of its reach; else 0.
     """
@@ -50,6 +50,7 @@ class Attachment:
     to_bind: np.ndarray
     how: str
     skinned: bool
+    at_default: np.ndarray | None = None
     far: float = 0.0
 
 
@@ -85,7 +86,9 @@ def attach(
             skinned=True,
         )
     else:
-        found = _on_mesh(prim, rigs, placement, notes) or _by_name(prim, rigs, placement, head)
+        seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement)) is not None]
+        found = _on_mesh(prim, seats, placement, notes) or _by_name(prim, rigs, placement, head)
+        notes += _floats(path, found, seats)
     name = rig_joint(found)
     if head and name.split("/")[-1] != head.split("/")[-1]:
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
@@ -108,59 +111,33 @@ def rig_joint(found: Attachment) -> str:
     return found.rig.source.names[found.character.head]
 
 
-def _on_mesh(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, notes: list[str]) -> Attachment | None:
+def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment | None:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
-    roots = _some_roots(prim)
-    seats = [seat for rig in rigs if (seat := _seat(roots, rig, placement)) is not None and seat.distance <= NEAR]
+    seats = [seat for seat in seats if seat.distance <= NEAR]
     if not seats:
         return None
     nearest = min(seat.distance for seat in seats)
     alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
     # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
-    seat = min(alike, key=lambda seat: (-_kinship(prim, seat.rig), seat.way, seat.distance))
+    seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
     rig, mesh = seat.rig, seat.mesh
     shares = _shares(rig, mesh.indices[seat.points], mesh.weights[seat.points])
     joint, why = _carrier(rig, shares)
     notes += _spread(rig, str(prim.GetPath()), joint, shares)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
-    return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False)
+    at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
+    return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
 
 
-@dataclass(frozen=True)
-class _Seat:
-    """How a groom would sit on a rig's nearest mesh.
-
-    Attributes:
-        distance: of its roots from the mesh, in the median [m].
-        rig, mesh: on what.
-        to_bind: its way to bind world, (4, 4).
-        way: that way's place in `_ways`.
-        points: the mesh's nearest point to each root.
-    """
-
-    distance: float
-    rig: StageRig
-    mesh: SkinnedMesh
-    to_bind: np.ndarray
-    way: int
-    points: np.ndarray
-
-
-def _seat(roots: np.ndarray, rig: StageRig, placement: Placement) -> _Seat | None:
-    best = None
-    for mesh in rig.meshes:
-        tree = cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind))
-        for way, to_bind in enumerate(_ways(rig, mesh, placement)):
-            distance, points = tree.query(transformed(roots, to_bind))
-            middle = float(np.median(distance))
-            if best is None or middle < best.distance - 1e-4:
-                best = _Seat(middle, rig, mesh, to_bind, way, points)
-    return best
-
-
-def _kinship(prim: Usd.Prim, rig: StageRig) -> int:
-    """How many of their parents a groom and a skeleton share."""
-    return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
+def _floats(path: str, found: Attachment, seats: list[Seat]) -> list[str]:
+    """What to say of hair that lies off the skin of what carries it."""
+    off = min((seat.distance for seat in seats if seat.rig is found.rig), default=0.0)
+    if off <= NEAR or found.far:
+        return []
+    return [
+        f"{path}: its roots lie {off:.2g} m from the skin of {found.rig.path} and keep that distance; "
+        "check that it was made for this pose"
+    ]
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -170,18 +147,19 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         raise NeuralocksError(
             f"{path}: no joint of {rigs[0].path} is named like a head; name the joint that carries it with --head JOINT"
         )
-    roots = _some_roots(prim)
+    roots = some_roots(prim)
 
     def away(rig: StageRig, to_bind: np.ndarray) -> float:
         head_at = rig.character.canonical_to_bind[:3, 3]
         return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
 
-    far = [(min(away(rig, way) for way in _ways(rig, None, placement)), rig) for rig in able]
+    when = moment(prim)
+    far = [(min(away(rig, way) for way in ways(rig, None, placement, when)), rig) for rig in able]
     # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
     least = min(distance for distance, _ in far)
     close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
-    kin = max(_kinship(prim, rig) for _, rig in close)
-    close = [(distance, rig) for distance, rig in close if _kinship(prim, rig) == kin]
+    kin = max(kinship(prim, rig) for _, rig in close)
+    close = [(distance, rig) for distance, rig in close if kinship(prim, rig) == kin]
     nearest, rig = close[0]
     out_of_reach = nearest > max(REACH, _trunk(rig))
     if len(close) > 1 and not out_of_reach:
@@ -189,48 +167,18 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         raise NeuralocksError(
             f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
         )
-    to_bind = min(_ways(rig, None, placement), key=lambda way: round(away(rig, way), 3))
+    to_bind = min(ways(rig, None, placement, when), key=lambda way: round(away(rig, way), 3))
+    at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
-    return Attachment(
-        rig=rig, character=rig.character, to_bind=to_bind, how=how, skinned=False, far=nearest if out_of_reach else 0.0
-    )
+    far = nearest if out_of_reach else 0.0
+    return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
 
 
 def _trunk(rig: StageRig) -> float:
     """Distance of the carrying joint from the hips [m]."""
     bind = rig.character.skeleton.bind[:, :3, 3]
     return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
-
-
-def _ways(rig: StageRig, mesh: SkinnedMesh | None, placement: Placement) -> list[np.ndarray]:
-    """Candidates for the way from the groom's own space to bind world, the likeliest first."""
-    ways = []
-    if placement.samples and rig.source.animated:
-        # A prim that is moved along by its parents: where it stood against the head when that motion began.
-        when = placement.samples[0]
-        carried = rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
-        ways.append(np.linalg.inv(carried) @ rig.border.to_core @ placement.at(when))
-    groom = placement.reference
-    if mesh is not None:
-        ways.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
-    ways.append(rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom)
-    ways.append(rig.to_bind @ groom)
-    return ways
-
-
-def _some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
-    """Up to `most` finite roots (n, 3) in the prim's own space."""
-
-    points = rest_points(prim)
-    counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
-    starts = np.cumsum(counts) - counts
-    starts = starts[(counts > 0) & (starts >= 0) & (starts < len(points))]
-    roots = points[starts[:: max(1, len(starts) // most)]] if len(starts) else points[:1]
-    roots = roots[np.isfinite(roots).all(axis=1)]
-    if not len(roots):
-        raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
-    return roots
 
 
 def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -60,6 +60,14 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
     return np.asarray(points, np.float32)
 
 
+def moment(prim: Usd.Prim) -> float | None:
+    """Time code of which the points taken for those at rest are, where they are one sample of a moving cache."""
+    points = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    if points.Get(Usd.TimeCode.Default()) is not None or not points.ValueMightBeTimeVarying():
+        return None
+    return float(points.GetTimeSamples()[0])
+
+
 def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     """The groom at rest in bind-world metres.
 
@@ -73,6 +81,8 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     """
     curves, path = UsdGeom.BasisCurves(prim), str(prim.GetPath())
     points = rest_points(prim)
+    if (when := moment(prim)) is not None:
+        notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
     counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
     scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
     uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdUtils, Vt
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
 
-from .border import Border, first_line
+from .border import Border, first_line, transformed
+from .curves import rest_points
 from .stage import Shot, StageGroom
 
 SAVE_EVERY = 32 << 20
@@ -55,7 +56,10 @@ class OverrideWriter:
             relation.targetPathList.ClearEditsAndMakeExplicit()
         names = Sdf.ValueTypeNames
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
-        Sdf.AttributeSpec(over, "points", names.Point3fArray)
+        points = Sdf.AttributeSpec(over, "points", names.Point3fArray)
+        if UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(Usd.TimeCode.Default()) is None:
+            # Else the first baked sample would be the shape at rest to whoever reads the bake.
+            points.default = Vt.Vec3fArray.FromNumpy(_at_default(item))
         # What the shot says of motion is not that of these points: a renderer would blur by it.
         authored = {name for name in ("velocities", "accelerations") if item.prim.GetAttribute(name).HasAuthoredValue()}
         if velocities:
@@ -189,6 +193,14 @@ def _corners(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         parts += [rows.min(axis=0).reshape(-1, 3), rows.max(axis=0).reshape(-1, 3)]
     few = np.concatenate(parts)
     return few.min(axis=0), few.max(axis=0)
+
+
+def _at_default(item: StageGroom) -> np.ndarray:
+    """Points at rest (P, 3) float32 of a groom that has none at the default time."""
+    points, attachment = rest_points(item.prim), item.attachment
+    if attachment.at_default is None:
+        return points
+    return transformed(points, np.linalg.inv(attachment.at_default) @ attachment.to_bind).astype(np.float32)
 
 
 def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where curves that nothing binds lie in a rig's bind pose, and on which skin.
+
+A file does not say of what their place in the stage is the place: of the bind pose, of a skin elsewhere in the stage,
+or of the pose at one moment. That of curves that move with the head or are a moving cache is of a moment; of the rest
+it is where their roots lie on skin.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Usd, UsdGeom
+from scipy.spatial import cKDTree
+
+from neuralocks_core.errors import NeuralocksError
+
+from .border import transformed
+from .curves import moment, rest_points
+from .placement import Placement
+from .rig_source import StageRig
+from .surface import SkinnedMesh, rest_value
+
+NEAR = 0.03
+"""Roots this far from a mesh, in the median, still sit on it [m]."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """How a groom would sit on a rig's nearest mesh.
+
+    Attributes:
+        distance: of its roots from the mesh, in the median [m].
+        rig, mesh: on what.
+        to_bind: its way to bind world, (4, 4).
+        way: that way's place among `ways`.
+        points: the mesh's nearest point to each root.
+    """
+
+    distance: float
+    rig: StageRig
+    mesh: SkinnedMesh
+    to_bind: np.ndarray
+    way: int
+    points: np.ndarray
+
+
+def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement) -> Seat | None:
+    """A groom on a rig's nearest skin, however far that is; None where the rig has no skin."""
+    roots, when, best = some_roots(prim), moment(prim), None
+    trees = [cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind)) for mesh in rig.meshes]
+
+    def nearest(best: Seat | None, mesh, tree, way: int, to_bind) -> Seat:
+        distance, points = tree.query(transformed(roots, to_bind))
+        middle = float(np.median(distance))
+        better = best is None or middle < best.distance - 1e-4
+        return Seat(middle, rig, mesh, to_bind, way, points) if better else best
+
+    for likely in (True, False):
+        for mesh, tree in zip(rig.meshes, trees, strict=True):
+            for way, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely)):
+                best = nearest(best, mesh, tree, way if likely else way + 9, to_bind)
+        if best is not None and best.distance <= NEAR:
+            break
+    return best
+
+
+def ways(
+    rig: StageRig,
+    mesh: SkinnedMesh | None,
+    placement: Placement,
+    when: float | None = None,
+    *,
+    likely: bool = True,
+) -> list[np.ndarray]:
+    """Candidates (4, 4) for the way from the groom's own space to bind world, the likeliest first.
+
+    Args:
+        rig: what carries the groom.
+        mesh: its skin below the groom, if it has one.
+        placement: where the groom's prim stands.
+        when: time code at which the groom has the points it is read with, if they are no points at rest.
+        likely: those that serve unless skin says otherwise, or the others.
+    """
+    groom = placement.reference
+    still = []
+    if mesh is not None:
+        still.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
+    still += [rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom, rig.to_bind @ groom]
+    if not rig.source.animated:
+        return still if likely else []
+    if when is not None:  # it is seen where it is then
+        return [_posed(rig, placement, when)] if likely else still
+    if not placement.samples or _steady(placement, rig.source.placement.at):
+        # Or it was made where the character stands when its motion begins.
+        return still if likely else [_posed(rig, placement, float(rig.time_codes[0]))]
+    # A prim that is moved along by its parents: where it stood against the head when that motion began.
+    posed = [_posed(rig, placement, placement.samples[0])]
+    if _steady(placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core):
+        return posed if likely else still
+    return posed + still if likely else []
+
+
+def kinship(prim: Usd.Prim, rig: StageRig) -> int:
+    """How many of their parents a groom and a skeleton share."""
+    return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
+
+
+def some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
+    """Up to `most` finite roots (n, 3) in the prim's own space.
+
+    Raises:
+        NeuralocksError: no root is finite.
+    """
+    points = rest_points(prim)
+    counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
+    starts = np.cumsum(counts) - counts
+    starts = starts[(counts > 0) & (starts >= 0) & (starts < len(points))]
+    roots = points[starts[:: max(1, len(starts) // most)]] if len(starts) else points[:1]
+    roots = roots[np.isfinite(roots).all(axis=1)]
+    if not len(roots):
+        raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
+    return roots
+
+
+def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
+    """The way of a groom that lies right on the head as it is at a time code."""
+    return np.linalg.inv(_carried(rig, when)) @ rig.border.to_core @ placement.at(when)
+
+
+def _carried(rig: StageRig, when: float) -> np.ndarray:
+    """What the head does to bind world [m] at a time code, (4, 4)."""
+    return rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
+
+
+def _steady(placement: Placement, against: Callable[[float], np.ndarray], most: int = 16) -> bool:
+    """Whether a moving prim stands still against something else in stage space, which then is what moves it."""
+    times = placement.samples[:: max(1, len(placement.samples) // most)]
+    places = np.stack([placement.at(time) for time in times])
+    relative = np.stack([np.linalg.inv(against(time)) for time in times]) @ places
+    turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
+    reach = max(1.0, np.abs(places[..., 3]).max(), np.abs(relative[..., 3]).max())
+    return bool(turned <= 1e-4 * np.abs(relative[0, :3, :3]).max() and moved <= 1e-4 * reach)
