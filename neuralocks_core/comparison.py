@@ -6,14 +6,18 @@ import numpy as np
 from neuralocks_core import metrics
 from neuralocks_core.character import Character
 from neuralocks_core.collider import Collider
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.locks import lock_mates
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
+from neuralocks_core.progress import Progress
 from neuralocks_core.resolve import Resolver
 from neuralocks_core.strands import StrandSet
 
 STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
+MOST_STEPS = 10_000
+"""Over five minutes; all of a rollout is held in memory."""
 
 
 def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray) -> dict[str, float]:
@@ -45,7 +49,7 @@ def simulated(
     *,
     substeps: int = 1,
     volume: float = 0.0,
-    progress=None,
+    progress: Progress | None = None,
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
 
@@ -62,11 +66,17 @@ def simulated(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the solver is not installed.
+        NeuralocksError: the solver is not installed, or would take more than MOST_STEPS.
     """
     from neuralocks_core.reference import simulate
 
-    clock = times[0] + STEP * np.arange(int(np.ceil((times[-1] - times[0]) / STEP - 1e-9)) + 1)
+    steps = np.ceil((times[-1] - times[0]) / STEP - 1e-9)
+    if not steps <= MOST_STEPS:
+        raise NeuralocksError(
+            f"frames: the solver goes from {times[0]:g} s to {times[-1]:g} s, {steps:g} steps where {MOST_STEPS} are "
+            "the most; choose frames near the animation, or fewer"
+        )
+    clock = times[0] + STEP * np.arange(int(steps) + 1)
     joints, shapes = clip.at(clock), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None

@@ -2,7 +2,7 @@
 """Pictures and clips of moving hair, on machines without a display."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.film import Detail, Film, Scene
+from neuralocks_core.progress import Progress, silent
 
 SUFFIXES = (".png", ".mp4", ".gif")
 
@@ -28,7 +29,7 @@ def render(
     panels: int = 6,
     rate: float = 24.0,
     detail: Detail | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a strip of pictures (.png) or a clip (.mp4, .gif).
 
@@ -59,7 +60,7 @@ def render(
     width, height = size or ((440, 620) if still else (480, 600))
     # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
         with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
             _WRITERS[kind](part, images, scene.times[frames], rate)

@@ -4,13 +4,13 @@
 import hashlib
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
+from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel
 
 from .notes import out_of_range
@@ -58,7 +58,7 @@ def bake(
     loop: bool = False,
     velocities: bool = True,
     jobs: int | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> BakeResult:
     """Bake moving hair.
 
@@ -141,7 +141,7 @@ def _jobs(jobs: int | None) -> int:
     if jobs is None:
         return min(os.cpu_count() or 1, 8)
     if isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= 1024:
-        raise NeuralocksError(f"--jobs {jobs}: must be a whole number from 1")
+        raise NeuralocksError(f"--jobs {jobs}: must be a whole number from 1 to 1024")
     return jobs
 
 

@@ -2,13 +2,13 @@
 """`neuralocks demo`: the shipped shot with the shipped model, from bake to picture and report card."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
+from neuralocks_core.progress import Progress
 from neuralocks_core.report import Card
 
 from .bake import BakeResult, bake
@@ -51,7 +51,7 @@ def shipped_shot() -> Path:
     raise NeuralocksError("demo: the shipped shot is missing from this installation; install neuralocks again")
 
 
-def demo(out, model=None, *, clip: bool = True, progress: Callable[[int, int, str], None] | None = None) -> Demo:
+def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None) -> Demo:
     """Bake the shipped shot, measure it and draw it.
 
     Args:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks evaluate`: the report card of a bake."""
 
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from neuralocks_core.arclength import arc_lengths
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY, G
 from neuralocks_core.pose_energies import energies, stretch_energy
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
 from neuralocks_core.strands import K, StrandSet, strands_on
@@ -38,7 +38,7 @@ def evaluate(
     head: str | None = None,
     model=None,
     material: Material | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Card:
     """Measure a bake, whatever made it.
 
@@ -56,7 +56,7 @@ def evaluate(
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head)
     material = material or Material()
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     measured, compared, curves = {}, {}, {}
     notes = list(baked.shot.notes)
     if len(baked.codes) < 3:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from neuralocks_core import preview as drawing
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 
 from .baked import Baked, read_baked
 from .border import Border, open_stage
@@ -15,7 +16,7 @@ from .rig_stage import read_rigged_hair
 
 
 @names_damage
-def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress=None) -> Path:
+def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress: Progress | None = None) -> Path:
     """Draw a bake without a display; mesh hair on joints where the stage has no strands.
 
     Args:

@@ -10,6 +10,7 @@ import numpy as np
 from pxr import UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
@@ -54,7 +55,7 @@ def bake_rig(
     loop: bool = False,
     strength: float = 1.0,
     cuts=None,
-    progress=None,
+    progress: Progress | None = None,
 ) -> RigBakeResult:
     """Bake the hair joints of a shot.
 

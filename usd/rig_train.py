@@ -6,6 +6,7 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
+from neuralocks_core.progress import Progress
 
 from .rig_stage import read_rigged_hair, weight_notes
 
@@ -25,7 +26,7 @@ def train_rig(
     head: str | None = None,
     skeleton: str | None = None,
     command: str = "",
-    progress=None,
+    progress: Progress | None = None,
 ):
     """Train a model for the hair joints of a rig and write it.
 

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress, silent
 
 from .border import check_not_input, used_files
 from .damage import names_damage
@@ -44,7 +45,7 @@ def write_samples(
     inputs: dict,
     *,
     velocities: bool = True,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> int:
     """Write an override layer.
 
@@ -69,7 +70,7 @@ def write_samples(
     facts = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], facts))
     try:
-        return _write(shot, codes, poser, spool, velocities, progress or (lambda done, total, message: None))
+        return _write(shot, codes, poser, spool, velocities, progress or silent)
     except KeyboardInterrupt:
         spool.close()
         raise

@@ -2,13 +2,13 @@
 """A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 
 from .bake import BakeResult, as_material, described
 from .placing import GroomPlacer
@@ -19,6 +19,8 @@ from .time_codes import time_codes
 
 STRANDS = 2000
 """Strands simulated where no number is given."""
+STIFFEST_VOLUME = 100.0
+"""Stiffer is not what anybody means, and takes the solver ever longer."""
 
 
 def simulate(
@@ -33,7 +35,7 @@ def simulate(
     material=None,
     strands: int | None = None,
     volume: float = 0.0,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> BakeResult:
     """Simulate a shot's hair and write it as a bake.
 
@@ -52,8 +54,8 @@ def simulate(
     count = STRANDS if strands is None else strands
     if count < 1:
         raise NeuralocksError(f"--strands {count}: must be above 0")
-    if not 0 <= volume < float("inf"):
-        raise NeuralocksError(f"--volume {volume}: must be 0 or above")
+    if not 0 <= volume <= STIFFEST_VOLUME:
+        raise NeuralocksError(f"--volume {volume:g}: must lie between 0 and {STIFFEST_VOLUME:g}")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}

@@ -9,8 +9,11 @@ import sys
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 
 METHODS = ("rollouts", "selfsupervised")
+MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
+"""Beyond these it is a slip of the finger: a hundred thousand processes take a machine down."""
 
 
 def train(
@@ -29,7 +32,7 @@ def train(
     processes: int = 1,
     credits=(),
     keep_work: bool = False,
-    progress=None,
+    progress: Progress | None = None,
 ) -> Path:
     """Train a strand model.
 
@@ -61,7 +64,6 @@ def train(
         import warp  # noqa: F401  (the solver's)
     except ImportError as error:
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
-    _check_amounts({**settings, "rollouts": rollouts, "processes": processes})
     if settings.get("device") == "cuda" and not torch.cuda.is_available():
         raise NeuralocksError("--device cuda: this machine has no CUDA device; use --device cpu")
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -73,6 +75,7 @@ def train(
 
     kind = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
     values = parsed(kind, settings)
+    _check_amounts({**values, "rollouts": rollouts, "processes": processes})
     options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
     history = {"spec": paper_boundary()} if paper else {}
     work_folder(out, resume=resume)
@@ -85,10 +88,10 @@ def train(
 
 
 def _check_amounts(given: dict) -> None:
-    for name in ("minutes", "steps", "rollouts", "processes"):
+    for name, most in MOST.items():
         value = given.get(name)
-        if isinstance(value, (int, float)) and not 0 < value < math.inf:
-            raise NeuralocksError(f"--{name} {value:g}: must be above 0")
+        if isinstance(value, (int, float)) and not 0 < value <= most:
+            raise NeuralocksError(f"--{name} {value:g}: must be above 0, and at most {most:,}")
 
 
 def parsed(kind: type, settings: dict) -> dict:

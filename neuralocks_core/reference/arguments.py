@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the simulators are given, checked: a wrong shape or number is named before anything is computed."""
 
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -9,9 +8,6 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
-
-Progress = Callable[[int, int, str], None]
-"""Called with frames done, all frames, message."""
 
 
 def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import G
-from neuralocks_core.reference.arguments import Progress, check_body, check_material, check_neighbours
+from neuralocks_core.progress import Progress
+from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours
 from neuralocks_core.reference.head_motion import head_motion
 from neuralocks_core.reference.rest import rest_rods
 

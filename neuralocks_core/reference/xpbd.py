@@ -8,7 +8,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import G
-from neuralocks_core.reference.arguments import Progress, check_body, check_material
+from neuralocks_core.progress import Progress
+from neuralocks_core.reference.arguments import check_body, check_material
 from neuralocks_core.reference.device import start_warp
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods

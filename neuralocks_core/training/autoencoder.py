@@ -8,13 +8,13 @@ keep a strand within a millimetre, which the MLPs alone do not reach in minutes.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 from neuralocks_core.strands import K
 
 LATENT = 32
@@ -30,7 +30,7 @@ def train_autoencoder(
     seed: int = 0,
     principal: bool = True,
     device: str = "cpu",
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> StrandAutoencoder:
     """Trains on all strands of all grooms and returns the autoencoder with frozen weights.
 

@@ -16,6 +16,7 @@ import torch
 
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress
 from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
@@ -46,7 +47,7 @@ def train_strands(
     keep_work: bool = False,
     credits: tuple[str, ...] = (),
     command: str = "",
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Train on rollouts of the solver, or on the physics of random moments, and write a model file.
 
