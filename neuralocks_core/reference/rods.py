@@ -11,8 +11,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours
-from neuralocks_core.reference.head_motion import head_motion
-from neuralocks_core.reference.rest import rest_rods
+from neuralocks_core.reference.head_motion import HeadMotion, head_motion
+from neuralocks_core.reference.rest import RestRods, rest_rods
 
 SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
@@ -91,15 +91,11 @@ def simulate(
         raise NeuralocksError(f"volume {volume}: must be 0 or above")
     if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
-    way = head_motion(head, substeps)
-    frames = len(head)
+    way, frames = head_motion(head, substeps), len(head)
     material = check_material(material, strands)
-    points = np.zeros((frames, strands, vertices, 3), np.float32)
-    planes = np.zeros((frames, strands, vertices, 4), np.float32)
-    planes[..., 3] = -1e3
-    residual, used = np.zeros(frames), np.zeros(frames)
+    result = _empty_rollout(frames, strands, vertices)
     if strands == 0:
-        return Rollout(points, planes, residual, used)
+        return result
     if start is not None and np.shape(start) != rods.points.shape:
         raise NeuralocksError(f"start: shape {np.shape(start)}; give {rods.points.shape}, as rest")
     from neuralocks_core.reference.stepper import Stepper
@@ -121,21 +117,35 @@ def simulate(
             bind_body = (first - way.origin[0]) @ np.asarray(head[0], np.float64)[:3, :3]
         stepper.attach_body(np.asarray(bind_body), faces)
         stepper.move_body(first)
-    stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
-    if start is None:
-        stepper.settle(SETTLE_DT, iterations)
-    before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
-    stepper.start_moving(before)
+    _begin(stepper, way, rods, start, iterations)
     for frame in range(frames):
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
                 stepper.move_body(_between(body, step, substeps))
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
-        residual[frame], used[frame] = stepper.read(points[frame], planes[frame])
+        left = stepper.read(result.points[frame], result.planes[frame])
+        result.residual[frame], result.iterations[frame] = left
         if progress:
             progress(frame + 1, frames, "simulating")
-    return Rollout(points, planes, residual, used)
+    return result
+
+
+def _empty_rollout(frames: int, strands: int, vertices: int) -> Rollout:
+    """Arrays to be filled in; no body is near."""
+    points = np.zeros((frames, strands, vertices, 3), np.float32)
+    planes = np.zeros((frames, strands, vertices, 4), np.float32)
+    planes[..., 3] = -1e3
+    return Rollout(points, planes, np.zeros(frames), np.zeros(frames))
+
+
+def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:
+    """Put hair where it starts, by default in the equilibrium of the first pose, moving along with the head."""
+    stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
+    if start is None:
+        stepper.settle(SETTLE_DT, iterations)
+    before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
+    stepper.start_moving(before)
 
 
 def _between(body: Any, step: int, substeps: int) -> np.ndarray:
