@@ -88,7 +88,7 @@ def attach(
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement)) is not None]
         found = _on_mesh(prim, seats, placement, notes) or _by_name(prim, rigs, placement, head)
-        notes += _floats(path, found, seats)
+        notes += _floats(prim, found, seats)
     name = rig_joint(found)
     if head and name.split("/")[-1] != head.split("/")[-1]:
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
@@ -129,13 +129,14 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
 
 
-def _floats(path: str, found: Attachment, seats: list[Seat]) -> list[str]:
+def _floats(prim: Usd.Prim, found: Attachment, seats: list[Seat]) -> list[str]:
     """What to say of hair that lies off the skin of what carries it."""
     off = min((seat.distance for seat in seats if seat.rig is found.rig), default=0.0)
     if off <= NEAR or found.far:
         return []
     return [
-        f"{path}: its roots lie {off:.2g} m from the skin of {found.rig.path} and keep that distance; "
+        f"{prim.GetPath()}: its roots lie {off:.2g} m from the skin of {found.rig.path}"
+        f"{found.rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
         "check that it was made for this pose"
     ]
 

@@ -53,6 +53,20 @@ class Border:
         """Transform (4, 4) from metres, Y up, to stage world space."""
         return np.linalg.inv(self.to_core)
 
+    def foreign(self, attribute: Usd.Attribute) -> str:
+        """A remark where an attribute's layer counts in another unit or axis: references convert neither. '' if not."""
+        for spec in attribute.GetPropertyStack(Usd.TimeCode.EarliestTime()):
+            root, said = spec.layer.pseudoRoot, []
+            unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else self.metres_per_unit
+            if abs(unit / self.metres_per_unit - 1) > 1e-3:
+                said.append(f"counts in {unit:g} m, the stage in {self.metres_per_unit:g} m")
+            if root.HasInfo("upAxis") and root.GetInfo("upAxis") != self.up_axis:
+                said.append(f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}")
+            if said:
+                name = spec.layer.GetDisplayName()
+                return f" (its layer {name} {' and '.join(said)}: USD converts neither, the prim needs a transform)"
+        return ""
+
     def seconds(self, time_codes) -> np.ndarray:
         """Times [s] of time codes."""
         return np.asarray(time_codes, float) / self.rate

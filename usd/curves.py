@@ -68,6 +68,16 @@ def moment(prim: Usd.Prim) -> float | None:
     return float(points.GetTimeSamples()[0])
 
 
+def left_as_they_are(prim: Usd.Prim) -> list[str]:
+    """What to say of values that belong to the points at rest and that a bake does not carry."""
+    if not UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
+        return []
+    return [
+        f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
+        "remove them, so that it is drawn as tubes or towards the camera"
+    ]
+
+
 def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     """The groom at rest in bind-world metres.
 
@@ -83,7 +93,7 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     points = rest_points(prim)
     if (when := moment(prim)) is not None:
         notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
-    counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
+    counts = _counts(curves)
     scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
     uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)
     guides = _per_strand(prim, ("groom_guide",), counts, 1)
@@ -99,6 +109,20 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         guides=None if guides is None else guides.astype(bool),
         group=None if group is None else group.astype(np.int32),
     )
+
+
+def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:
+    """Points of each strand (S,), which some caches write anew for each frame."""
+    attribute = curves.GetCurveVertexCountsAttr()
+    counts = np.asarray(rest_value(attribute) or [], np.int64)
+    times = attribute.GetTimeSamples()
+    for time in times[:: max(1, len(times) // most)]:
+        if not np.array_equal(counts, attribute.Get(time)):
+            raise NeuralocksError(
+                f"{curves.GetPath()}: its curveVertexCounts at time code {time:g} are not those at rest; "
+                "hair must keep its strands, remove the other samples"
+            )
+    return counts
 
 
 def _widths(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pxr import Usd
 
 from .attach import Attachment, attach, of_another
-from .curves import without_points
+from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
 from .placement import Placement
 from .rig_source import StageRig
@@ -58,6 +58,7 @@ class HairSearch:
             return None
         found = attach(prim, self._rigs, placement, self._head, self._notes)
         if found.far and not self._named:
-            self.far.append(too_far(path, found))
+            self.far.append(too_far(prim, found))
             return None
+        self._notes += left_as_they_are(prim)
         return found

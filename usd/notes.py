@@ -64,11 +64,12 @@ def another_carries(path: str, rig: StageRig) -> str:
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
-def too_far(path: str, found: Attachment) -> str:
+def too_far(prim: Usd.Prim, found: Attachment) -> str:
     """Why the curves of a prim are not taken for hair."""
     return (
-        f"{path}: lies {found.far:.3g} m from joint '{rig_joint(found).split('/')[-1]}' of {found.rig.path} and on no "
-        "skin, so it is not taken for hair; if it is, name it with --groom"
+        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{rig_joint(found).split('/')[-1]}' of {found.rig.path} "
+        f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}, so it is not taken for hair; "
+        "if it is, name it with --groom"
     )
 
 

@@ -151,3 +151,21 @@ def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
     item = read_shot(path).grooms[0]
     assert item.joint.endswith("head")
     assert np.abs(item.groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-5
+
+
+def test_a_groom_of_another_unit_than_the_stage_is_told_so(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=0.01))
+    stage = Usd.Stage.Open(str(path))
+    groom = Usd.Stage.CreateNew(str(tmp_path / "groom.usda"))
+    UsdGeom.SetStageMetersPerUnit(groom, 1)
+    UsdGeom.SetStageUpAxis(groom, "Z")
+    _curves(groom, "/Hair", strand_points(40, 2))
+    groom.SetDefaultPrim(groom.GetPrimAtPath("/Hair"))
+    groom.Save()
+    stage.RemovePrim("/Hero/Hair")
+    stage.DefinePrim("/Hero/Groom").GetReferences().AddReference("./groom.usda")
+    stage.Save()
+    with pytest.raises(
+        NeuralocksError, match=r"groom.usda counts in 1 m, the stage in 0.01 m and has Z up, the stage Y"
+    ):
+        read_shot(path)

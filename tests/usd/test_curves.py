@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from usd.curves import read_groom
+from neuralocks_core.errors import NeuralocksError
+from usd.curves import left_as_they_are, read_groom
 
 COUNTS = [2, 3, 2]
 POINTS = np.arange(21, dtype=np.float32).reshape(7, 3)
@@ -36,3 +37,23 @@ def test_texture_coordinates_of_roots(interpolation, kind, values, indices, expe
     read = read_groom(curves.GetPrim(), np.eye(4), []).root_uv
     assert (read is None) == (expected is None)
     assert expected is None or np.allclose(read, expected, atol=1e-3)
+
+
+def test_caches_may_repeat_their_counts_but_not_change_them():
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    for code in (1, 2):
+        curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(POINTS), code)
+        curves.CreateCurveVertexCountsAttr().Set(COUNTS, code)
+    assert read_groom(curves.GetPrim(), np.eye(4), []).counts.tolist() == COUNTS
+    curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)
+    with pytest.raises(NeuralocksError, match="/Hair: its curveVertexCounts at time code 3 are not those at rest"):
+        read_groom(curves.GetPrim(), np.eye(4), [])
+
+
+def test_normals_are_said_to_stay_behind():
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Ribbons")
+    assert left_as_they_are(curves.GetPrim()) == []
+    curves.CreateNormalsAttr([(0, 0, 1)])
+    assert left_as_they_are(curves.GetPrim())[0].startswith("/Ribbons: has normals")
