@@ -36,5 +36,7 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> NeuralocksError:
     """The one line for a file system that refuses."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return NeuralocksError(f"{path}: no space left on the disk; free some, or choose another folder")
+    if error.errno in (errno.EEXIST, errno.ENOTDIR):
+        return NeuralocksError(f"{path}: on the way there is a file, not a folder; choose another folder")
     fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
     return NeuralocksError(f"{path}: cannot be written ({fact}); choose a folder you can write to")

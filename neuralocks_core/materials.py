@@ -88,7 +88,8 @@ class Material:
             name, _, text = setting.partition("=")
             name = ALIASES.get(name.strip(), name.strip())
             if name not in RANGES:
-                raise NeuralocksError(f"material '{setting}': unknown name; use {', '.join(RANGES)} as NAME=VALUE")
+                known = ", ".join([*ALIASES, *RANGES])
+                raise NeuralocksError(f"material '{setting}': unknown name; use {known} as NAME=VALUE")
             try:
                 factor = text.strip().endswith("x")
                 value = float(text.strip().removesuffix("x"))

@@ -96,6 +96,8 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         raise NeuralocksError(
             f"{path}: no such model file; check the path or leave --model out for the shipped one"
         ) from None
+    except IsADirectoryError:
+        raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it") from None
     except (
         OSError,
         zipfile.BadZipFile,

@@ -12,7 +12,7 @@ from .cli_bake import bake_command, simulate_command
 from .cli_rig import app as rig_app
 from .cli_train import train_command
 from .command import command_of, note, print_json
-from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Skeleton, numbers, pairs
+from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs
 
 app = typer.Typer(
     name="neuralocks",
@@ -189,7 +189,7 @@ def grow_command(
     character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
     out: Out,
     count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
-    seed: Annotated[int, typer.Option(help="The same seed grows the same groom.")] = 0,
+    seed: Seed = 0,
     skeleton: Skeleton = None,
     head: Head = None,
 ) -> None:

@@ -11,7 +11,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 
 from .command import command_of, note, print_json
-from .options import AsJson, Head, Skeleton
+from .options import AsJson, Head, Seed, Skeleton
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -35,7 +35,7 @@ def train(
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
     weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
     damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]. Dynamic only.")] = None,
-    seed: Annotated[int, typer.Option(help="Decides poses and first weights.")] = 0,
+    seed: Seed = 0,
     chains: Chains = None,
     head: Head = None,
     skeleton: Skeleton = None,

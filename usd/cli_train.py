@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Head, Out, Skeleton, pairs
+from .options import Head, Out, Seed, Skeleton, pairs
 
 
 def train_command(
@@ -39,7 +39,7 @@ def train_command(
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; a wrong name lists them.")
     ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    seed: Seed = 0,
     credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
     keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
 ) -> None:

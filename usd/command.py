@@ -2,6 +2,7 @@
 """What all commands share: expected errors become one line on stderr and an exit status."""
 
 import functools
+import inspect
 import json
 import sys
 from pathlib import Path
@@ -18,11 +19,11 @@ def command_of(app: typer.Typer):
 
     def command(name: str):
         def wrap(function):
-            @app.command(name)
+            @app.command(name, help=_paragraphs(function.__doc__))
             @functools.wraps(function)
             def run(*args, **kwargs):
                 try:
-                    _check_names(kwargs.values())
+                    _check_words(kwargs)
                     return function(*args, **kwargs)
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
@@ -46,14 +47,23 @@ def command_of(app: typer.Typer):
     return command
 
 
-def _check_names(values) -> None:
-    """Refuse files whose names are no text: USD takes UTF-8 alone, whatever the disk allows."""
-    for value in values:
-        for path in value if isinstance(value, list) else [value]:
+def _paragraphs(text: str) -> str:
+    """A docstring whose lines are broken where the terminal ends, not where the source does."""
+    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+
+
+def _check_words(given: dict) -> None:
+    """Refuse empty words, such as a script's variable that was never set leaves behind, and files whose names are no
+    text: USD takes UTF-8 alone, whatever the disk allows.
+    """
+    for name, value in given.items():
+        for word in value if isinstance(value, list) else [value]:
+            if isinstance(word, str) and not word.strip():
+                raise NeuralocksError(f"{name.replace('_', '-')}: is empty; give a value, or leave it out")
             try:
-                str(path if isinstance(path, Path) else "").encode()
+                str(word if isinstance(word, Path) else "").encode()
             except UnicodeEncodeError:
-                name = str(path).encode("utf-8", "backslashreplace").decode()
+                name = str(word).encode("utf-8", "backslashreplace").decode()
                 raise NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it") from None
 
 

@@ -29,11 +29,12 @@ Materials = Annotated[
     list[str] | None,
     typer.Option(
         "--material",
-        help="NAME=VALUE, or NAME=2x for a factor. bend 0.0002..0.005 m^4/s^2, weight 0.5..2 (times gravity), "
+        help="NAME=VALUE, or NAME=2x for a factor. stiffness 0.0002..0.005 m^4/s^2, weight 0.5..2 (times gravity), "
         "damping 4..20 /s, clumping 0..240 /s^2.",
     ),
 ]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of everything random.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", help="Threads; all cores if left out. The result is the same.")]
 
 

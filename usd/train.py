@@ -8,6 +8,8 @@ import shlex
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 
@@ -64,9 +66,8 @@ def train(
         import warp  # noqa: F401  (the solver's)
     except ImportError as error:
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
-    if settings.get("device") == "cuda" and not torch.cuda.is_available():
-        raise NeuralocksError("--device cuda: this machine has no CUDA device; use --device cpu")
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
+    from neuralocks_core.training.networks import MOTIONS, OUTPUTS
     from neuralocks_core.training.regression import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands, work_folder
@@ -77,6 +78,11 @@ def train(
     values = parsed(kind, settings)
     _check_amounts({**values, "rollouts": rollouts, "processes": processes})
     options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
+    _check_choices(options, {"output": OUTPUTS, "motion": MOTIONS, "optimiser": ("muon", "adamw")})
+    try:
+        torch.empty(0, device=options.device)
+    except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
+        raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     history = {"spec": paper_boundary()} if paper else {}
     work_folder(out, resume=resume)
     scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=options.seed, **history)
@@ -92,6 +98,20 @@ def _check_amounts(given: dict) -> None:
         value = given.get(name)
         if isinstance(value, (int, float)) and not 0 < value <= most:
             raise NeuralocksError(f"--{name} {value:g}: must be above 0, and at most {most:,}")
+
+
+def _check_choices(options, known: dict[str, tuple[str, ...]]) -> None:
+    """Known before the simulations begin: words that are among the known ones, counts from 1, weights not below 0."""
+    for name, default in ((field.name, field.default) for field in dataclasses.fields(options)):
+        value = getattr(options, name)
+        if name in known and value not in known[name]:
+            raise NeuralocksError(f"--set {name}={value}: is unknown; give {'|'.join(known[name])}")
+        if name == "seed" and not 0 <= value < 2**32:
+            raise NeuralocksError(f"--seed {value}: must be a whole number from 0, below 2^32")
+        if type(default) is int and name != "seed" and value < 1:
+            raise NeuralocksError(f"--set {name}={value}: must be at least 1")
+        if isinstance(default, float | tuple) and not all(v >= 0 for v in np.atleast_1d(value)):
+            raise NeuralocksError(f"--set {name}={value}: must not be below 0")
 
 
 def parsed(kind: type, settings: dict) -> dict:

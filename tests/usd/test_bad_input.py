@@ -155,10 +155,12 @@ WRONG = {
     "endless frames": ({"frames": "0:1e12"}, "samples"),
     "more frames than numbers": ({"frames": "0:1e300:1e-300"}, "samples"),
     "jobs": ({"jobs": 0}, "--jobs 0"),
+    "too many jobs": ({"jobs": 5000}, "1 to 1024"),
     "subframes": ({"subframes": 0}, "--subframes 0"),
     "material": ({"material": ["colour=3"]}, "colour"),
     "material range": ({"material": ["bend=1e9"]}, "bend"),
     "model": ({"model": "nope.neuralocks"}, "nope.neuralocks"),
+    "folder as model": ({"model": "."}, "is a folder"),
 }
 
 
@@ -265,8 +267,9 @@ def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
     shot = write_shot(tmp_path)
     target = tmp_path / "file"
     target.write_text("")
-    with pytest.raises(NeuralocksError, match="cannot be written"):
-        bake(shot, target / "out.usdc", model)  # a file where a folder should be
+    for out in (target / "out.usdc", target / "deeper" / "out.usdc"):  # a file where a folder should be
+        with pytest.raises(NeuralocksError, match="a file, not a folder"):
+            bake(shot, out, model)
 
     def full(self, *arguments):
         raise cannot_write(self.out, OSError(28, "No space left on device"))

@@ -93,6 +93,25 @@ def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
     assert done.stderr == ""
 
 
+def test_an_empty_word_is_refused(tmp_path, capsys):
+    """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
+    for words in (("bake", "s.usda", "-o", "o.usdc", "--head", ""), ("rig", "inspect", "s.usda", "--chains", " ")):
+        assert status(*words) == 1
+        assert capsys.readouterr().err == f"error: {words[-2][2:]}: is empty; give a value, or leave it out\n"
+
+
+def test_a_seed_is_one_of_numpys(capsys):
+    for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
+        assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
+    capsys.readouterr()
+
+
+def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    assert status("bake", "--help") == 0
+    assert "mute it to have the shot back. A bake that was stopped goes on" in capsys.readouterr().out
+
+
 def test_the_version_is_told(capsys):
     assert status("--version") == 0
     assert capsys.readouterr().out.split()[0] == "neuralocks"
@@ -263,6 +282,14 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
         ((*selfsupervised, "--set", "colour=red"), "undetached"),
         ((*selfsupervised, "--set", "form=round"), "constant"),
         ((*selfsupervised, "--set", "rate=nan"), "rate"),
+        ((*selfsupervised, "--set", "style=1,nan"), "style"),
+        (("--set", "minutes=-5"), "--minutes"),
+        (("--set", "rate=-1"), "rate"),
+        (("--set", "clips=0"), "clips"),
+        (("--set", "motion=magic"), "modulated"),
+        (("--set", "seed=-1"), "--seed"),
+        (("--processes", "100000"), "at most 256"),
+        (("--device", "abacus"), "--device abacus"),
     ):
         assert status("train", "--character", tmp_path / "nope.usda", "-o", out, *words) == 1
         error = capsys.readouterr().err

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from neuralocks_core.errors import NeuralocksError
 from usd.simulate import simulate
 
 from .shots import Recipe, samples, world_points, write_shot
@@ -20,3 +21,16 @@ def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
     lengths = [np.linalg.norm(np.diff(p.reshape(12, 12, 3), axis=1), axis=-1).sum(1) for p in (first, last)]
     assert np.abs(lengths[1] / lengths[0] - 1).max() < 0.05
     assert np.abs(samples(result.path, "velocities", at=5.0)).max() > 1
+
+
+def test_what_would_take_for_ever_is_refused(tmp_path):
+    """Frames far from the animation, from which the solver starts, ended in a traceback or in no memory."""
+    shot = write_shot(tmp_path)
+    for wrong, said in (
+        ({"frames": "1e308:1e308"}, "10000 are the most"),
+        ({"frames": "9000000:9000001"}, "10000 are the most"),
+        ({"volume": 1e308}, "--volume 1e\\+308: must lie between"),
+    ):
+        with pytest.raises(NeuralocksError, match=said):
+            simulate(shot, tmp_path / "slow.usdc", **wrong)
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
