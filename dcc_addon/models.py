@@ -3,12 +3,10 @@
 
 import os
 
-import bpy
-
 from neuralocks_core import model as model_file
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
 
+from .scene.paths import absolute
 from .session import session
 
 
@@ -25,8 +23,4 @@ def model_path(path: str, kind: str = "strands") -> str:
     """Absolute path of a model named in the panel; the shipped one where it is empty."""
     if not path.strip():
         return str(model_file.shipped(kind))
-    if path.startswith("//") and not bpy.data.filepath:
-        raise NeuralocksError(
-            f"{path}: a path relative to a file that is not saved; save the file or choose the model again"
-        )
-    return bpy.path.abspath(path)
+    return absolute(path)

@@ -7,15 +7,13 @@ import bpy
 
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import LOOP_GAP
 
 from .operators.training import job
 from .scene.actions import has_keys
 from .scene.attach import MODIFIER
 from .services.panel_errors import for_the_panel
 from .session import session
-
-LOOP_GAP = 2.0
-"""Turn from the last frame of a loop to its first [degrees] that is worth a word."""
 
 _findings: dict[tuple, tuple[list, str]] = {}
 

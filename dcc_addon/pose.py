@@ -5,6 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from .scene.binding import hidden
 from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
 from .services.motion import TOLERANCE, similar
@@ -17,9 +18,7 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     """
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:
-        raise NeuralocksError(
-            f"{armature.name_full}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
-        )
+        raise hidden(armature)
     reader = session.readers.get(armature.name_full)
     if reader is None or tuple(armature.pose.bones.keys()) != reader.bones:
         session.forget_motion(armature.name_full)

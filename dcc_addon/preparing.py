@@ -3,6 +3,7 @@
 
 import bpy
 
+from .scene.redraw import redraw
 from .services.threaded import Threaded
 from .session import session
 
@@ -42,8 +43,5 @@ def look() -> float | None:
             job.then(name)
         except Exception as error:
             session.tell(name, error)
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    redraw()
     return LOOK if session.preparing else None

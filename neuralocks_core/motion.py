@@ -14,6 +14,8 @@ GRAVITY = np.array([0.0, -G, 0.0])
 """[m/s^2], Y up."""
 LARGEST_CLIP = 4_000_000
 """Joint samples held of one file's animation: 512 MB. More than that is a stray key frame, not a shot."""
+LOOP_GAP = 2.0
+"""Turn of a joint from the last sample of a loop to its first [degrees] that a user should know of."""
 
 
 @dataclass(frozen=True)

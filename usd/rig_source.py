@@ -10,7 +10,7 @@ from pxr import Usd, UsdSkel
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
-from neuralocks_core.motion import LARGEST_CLIP, Clip
+from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
 from neuralocks_core.rotation import sizes
 
 from .blend_shapes import knot_weights, shares
@@ -18,10 +18,8 @@ from .border import Border
 from .joints import JointSource
 from .surface import SkinnedMesh, bound_meshes, merged_body
 
-LOOP_GAP = 2.0
-"""Turn of a joint from the last sample of a loop to its first [degrees] that is worth a word."""
 CLOSE = 1.5 / 24
-"""Samples no farther apart than this [s] are those of every frame, whatever the rate of the stage they come to."""
+"""Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +29,7 @@ class StageRig:
     Attributes:
         path: the Skeleton prim.
         source: the skeleton as authored.
+        border: the stage's units.
         meshes: what it skins.
         to_bind: authored bind space to bind world [m], (4, 4).
         character: in core axes and metres.
@@ -162,7 +161,7 @@ def read_each_rig(
 
 
 def _time_codes(source: JointSource, border: Border) -> np.ndarray:
-    """The authored samples, and where they are not close, every frame of the shot or between the first and the last."""
+    """Where the animation is read (T,): at its samples, and at every frame in gaps wider than CLOSE."""
     frame = border.frame
     samples = source.samples
     if not samples:

@@ -14,12 +14,12 @@ from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
 from ..scene.lookup import find
-from ..scene.paths import FILE
-from ..scene.sampling import hairs_of, sample, stepping
+from ..scene.paths import FILE, absolute
+from ..scene.sampling import hairs_of
 from ..services.names import identifier
 from ..services.threaded import Threaded
 from ..session import session
-from .base import Stepwise, shown_armature, shown_hair
+from .base import Stepwise, sampling, shown_armature, shown_hair
 
 
 def output_path(path: str) -> str:
@@ -30,11 +30,7 @@ def output_path(path: str) -> str:
     """
     if not path.strip():
         raise NeuralocksError("Output: no file is named; choose where the bake is written")
-    if path.startswith("//") and not bpy.data.filepath:
-        raise NeuralocksError(
-            f"{path}: this file is not saved yet, so there is no folder beside it; save the file or choose a full path"
-        )
-    full = os.path.abspath(bpy.path.abspath(path))
+    full = os.path.abspath(absolute(path))
     if not full.lower().endswith((".usd", ".usda", ".usdc")):
         full += ".usdc"
     folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # the others are made
@@ -71,10 +67,7 @@ def bake_steps(context, armature, hairs, path: str):
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
     looks = {_look(h) for h in hairs}
-    with stepping(scene):
-        for done, total in sample(context, armature):
-            yield done, 2 * total, f"Sampling the motion of {armature.name_full}"
-    sampled = session.rigs[armature.name_full]
+    sampled = yield from sampling(context, armature, share=0.5)
     baked = {}
     for number, look in enumerate(sorted(looks)):
         group = [h for h in hairs if _look(h) == look]

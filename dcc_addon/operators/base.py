@@ -8,7 +8,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..scene.sampling import stepping
+from ..scene.sampling import sample, stepping
 from ..services.panel_errors import for_the_panel
 from ..session import session
 
@@ -124,6 +124,17 @@ class Stepwise(Hardened):
         if context.workspace is not None:
             context.workspace.status_text_set(None)
         session.sampling = None
+
+
+def sampling(context, armature, share: float = 1.0):
+    """Steps (done, total, message) of sampling an armature's motion, the first `share` of longer work; returns its
+    `SampledRig`.
+    """
+    name = armature.name_full
+    with stepping(context.scene):
+        for done, total in sample(context, armature):
+            yield share * done, total, f"Sampling the motion of {name}"
+    return session.rigs[name]
 
 
 def shown_armature(context):

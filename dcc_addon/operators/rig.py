@@ -14,13 +14,13 @@ from ..models import model_path
 from ..scene import actions
 from ..scene.attach import check_own
 from ..scene.lookup import find
-from ..scene.paths import FILE
-from ..scene.sampling import ensure, sample, stepping
+from ..scene.paths import FILE, absolute
+from ..scene.sampling import ensure
 from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..session import session
 from .bake import frame_range, output_path
-from .base import Hardened, Stepwise, shown_armature
+from .base import Hardened, Stepwise, sampling, shown_armature
 
 
 class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
@@ -56,11 +56,8 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         actions.remove(armature)
         armature.neuralocks_character.rig_live = False
         rest(armature)
-        with stepping(scene):
-            for done, total in sample(context, armature):
-                yield done, total, f"Sampling the motion of {name}"
+        sampled = yield from sampling(context, armature)
         armature = find(name)
-        sampled = session.rigs[name]
         bones, frames = bind(armature, sampled), frame_numbers(first, last, 0)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
@@ -101,12 +98,10 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
-        with stepping(scene):
-            for done, total in sample(context, armature):
-                yield done, total, f"Sampling the motion of {name}"
-        bind(find(name), session.rigs[name])  # says what is wrong before anything is written
+        sampled = yield from sampling(context, armature)
+        bind(find(name), sampled)  # says what is wrong before anything is written
         shot = out.with_name(f"{out.stem}_shot.usdc")
-        write_shot(shot, find(name), scene, session.rigs[name], [])
+        write_shot(shot, find(name), scene, sampled, [])
         bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
@@ -124,10 +119,8 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         from neuralocks_core.export_c import export_c
 
         armature = shown_armature(context)
-        if self.filepath.startswith("//") and not bpy.data.filepath:
-            raise NeuralocksError(f"{self.filepath}: this file is not saved yet; save it or choose a full path")
         model = RigModel.load(model_path(armature.neuralocks_character.rig_model, "rig"))
-        out = export_c(model, Path(bpy.path.abspath(self.filepath)))
+        out = export_c(model, Path(absolute(self.filepath)))
         return f"C header written to {out}"
 
 

@@ -12,11 +12,11 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..scene.export import write_shot
 from ..scene.lookup import find
-from ..scene.sampling import sample, stepping
+from ..scene.redraw import redraw
 from ..services.threaded import Threaded
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
-from .base import Hardened, Stepwise, shown_armature, shown_hair
+from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
 
 _jobs: list = []
 _checked: dict[str, str] = {}
@@ -79,10 +79,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         _checked[python] = yield from asking.steps()
         if _checked[python]:
             raise NeuralocksError(_checked[python])
-        with stepping(context.scene):
-            for done, total in sample(context, armature):
-                yield done, total, f"Sampling the motion of {name}"
-        armature, target, sampled = find(name), find(wanted), session.rigs[name]
+        sampled = yield from sampling(context, armature)
+        armature, target = find(name), find(wanted)
         stop()
         folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
         character = Path(folder.name) / "character.usdc"
@@ -139,10 +137,7 @@ def finish() -> str | None:
 
 
 def _watch():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    redraw()
     running = job()
     if running is None:
         return None

@@ -1,8 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties that name files."""
+"""Files as properties name them."""
 
 import bpy
+
+from neuralocks_core.errors import NeuralocksError
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set()
 FILE = {"subtype": "FILE_PATH", "options": _RELATIVE}
 """How such a property is made; since 4.5 Blender warns of // where it is not told that we know what it means."""
+
+
+def absolute(path: str) -> str:
+    """The absolute path of one that may begin with //, the folder of the saved file.
+
+    Raises:
+        NeuralocksError: the file is not saved, so that // means nothing.
+    """
+    if path.startswith("//") and not bpy.data.filepath:
+        raise NeuralocksError(
+            f"{path}: this file is not saved yet, so there is no folder beside it; save the file or choose a full path"
+        )
+    return bpy.path.abspath(path)

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawing the panel anew while work in the background goes on."""
+
+import bpy
+
+
+def redraw() -> None:
+    """Draw every 3D viewport again, its sidebar too."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
