@@ -11,10 +11,10 @@ from neuralocks_core.errors import NeuralocksError
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
 THREADED = 2_000
-"""Points from which a search is worth sharing with other threads."""
+"""From so many points on, a search is shared with other threads."""
 
 ROWS = 20_000
-"""Points whose candidates are measured at a time: those of a grid around a giant's head took gigabytes at once."""
+"""Points measured at a time, to bound the memory: a grid around a giant's head has millions."""
 
 
 class Collider:

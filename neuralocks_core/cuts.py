@@ -8,11 +8,12 @@ import numpy as np
 from neuralocks_core.motion import Clip
 
 JUMP = 0.4
-"""A joint that is farther [m] from where its motion was taking it than this, on both sides of a step, was put there: in
-1/24 s that takes 23 g. A fifth of a turn is as impossible."""
+"""A step is a cut if it ends farther [m] than this from where the motion before it, and the motion after it, would have
+put the joint: within 1/24 s that would take 23 g."""
 _TURN = np.radians(72.0)
+"""The same for the joint's rotation [rad]."""
 _LONGEST = 0.1
-"""Over longer steps [s] people come anywhere."""
+"""Longer steps [s] are no cuts: in that time people may come anywhere."""
 
 
 def find_cuts(clip: Clip, joint: int) -> np.ndarray:

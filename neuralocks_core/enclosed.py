@@ -6,8 +6,9 @@ import numpy as np
 from neuralocks_core.collider import Collider
 
 _DEEP = 2e-3
-"""Depth [m] from which on it is proven."""
+"""Only depths beyond this [m] are proven."""
 _FEW = 8
+"""Points proven at a time."""
 _AT_ONCE = 2_000_000
 """Pairs of a point and a triangle that are held in memory."""
 
@@ -15,7 +16,8 @@ _AT_ONCE = 2_000_000
 def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them, what seems deepest inside proven.
 
-    Air that seems inside seems deeper than what is: the deepest few are looked at, and more where one of them is air.
+    Points in free air that `Collider` takes for inside seem deeper than those that are. So the deepest few are proven, and
+    the next few as long as one of them turns out to be outside.
     """
     result = Collider(vertices, triangles).distance(points)[0]
     deep = np.flatnonzero(result < -_DEEP)

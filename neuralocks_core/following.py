@@ -14,7 +14,7 @@ from .scratch import Scratch
 from .turning import Coils
 
 WIDEST = spans.NODES + 4
-"""Most network vertices among which the same own vertex of several strands may find its own."""
+"""Strands are laid out as a grid where each own vertex depends on at most so many network vertices over all strands."""
 
 _scratch, _network = Scratch(), Scratch()
 

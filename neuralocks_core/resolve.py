@@ -18,7 +18,7 @@ MARGIN = 0.001
 ROUNDS = 5
 """Of finding the planes under a strand and laying it over them."""
 SLACK = np.float32(1e-5)
-"""A vertex that may rest inside must not be in trouble by the rounding of the network's output [m]."""
+"""Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
 CLAMPED = 2
 """Vertices at the root that never move."""
 STILL = 1e-3
@@ -28,7 +28,7 @@ BATCH = 2048
 PUSHED = 1024
 """Strands pushed together."""
 NEAR = 0.02
-"""Distance [m] within which a vertex of a strand in trouble minds the surface."""
+"""A strand that is pushed keeps clear of the surface where it comes within this distance [m]."""
 
 
 class Resolver:
@@ -106,7 +106,7 @@ class Resolver:
         return clearance(np.concatenate(parts))
 
     def serves(self, clip: Clip) -> bool:
-        """Whether one that is made for this clip pushes hair just alike."""
+        """Whether a resolver made for this clip would give the same results."""
         if self.body is None:
             return True
         same = np.array_equal(clip.shape[:1], self._clip.shape[:1])

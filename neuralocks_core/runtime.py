@@ -76,7 +76,7 @@ class StrandModel:
             for chunk in left:
                 function(chunk)
 
-        # The caller works, too, and is not woken for each chunk: in Python threads that wake cost more than they do.
+        # All threads, the caller's too, take chunks until none is left: waking one for each chunk costs more than a chunk.
         others = [self._pool.submit(work) for _ in range(min(self.threads, len(todo)) - 1)]
         try:
             work()

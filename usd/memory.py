@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory that is free but still held; only the GNU C library needs to be told."""
+"""Giving freed memory back to the system, which the GNU C library otherwise keeps."""
 
 import ctypes
 from collections.abc import Iterator
@@ -7,14 +7,14 @@ from contextlib import contextmanager
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
 SMALL, LARGE = 1 << 20, 32 << 20
-"""Bytes from which on memory is asked of the system by itself: while something is prepared, and else. It costs a third
-more time where frames are computed.
+"""Arrays of at least so many bytes are mapped one by one, and go back to the system when they are freed: SMALL while
+something large is prepared; LARGE otherwise, because mapping arrays makes frames a third slower.
 """
 
 
 @contextmanager
 def preparing() -> Iterator[None]:
-    """While something large is prepared: what it needed besides its result goes back to the system, in one piece."""
+    """While something large is prepared: all that it needs besides its result is given back at the end."""
     _tell("mallopt", _MMAP_THRESHOLD, SMALL)
     try:
         yield

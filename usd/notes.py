@@ -35,7 +35,7 @@ def left_out(error) -> str:
 
 
 def few(lines: list[str], most: int = 3) -> list[str]:
-    """Alike lines about prims, of which a set may have hundreds: the first ones, and how many more there are."""
+    """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
     return (
         lines if len(lines) <= most + 1 else [*lines[:most], f"{len(lines) - most} more prims are left out like that"]
     )

@@ -28,7 +28,6 @@ class OverrideWriter:
         part: file to write now.
         out: its final name, to which the shot's path is relative.
         shot: what is overridden.
-        grooms: the grooms that get samples.
         codes: all time codes of the bake.
     """
 

@@ -43,7 +43,7 @@ class GroomPoser:
         self._strength = strength
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
         self._resolver = None
-        with preparing():  # leaves 150 MB of a large groom
+        with preparing():  # or 150 MB of a large groom would stay allocated
             self._placer = GroomPlacer(item)
             self._session = StrandSession(model, self._placer.strands)
             self._session.anchor(self._sampler.held_bind(self._material))

@@ -15,9 +15,9 @@ from .nodes import geometry_nodes
 REST = "neuralocks_rest"
 TYPES = ("CATMULL_ROM", "POLY", "BEZIER", "NURBS")
 """By the number that Blender keeps in the attribute `curve_type`."""
-UNTOLD = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_rna.functions
-"""Whether Blender goes on with the bounds and the smooth curves of the points before unless strands are added, be it
-none; geometry nodes that resample or mesh the hair would use these.
+KEEPS_CACHES = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_rna.functions
+"""Whether Blender keeps the bounds and the smooth curves of the old points until strands are added, be it none: geometry
+nodes that resample or mesh the hair would use the old ones.
 """
 RADIUS = 0.005
 """Of hair without the attribute `radius`, as Cycles draws it, in the object's space."""
@@ -120,7 +120,7 @@ def write(data, values: np.ndarray) -> None:
     times slower.
     """
     data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
-    if UNTOLD:
+    if KEEPS_CACHES:
         data.add_curves([])
 
 

@@ -45,6 +45,7 @@ class LiveBones:
     """A rig model bound to a character.
 
     Attributes:
+        model: the rig model.
         bones: names of the hair bones, (N), as in Blender.
         joints: their places in the skeleton, (N,).
         modes: by bone, the rotation mode in which it is turned.

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boundary vectors of a clip, those of its own samples some at a time and kept: playing and scrubbing ask for these."""
+"""Boundary vectors of a clip: those at its own samples, which playing and scrubbing ask for, are made in blocks and kept."""
 
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
 
 BLOCK = 8
-"""Samples made together: each costs a third of what it costs alone, and the one frame that pays for all not much more
-than before."""
+"""Samples made together: each then costs a third of one made alone, and the frame that makes them is hardly slower."""
 
 
 class SampledBoundary:
