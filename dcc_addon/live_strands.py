@@ -8,6 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
+from neuralocks_core.rotation import inverse
 
 from . import preparing
 from .models import load_model, model_path
@@ -70,7 +71,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     row = sampled.motion.row(frame)
     if moved and row is not None and np.abs(place - sampled.motion.places[hair.name_full][row]).max() > TOLERANCE:
         sampled.stale = session.wanting = True  # the hair object has been moved since
-    to_local = np.linalg.inv(core @ place)
+    to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
     wanted = time, joints, to_local, material(settings), typed(settings, "motion"), settings.resolve
     prepared = prepare(hair, armature, sampled, wanted, wait)

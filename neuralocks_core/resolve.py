@@ -11,6 +11,7 @@ from neuralocks_core.character import Body, Character
 from neuralocks_core.collider import Collider
 from neuralocks_core.motion import Clip
 from neuralocks_core.near_body import NearBody, PosedBody
+from neuralocks_core.rotation import inverse
 from neuralocks_core.strands import StrandSet
 
 MARGIN = 0.001
@@ -131,7 +132,7 @@ class Resolver:
         return self._clip.shape[0]
 
     def _skinning(self, joints: np.ndarray) -> np.ndarray:
-        to_canonical = np.linalg.inv(self.character.canonical_to_world(joints))
+        to_canonical = inverse(self.character.canonical_to_world(joints))
         return to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
 
 

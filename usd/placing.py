@@ -10,7 +10,7 @@ from neuralocks_core.carrier import Carrier, Placing
 from neuralocks_core.character import Character
 from neuralocks_core.groom import Groom
 from neuralocks_core.locks import lock_of_roots
-from neuralocks_core.rotation import sizes
+from neuralocks_core.rotation import inverse, sizes
 from neuralocks_core.strands import StrandSet, strands_on
 
 from .curves import rest_points
@@ -60,7 +60,7 @@ class GroomPlacer:
             into: (P, 3) float32 that the points are put into; made if left out.
         """
         item = self.item
-        to_prim = np.linalg.inv(item.attachment.rig.border.to_core @ item.placement.at(time_code))
+        to_prim = inverse(item.attachment.rig.border.to_core @ item.placement.at(time_code))
         to_local = to_prim @ item.attachment.character.carrying(joints)
         points = np.empty((len(item.groom.points), 3), np.float32) if into is None else into
         return Placed(self, to_local, self._rest_in_place(to_local), points)
@@ -80,7 +80,7 @@ class GroomPlacer:
 
     def _rest_in_place(self, to_local: np.ndarray) -> np.ndarray | None:
         """The authored rest points (P, 3) if the groom as a whole stands where it rests."""
-        home = np.linalg.inv(self.item.attachment.to_bind)
+        home = inverse(self.item.attachment.to_bind)
         shift = self._corners @ (to_local - home)[:3, :3].T + (to_local - home)[:3, 3]
         scale = abs(sizes(home))
         return rest_points(self.item.prim) if np.abs(shift).max() < STILL * scale else None

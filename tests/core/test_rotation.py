@@ -26,6 +26,21 @@ def test_products_of_quaternions_of_any_length_turn_by_b_and_then_a():
     np.testing.assert_allclose(rotation.from_quaternion(product), one_by_one, atol=1e-12)
 
 
+def test_affine_transforms_are_undone_by_their_inverse_and_flat_ones_refused():
+    rng = np.random.default_rng(4)
+    for size in (1e-3, 1.0, 1e3):
+        transform = np.eye(4)
+        transform[:3] = rng.normal(size=(3, 4)) * size
+        assert np.allclose(rotation.inverse(transform) @ transform, np.eye(4), atol=1e-9)
+        assert np.allclose(rotation.inverse(transform), np.linalg.inv(transform), rtol=1e-9)
+    transform[:3, 1] = 0
+    with pytest.raises(NeuralocksError, match="flat"):
+        rotation.inverse(transform)
+    transform[1, 1] = np.nan
+    with pytest.raises(NeuralocksError, match="not finite"):
+        rotation.inverse(transform)
+
+
 def test_mirrored_and_flat_transforms_are_refused():
     with pytest.raises(NeuralocksError, match="mirrored"):
         rotation.rotation_part(np.diag([-1.0, 1, 1, 1]), "joint")
