@@ -18,6 +18,10 @@ LARGEST_FILE = 256 * 2**20
 MOST_JOINTS = 2048
 LARGEST = 1e6
 """No length in a file, in its own unit, is larger."""
+LONGEST_NUMBER = 64
+"""Characters; an array of words is as wide as its longest one."""
+MOST_NAMES = 2**24
+"""Characters of all joint paths together; each path repeats those of the joints above."""
 UNITS = (1.0, 0.01, 0.0254, 0.056444, 0.001)
 """[m] Lengths that files come in; the fourth is the CMU library's (an inch over 0.45)."""
 
@@ -126,6 +130,7 @@ def _hierarchy(words: _Words) -> list[_Joint]:
     words.expect("HIERARCHY")
     joints: list[_Joint] = []
     open_joints: list[int] = []
+    lengths: list[int] = []
     in_end = False
     while True:
         word = words.next()
@@ -137,6 +142,9 @@ def _hierarchy(words: _Words) -> list[_Joint]:
                 raise words.error(f"joint {len(joints)} stands in a wrong place")
             name = _name(words)
             joints.append(_Joint(name, open_joints[-1] if open_joints else -1, np.zeros(3)))
+            lengths.append(len(name) + (1 + lengths[open_joints[-1]] if open_joints else 0))
+            if sum(lengths) > MOST_NAMES:
+                raise words.error(f"has joint paths of more than {MOST_NAMES} characters", "shorten the names")
             open_joints.append(len(joints) - 1)
         elif key == "END" and open_joints and not in_end:
             in_end = True
@@ -193,6 +201,8 @@ def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
 
 def _values(words: _Words, frames: int, width: int) -> np.ndarray:
     block = words.words[words.place : words.place + frames * width]
+    if max(map(len, block), default=0) > LONGEST_NUMBER:
+        raise words.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
     try:
         values = np.array(block).astype(float).reshape(frames, width)
     except ValueError as error:

@@ -39,7 +39,9 @@ def read(content: bytes, subject: str) -> RawGroom:
         elif words[0] == b"strand" and len(words) >= 4 and words[2] == b"numVerts":
             left = _count(words[3], subject, number)
             counts.append(left)
-            coordinate = words[5].split() + words[6].split() if len(words) == 7 and words[4] == b"texcoord" else []
+            coordinate = (
+                words[5].split() + words[6].split(None, 2) if len(words) == 7 and words[4] == b"texcoord" else []
+            )
             uv.extend(_numbers(coordinate, subject, number) if len(coordinate) == 2 else (np.nan, np.nan))
         else:
             raise bad_file(subject, f"line {number} is neither a strand nor x y z")

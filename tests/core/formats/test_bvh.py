@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """BVH files give the motion they hold, and hostile ones one clear line."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,18 @@ def test_joints_without_channels_do_not_make_a_small_file_a_huge_clip(tmp_path):
     text = f"HIERARCHY ROOT r {{ OFFSET 0 0 0 CHANNELS 1 Xrotation {still} }} MOTION Frames: 2500 Frame Time: 0.01 "
     with pytest.raises(NeuralocksError, match="2500 frames of 2001 joints"):
         read_bvh(written(tmp_path, text + "0 " * 2500))
+
+
+def test_small_files_do_not_ask_for_much_memory(tmp_path):
+    frames = TEXT.replace("Frames: 2", "Frames: 500").replace("10 90 0  90", "10 90 0  " + "0" * 50_000 + " ")
+    deep = "".join(f"JOINT {'x' * 190}{i} {{ OFFSET 0 1 0 CHANNELS 0 }} "[:-2] for i in range(1000))
+    names = f"HIERARCHY ROOT r {{ OFFSET 0 0 0 CHANNELS 1 Xrotation {deep}"
+    for text, fact in ((frames + "0 " * 6000, "more than 64 characters"), (names, "joint paths of more than")):
+        tracemalloc.start()
+        with pytest.raises(NeuralocksError, match=fact):
+            read_bvh(written(tmp_path, text))
+        assert tracemalloc.get_traced_memory()[1] < 50 * len(text)
+        tracemalloc.stop()
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the shared motion capture is not there")
