@@ -13,9 +13,10 @@ from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel
 
+from .border import check_layer_name
 from .notes import out_of_range
 from .posing import GroomPoser
-from .samples import check_out, write_samples
+from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .time_codes import time_codes
 
@@ -85,7 +86,7 @@ def bake(
     """
     began = time.monotonic()
     out = Path(out)
-    check_out(out)
+    check_layer_name(out)
     jobs = _jobs(jobs)
     strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
     look = as_material(material)

@@ -126,6 +126,18 @@ def used_files(stage: Usd.Stage) -> list[str]:
     return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})
 
 
+def check_layer_name(out: Path) -> None:
+    """Refuse to write USD under a name that is no USD layer's.
+
+    Raises:
+        NeuralocksError: it has another ending, or is a folder's.
+    """
+    if out.suffix.lower() not in LAYERS:
+        raise NeuralocksError(f"{out}: is written as a USD layer; end its name with {', '.join(LAYERS)}")
+    if out.is_dir():
+        raise NeuralocksError(f"{out}: is a folder; give a file name")
+
+
 def check_not_input(out: Path, stage: Usd.Stage) -> None:
     """Refuse to write over a file that the stage is composed of.
 
@@ -142,8 +154,7 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
     Raises:
         NeuralocksError: the path has another ending, or cannot be written.
     """
-    if path.suffix.lower() not in LAYERS:
-        raise NeuralocksError(f"{path}: is written as USD; end the name with {', '.join(LAYERS)}")
+    check_layer_name(path)
     try:
         with atomic_write(path) as part:
             stage = Usd.Stage.CreateNew(str(part))

@@ -11,12 +11,12 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 
-from .border import Border, check_not_input, open_stage, write_stage
+from .border import LAYERS, Border, check_not_input, open_stage, write_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .placement import Placement
 
-USD = (".usd", ".usda", ".usdc", ".usdz")
+USD = (*LAYERS, ".usdz")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
-from .border import check_not_input
+from .border import check_layer_name, check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
@@ -78,8 +78,7 @@ def bake_rig(
         NeuralocksError: shot, model or output cannot be used.
     """
     out, shot = Path(out), Path(shot)
-    if out.suffix not in (".usd", ".usda", ".usdc"):
-        raise NeuralocksError(f"{out}: not a USD file name; end it in .usd, .usda or .usdc")
+    check_layer_name(out)
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)

@@ -136,5 +136,5 @@ def _blend_shapes(layer, prim, animation) -> None:
 
 def _save(layer: Sdf.Layer, out: Path) -> None:
     with atomic_write(out) as part:
-        if not layer.Export(str(part), args={"format": "usda" if out.suffix == ".usda" else "usdc"}):
+        if not layer.Export(str(part), args={"format": "usda" if out.suffix.lower() == ".usda" else "usdc"}):
             raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")

@@ -79,18 +79,6 @@ def write_samples(
         raise
 
 
-def check_out(out: Path) -> None:
-    """Refuse a name that is no USD layer.
-
-    Raises:
-        NeuralocksError: it is not.
-    """
-    if out.suffix.lower() not in (".usdc", ".usd", ".usda"):
-        raise NeuralocksError(f"{out}: a bake is a USD layer; end its name with .usdc, .usd or .usda")
-    if out.is_dir():
-        raise NeuralocksError(f"{out}: is a folder; give a file name")
-
-
 def _write(shot: Shot, codes, poser, spool: Spool, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
     plans = [Stencils(item, codes, velocities) for item in shot.grooms]

@@ -11,8 +11,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 
 from .bake import BakeResult, as_material, described
+from .border import check_layer_name
 from .placing import GroomPlacer
-from .samples import check_out, write_samples
+from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .stencils import Stencils
 from .time_codes import time_codes
@@ -49,7 +50,7 @@ def simulate(
     """
     began = time.monotonic()
     out = Path(out)
-    check_out(out)
+    check_layer_name(out)
     look = as_material(material)
     count = STRANDS if strands is None else strands
     if count < 1:

@@ -73,7 +73,7 @@ def test_a_body_is_written_whole_or_not_at_all(tmp_path):
     assert [p.name for p in path.parent.iterdir()] == ["body.usda"]
     again = read_rigs(path)[0].character
     assert np.allclose(again.skeleton.bind, bind) and np.allclose(again.body.points, points, atol=1e-6)
-    with pytest.raises(NeuralocksError, match="end the name"):
+    with pytest.raises(NeuralocksError, match="end its name"):
         write_body(tmp_path / "body.fbx", body)
 
 
