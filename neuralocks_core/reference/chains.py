@@ -5,33 +5,17 @@ Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per u
 
     sum m / (2 h^2) |x - y|^2 + sum m c / (2 h) |x - x_before|^2 + bend(D) - sum m (g + support) x + contact(x)
 
-with x the bones' far ends in the head's frame now and y where free flight would have taken them. Bones meet the body as
-spheres at their ends and middles, so that a clip needs no skin.
+with x the bones' far ends in the head's frame now and y where free flight would have taken them. What meets the body are
+points of the hair's mesh, each fixed to one joint, against the plane of the nearest body vertex.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from neuralocks_core.motion import GRAVITY
+from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearBody
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices
 from neuralocks_core.rotation import quaternion_product
-
-
-@dataclass(frozen=True)
-class BodyPoints:
-    """A few hundred body vertices around the head of each clip and step, in the head's frame.
-
-    Attributes:
-        points, normals: (C, T, P, 3) float32 [m].
-        rest_points, rest_normals: of the bind pose, (P, 3).
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    rest_points: np.ndarray
-    rest_normals: np.ndarray
 
 
 class ChainSolver:
@@ -42,23 +26,26 @@ class ChainSolver:
         tree: masses, stiffnesses and rest support (`training.rig_energy.RodTree`).
         damping: of motion in the head's frame [1/s].
         weight: times gravity.
-        radius: of the spheres that meet the body [m]; less where they are nearer at rest.
+        contacts: what meets the body; ends and middles of the bones if left out.
     """
 
     STIFFNESS = 4e4
-    """Of contact, per sphere and unit of its mass [1/s^2]: one g presses a sphere 0.25 mm deep."""
+    """Of contact, per unit of the mass that a joint moves [1/s^2]: one g presses it 0.25 mm deep."""
 
-    def __init__(self, chains: HairChains, tree, damping: float, weight: float = 1.0, radius: float = 0.012):
-        self.chains, self.tree, self.damping, self.weight, self.radius = chains, tree, damping, weight, radius
-        count, bones = len(chains), len(chains.bones)
-        # moves[m, j]: whether turning joint j moves the far end of bone m.
-        self.moves = np.zeros((bones, count), bool)
-        for bone, joint in enumerate(chains.bone_joint):
-            while joint >= 0:
-                self.moves[bone, joint] = True
-                joint = chains.parents[joint]
+    def __init__(self, chains: HairChains, tree, damping: float, weight: float = 1.0, contacts: Contacts | None = None):
+        self.chains, self.tree, self.damping, self.weight = chains, tree, damping, weight
+        self.contacts = contacts or Contacts.of_bones(chains)
+        count, owner = len(chains), self.contacts.joint
+        carries = np.eye(count, dtype=bool)  # carries[i, j]: whether turning joint j turns joint i
+        for joint, parent in enumerate(chains.parents):
+            if parent >= 0:
+                carries[joint] |= carries[parent]
+        self.moves, self.contact_moves = carries[chains.bone_joint], carries[owner]
         self.groups = [np.flatnonzero(chains.chain == c) for c in range(len(chains.roots))]
         self.group_bones = [np.flatnonzero(np.isin(chains.bone_joint, g)) for g in self.groups]
+        self.group_contacts = [np.flatnonzero(np.isin(owner, g)) for g in self.groups]
+        mass = np.bincount(chains.bone_joint, tree.mass, count)
+        self.contact_stiffness = (self.STIFFNESS * mass / np.maximum(np.bincount(owner, minlength=count), 1))[owner]
 
     def simulate(
         self, heads: np.ndarray, step: float, body: BodyPoints | None = None, *, substeps: int = 2, warm_up: int = 60
@@ -77,7 +64,7 @@ class ChainSolver:
         h = step / substeps
         turns = np.zeros((clips, len(self.chains), 4))
         turns[..., 0] = 1
-        limit = self._limits(body)
+        limit, near = self._limits(body), None
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
         before = last = None
         previous = heads[:, 0]
@@ -94,16 +81,18 @@ class ChainSolver:
                     before = last
                 flight = np.einsum("cji,cmj->cmi", rotation, 2 * last - before - origin[:, None])
                 gravity = np.einsum("cji,j->ci", rotation, GRAVITY * self.weight)
-                near = None if body is None else (body.points[:, sample], body.normals[:, sample], limit)
-                turns, ends = self._step(turns, ends, flight, gravity, h, near)
+                if part == 0 and body is not None:
+                    near = NearBody(body.points[:, sample], body.normals[:, sample])
+                turns, ends = self._step(turns, ends, flight, gravity, h, near, limit)
                 before, last = last, np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
             previous = heads[:, sample]
             result[:, sample] = turns
         return result
 
-    def _step(self, turns, start, flight, gravity, h, near, iterations: int = 2):
+    def _step(self, turns, start, flight, gravity, h, near, limit, iterations: int = 2):
         chains, tree = self.chains, self.tree
         inertia, drag = 1 / h**2, self.damping / h
+        planes = None
         for _ in range(iterations):
             matrices = quaternion_matrices(turns)
             rotations, positions = pose_chains(chains, matrices)
@@ -113,14 +102,16 @@ class ChainSolver:
                 -tree.mass[:, None] * (inertia * (ends - flight) + drag * (ends - start) - gravity[:, None])
                 + tree.support
             )
-            stiff = np.broadcast_to((tree.mass * (inertia + drag))[:, None, None] * np.eye(3), (*ends.shape, 3)).copy()
+            stiff = tree.mass * (inertia + drag)
             if near is not None:
-                self._contact(ends, positions, near, force, stiff)
+                touching = self._touching(rotations, positions)
+                planes = near.planes(touching) if planes is None else planes
+                depth = np.maximum(0, limit + planes[1] - np.einsum("cqi,cqi->cq", planes[0], touching))
             w, v = turns[..., :1], turns[..., 1:]
             # d/dw of 2 k |v|^2 for a turn w applied from the left, in the carrier's axes.
             bend = -np.einsum("cnij,cnj->cni", carriers, 2 * tree.stiffness[:, None] * w * v)
             change = np.zeros_like(v)
-            for joints, bones in zip(self.groups, self.group_bones):
+            for joints, bones, contacts in zip(self.groups, self.group_bones, self.group_contacts):
                 arm = ends[:, bones, None] - positions[:, None, joints]
                 arm = arm * self.moves[bones][:, joints, None]
                 cross = np.zeros((*arm.shape, 3))  # x moves by w x arm = -[arm] w
@@ -128,12 +119,18 @@ class ChainSolver:
                 cross -= np.swapaxes(cross, -1, -2)
                 count = len(joints)
                 jacobian = cross.transpose(0, 1, 3, 2, 4).reshape(len(turns), 3 * len(bones), 3 * count)
-                weighted = stiff[:, bones] @ jacobian.reshape(len(turns), len(bones), 3, 3 * count)
-                hessian = np.swapaxes(jacobian, 1, 2) @ weighted.reshape(jacobian.shape)
+                hessian = np.swapaxes(jacobian, 1, 2) @ (np.repeat(stiff[bones], 3)[:, None] * jacobian)
                 index = np.arange(3 * count)
                 hessian[:, index, index] += np.repeat(tree.stiffness[joints], 3) + 1e-9
                 right = np.einsum("cab,ca->cb", jacobian, force[:, bones].reshape(len(turns), -1))
                 right += bend[:, joints].reshape(len(turns), -1)
+                if near is not None:
+                    arm = touching[:, contacts, None] - positions[:, None, joints]
+                    arm = arm * self.contact_moves[contacts][:, joints, None]
+                    away = np.cross(arm, planes[0][:, contacts, None]).reshape(len(turns), len(contacts), 3 * count)
+                    push = self.contact_stiffness[contacts] * (depth[:, contacts] > 0)
+                    hessian += np.swapaxes(away * push[..., None], 1, 2) @ away
+                    right += np.einsum("cqa,cq->ca", away, push * depth[:, contacts])
                 solved = np.linalg.solve(hessian, right[..., None])[..., 0].reshape(len(turns), count, 3)
                 change[:, joints] = solved
             size = np.linalg.norm(change, axis=-1, keepdims=True)
@@ -144,42 +141,17 @@ class ChainSolver:
         return turns, bone_ends(chains, *pose_chains(chains, quaternion_matrices(turns)))
 
     def _limits(self, body):
-        """Distance at which each end and middle touches: its radius, or its distance at rest if that is less."""
+        """Distance that each contact keeps: its radius, or its distance at rest if that is less."""
         if body is None:
             return None
-        ends = self.chains.origins[self.chains.bone_joint] + self.chains.bones
-        middles = ends - self.chains.bones / 2
-        distance = _plane_distance(np.stack([ends, middles])[None], body.rest_points[None], body.rest_normals[None])[0][
-            0
-        ]
-        return np.minimum(self.radius, distance)
+        normals, offsets = NearBody(body.rest_points[None], body.rest_normals[None]).planes(self.contacts.points[None])
+        return np.minimum(self.contacts.radius, np.einsum("qi,qi->q", normals[0], self.contacts.points) - offsets[0])
 
-    def _contact(self, ends, positions, near, force, stiff) -> None:
-        points, normals, limit = near
-        starts = positions[:, self.chains.bone_joint]
-        spheres = np.stack([ends, (ends + starts) / 2], axis=1)
-        distance, normal = _plane_distance(spheres, points, normals)
-        depth = np.maximum(0, limit - distance)
-        push = self.STIFFNESS * self.tree.mass
-        for row, share in ((0, 1.0), (1, 0.5)):  # a middle is moved half by the end
-            n = normal[:, row]
-            force += share * (push * depth[:, row])[..., None] * n
-            touching = (depth[:, row] > 0) * push * share * share
-            stiff += touching[..., None, None] * n[..., :, None] * n[..., None, :]
-
-
-def _plane_distance(spheres, points, normals):
-    """Distance (C, R, M) to the plane of the nearest body vertex, and its normal; spheres (C, R, M, 3), points (C, P,
-    3).
-    """
-    clips = len(spheres)
-    flat = spheres.reshape(clips, -1, 3).astype(np.float32)
-    square = np.einsum("cpi,cpi->cp", points, points)[:, None] - 2 * flat @ np.swapaxes(points, 1, 2).astype(np.float32)
-    nearest = square.argmin(axis=-1)
-    rows = np.arange(clips)[:, None]
-    normal = normals[rows, nearest]
-    distance = np.einsum("csi,csi->cs", flat - points[rows, nearest], normal)
-    return distance.reshape(spheres.shape[:-1]).astype(float), normal.reshape(spheres.shape).astype(float)
+    def _touching(self, rotations, positions):
+        """Where the contacts are, (C, Q, 3)."""
+        owner = self.contacts.joint
+        arm = self.contacts.points - self.chains.origins[owner]
+        return positions[:, owner] + np.einsum("cqij,qj->cqi", rotations[:, owner], arm)
 
 
 def _between(a, b, share):

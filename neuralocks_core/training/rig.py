@@ -13,8 +13,8 @@ import torch
 from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend
+from neuralocks_core.training.rig_contact import HairOnBodies
 from neuralocks_core.training.rig_energy import RigMaterial
-from neuralocks_core.training.rig_held import HeldPoses
 from neuralocks_core.training.rig_network import TinyNet
 from neuralocks_core.training.rig_report import static_report, within
 
@@ -60,11 +60,11 @@ def train_static(
     say = progress or (lambda done, total, message: None)
     say(0, 1, "posing bodies")
     strict = replace(material, margin=material.margin + _ROOM, collision=_STRICTER * material.collision)
-    held = HeldPoses(rig, strict, _POOL, rng, spec)
+    held = HairOnBodies(rig, strict, _POOL, rng, spec)
     net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec, max_angle)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
-        elastic, collision = held.parts(net, batch, again=batch // 2)
+        elastic, collision = held.parts(net, batch)
         return {"elastic": elastic.mean(), "collision": collision.mean()}
 
     began = time.monotonic()

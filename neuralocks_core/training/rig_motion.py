@@ -9,7 +9,8 @@ import numpy as np
 
 from neuralocks_core.motion import Clip
 from neuralocks_core.random_motion import KINDS, scripted_clip
-from neuralocks_core.reference.chains import BodyPoints, ChainSolver
+from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
+from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
@@ -36,7 +37,8 @@ def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, rate: f
     if bodies[0] is not None:
         rest = body_around(rig, rig.character.skeleton.bind[None])
         body = BodyPoints(np.stack([b[0] for b in bodies]), np.stack([b[1] for b in bodies]), rest[0][0], rest[1][0])
-    solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, material.weight)
+    contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin) if len(rig.points) else None
+    solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, material.weight, contacts)
     return np.stack(features), solver.simulate(np.stack(heads), 1 / rate, body)
 
 

@@ -26,17 +26,27 @@ class PosePool:
         rng: decides all of them.
         most_points: body vertices kept of each (nearest-vertex planes need no more).
         whole: keep each whole body around the head too, for exact distances.
+        moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
+            necks if left out.
 
     Attributes:
+        moment: which of these each pose is, (P,).
         relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
         shapes: blend shape weights of each, (P, B).
         bodies: with `whole`, vertices of the body around the head of each (V, 3) float32 [m], canonical; else None.
     """
 
     def __init__(
-        self, rig: HairRig, count: int, rng: np.random.Generator, most_points: int = 2000, whole: bool = False
+        self,
+        rig: HairRig,
+        count: int,
+        rng: np.random.Generator,
+        most_points: int = 2000,
+        whole: bool = False,
+        moving: np.ndarray | None = None,
     ):
-        self.rig, self.count, self._rng, self._oldest = rig, count, rng, 0
+        self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
+        self.moment = np.zeros(count, int)
         self.relative = np.empty((count, 2, 3, 3))
         self._patch = _BodyPatch(rig, rng, most_points) if rig.character.body is not None and len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.offsets) if self._patch else 0))
@@ -54,9 +64,13 @@ class PosePool:
     def renew(self, count: int) -> np.ndarray:
         """Put new poses in the place of the oldest; which these were, (count,)."""
         character = self.rig.character
-        skinning = _random_skinning(character, count, self._rng)
         rows = (self._oldest + np.arange(count)) % self.count
         self._oldest = (self._oldest + count) % self.count
+        if self._moving is None:
+            skinning = _random_skinning(character, count, self._rng)
+        else:
+            self.moment[rows] = self._rng.integers(0, len(self._moving), count)
+            skinning = self._moving[self.moment[rows]]
         facing, head = character.facing, character.head
         indices = [character.humanoid.nearest(name) for name in ("neck", "upper_chest")]
         turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
@@ -223,7 +237,7 @@ def _random_skinning(character, count, rng) -> np.ndarray:
     return skinning
 
 
-def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 500) -> tuple[np.ndarray, np.ndarray] | None:
+def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tuple[np.ndarray, np.ndarray] | None:
     """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
     canonical space of the head.
     """

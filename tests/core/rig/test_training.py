@@ -26,7 +26,6 @@ from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig import train_static
 from neuralocks_core.training.rig_dynamic import train_dynamic
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns
-from neuralocks_core.training.rig_held import HeldPoses  # noqa: E402
 from neuralocks_core.training.rig_motion import SPRINGS, motion_report
 from neuralocks_core.training.rig_poses import PosePool, posed_distances, rest_distances
 from tests.core.rig.builders import character, random_model, tail
@@ -196,26 +195,6 @@ def test_renewed_poses_take_the_place_of_the_oldest():
         same = (pool.relative == before).all(axis=(1, 2, 3))
         assert same[kept].all() and not same[changed].any()
         before = pool.relative.copy()
-
-
-def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
-    """Half of a batch, if asked for: there the same answer costs more than in new poses; renewed poses are forgotten."""
-    monkeypatch.setattr("neuralocks_core.training.rig_held.HARD", 16)
-    rig, radius = with_balls()
-    points = np.random.default_rng(0).normal(0, 1, (40, 3))
-    points = [0, 0.0, 0.02] + 1.3 * radius * points / np.linalg.norm(points, axis=1, keepdims=True)
-    rig = replace(rig, points=points, weights=np.eye(1, len(rig.chains) + 1).repeat(len(points), 0))
-    held = HeldPoses(rig, RigMaterial(), 64, np.random.default_rng(0), rig_spec())
-
-    def still(features):
-        turns = torch.zeros(len(features), len(rig.chains), 4)
-        turns[..., 0] = 1
-        return turns
-
-    costs = np.array([held.parts(still, 8, again=4)[1].numpy() for _ in range(200)])[20:]
-    assert costs[:, :4].mean() > 1.3 * costs[:, 4:].mean() > 0
-    alone = [held.parts(still, 8)[1].mean().item() for _ in range(40)]
-    assert np.mean(alone) == pytest.approx(costs[:, 4:].mean(), rel=0.3)
 
 
 def test_a_teleport_and_other_frame_rates():

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What mesh hair does at the body: in the simulation of its chains, and in what networks learn from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+torch = pytest.importorskip("torch")
+
+from neuralocks_core.character import Body
+from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
+from neuralocks_core.reference.chains import ChainSolver
+from neuralocks_core.rig import find_chains, rig_spec
+from neuralocks_core.rig.kinematics import pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.network import feature_columns
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rotation import from_vector
+from neuralocks_core.training.rig_contact import HairOnBodies, Moments
+from neuralocks_core.training.rig_energy import RigMaterial, RodTree
+from tests.core.rig.builders import character, tail
+
+RADIUS = 0.12
+CENTRE = np.array([0, 0.05, 0.02])
+"""Of the head's ball, from the head joint."""
+
+
+def on_a_ball() -> HairRig:
+    """A tail of ribbons, 6 cm wide, behind a ball for a head."""
+    who = character(tail("hair", 5, at=(0, 1.65, -0.12), step=(0, -0.06, -0.002)))
+    ball = trimesh.creation.icosphere(4, RADIUS)
+    points = ball.vertices + CENTRE + who.skeleton.bind[who.head, :3, 3]
+    joints = np.full((len(points), 1), who.head)
+    who = replace(who, body=Body(points, ball.faces, joints, np.ones((len(points), 1))))
+    chains = find_chains(who)
+    along = chains.origins[:, None] + chains.bones[:, None] * np.linspace(0.1, 0.9, 5)[:, None]
+    points = np.concatenate([along + (side, 0, 0) for side in (-0.03, 0.0, 0.03)], axis=1)
+    weights = np.repeat(np.eye(len(chains), len(chains) + 1, 1), points.shape[1], axis=0)
+    return HairRig(who, chains, points.reshape(-1, 3), weights, np.zeros((0, 3), int))
+
+
+def test_ribbons_that_fall_over_the_head_lie_on_it():
+    """Edges as well as middles; without a body they fall through."""
+    rig = on_a_ball()
+    body = rig.character.canonical(rig.character.body.points).astype(np.float32)
+    normals = ((body - CENTRE) / RADIUS).astype(np.float32)
+    heads = np.tile(np.eye(4), (1, 60, 1, 1))
+    bow = np.stack([from_vector(np.array([angle, 0, 0])) for angle in np.linspace(0, np.radians(110), 30)])
+    heads[0, :, :3, :3] = np.concatenate([bow, bow[-1:].repeat(30, axis=0)])
+    balls = BodyPoints(body[None, None].repeat(60, 1), normals[None, None].repeat(60, 1), body, normals)
+    material = RigMaterial(bend=1e-3, rest_support=False)
+    contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin)
+    solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, contacts=contacts)
+    depths = []
+    for met in (None, balls):
+        turns = solver.simulate(heads, 1 / 30, met)[0].astype(float)
+        points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)), rig.points, rig.weights)
+        depths.append(RADIUS - np.linalg.norm(points - CENTRE, axis=-1).min())
+    assert depths[0] > 0.02 and depths[1] < -0.004, depths
+
+
+def test_contacts_are_the_corners_of_each_joint():
+    """Of a ribbon its four corners before anything else; of a joint without a mesh the bone's end."""
+    rig = on_a_ball()
+    contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, 0.01)
+    mine = rig.points[rig.weights[:, 1] > 0.5]
+    first = contacts.points[contacts.joint == 0][:4]
+    extremes = [np.abs(first[:, axis] - mine[:, axis].mean()).min() for axis in (0, 1)]
+    np.testing.assert_allclose(extremes, np.ptp(mine[:, :2], axis=0) / 2, atol=1e-9)
+    bare = Contacts.of_mesh(rig.chains, rig.points[:0], rig.weights[:0], 0.01)
+    np.testing.assert_allclose(bare.points, rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones)
+
+
+def test_bodies_in_motion_are_those_that_were_met():
+    """Each with what the network reads at that moment."""
+    rig = on_a_ball()
+    spec = rig_spec(dynamic=True)
+    skinning = np.tile(np.eye(4), (2, len(rig.character.skeleton.names), 1, 1))
+    turned = rig.character.skeleton.bind @ np.linalg.inv(rig.character.skeleton.bind)
+    turned[rig.character.head, :3, :3] = from_vector(np.array([0, 0.5, 0]))
+    skinning[1] = turned
+    features = np.random.default_rng(0).normal(size=(2, len(feature_columns(spec)))).astype(np.float32)
+    hair = HairOnBodies(rig, RigMaterial(), 16, np.random.default_rng(0), spec, Moments(features, skinning))
+    seen = []
+
+    def still(read):
+        seen.append(read.numpy())
+        turns = torch.zeros(len(read), len(rig.chains), 4)
+        turns[..., 0] = 1
+        return turns
+
+    hair.parts(still, 64)
+    rows = (seen[0][:, None] == features).all(-1)
+    assert rows.any(1).all() and rows.any(0).all()
+    neck = hair.pool.relative[:, 0]
+    expected = np.stack([np.eye(3), turned[rig.character.head, :3, :3].T])
+    np.testing.assert_allclose(neck, expected[hair.pool.moment], atol=1e-12)
+
+
+def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
+    """Half of a batch: there the same answer costs more than in new poses; renewed poses are forgotten."""
+    monkeypatch.setattr("neuralocks_core.training.rig_contact.HARD", 16)
+    rig = on_a_ball()
+    points = np.random.default_rng(0).normal(0, 1, (40, 3))
+    points = CENTRE + 1.3 * RADIUS * points / np.linalg.norm(points, axis=1, keepdims=True)
+    rig = replace(with_chest(rig), points=points, weights=np.eye(1, len(rig.chains) + 1).repeat(len(points), 0))
+    held = HairOnBodies(rig, RigMaterial(), 64, np.random.default_rng(0), rig_spec())
+
+    def still(features):
+        turns = torch.zeros(len(features), len(rig.chains), 4)
+        turns[..., 0] = 1
+        return turns
+
+    costs = np.array([held.parts(still, 8)[1].numpy() for _ in range(200)])[20:]
+    assert costs[:, :4].mean() > 1.3 * costs[:, 4:].mean() > 0
+
+
+def with_chest(rig: HairRig) -> HairRig:
+    """The same with another ball, for a chest."""
+    who = rig.character
+    names = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
+    body = who.body
+    chest = body.points - body.points.mean(axis=0) + (0, 1.3, 0)
+    joints = np.concatenate([body.joint_indices, np.full_like(body.joint_indices, names.index("chest"))])
+    triangles = np.concatenate([body.triangles, body.triangles + len(chest)])
+    both = Body(np.concatenate([body.points, chest]), triangles, joints, np.ones_like(joints, float))
+    return replace(rig, character=replace(who, body=both))
