@@ -44,18 +44,8 @@ def train(
     """Train a tiny network for the hair joints of one rig. No data is needed."""
     if out.suffix != ".neuralocks":
         raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
-    if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
-        raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
-    if hidden is not None and not 1 <= hidden <= 256:
-        raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
-    if clips is not None and not 2 <= clips <= 10000:
-        raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
-    if not dynamic and (clips is not None or damping is not None):
-        raise NeuralocksError("--clips, --damping: nothing for them to do in held poses; leave out --quasi-static")
     changed = {"bend": bend, "weight": weight, "damping": damping}
-    for name, value in changed.items():
-        if value is not None and not 1e-6 < value < 1e4:
-            raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
+    _check_amounts(dynamic, seconds, steps, hidden, clips, changed)
     from .rig_train import train_rig
 
     with progress_bar("training") as progress:
@@ -84,6 +74,21 @@ def train(
         )
         for line in report_lines(model.report):
             typer.echo(line)
+
+
+def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
+    """Refuse numbers that no training can use, before anything is read; None stands for a default."""
+    if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
+        raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
+    if hidden is not None and not 1 <= hidden <= 256:
+        raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
+    if clips is not None and not 2 <= clips <= 10000:
+        raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
+    if not dynamic and (clips is not None or material["damping"] is not None):
+        raise NeuralocksError("--clips, --damping: nothing for them to do in held poses; leave out --quasi-static")
+    for name, value in material.items():
+        if value is not None and not 1e-6 < value < 1e4:
+            raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
 
 
 @command("bake")

@@ -16,7 +16,7 @@ from neuralocks_core.rotation import sizes
 from .blend_shapes import knot_weights, shares
 from .border import Border
 from .joints import JointSource
-from .surface import SkinnedMesh, bound_meshes, merged_body
+from .surface import StageMesh, bound_meshes, merged_body
 
 CLOSE = 1.5 / 24
 """Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
@@ -42,7 +42,7 @@ class StageRig:
     path: str
     source: JointSource = field(repr=False)
     border: Border
-    meshes: list[SkinnedMesh] = field(repr=False)
+    meshes: list[StageMesh] = field(repr=False)
     to_bind: np.ndarray = field(repr=False)
     character: Character = field(repr=False)
     clip: Clip = field(repr=False)

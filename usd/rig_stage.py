@@ -12,7 +12,7 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
-from .border import Border, open_stage, transformed
+from .border import Border, open_stage
 from .damage import names_damage
 from .notes import nothing_found
 from .rig_source import StageRig, find_skeletons, read_rig
@@ -89,15 +89,10 @@ def read_rigged_hair(
 
 def core_meshes(source: StageRig) -> list[SkinnedMesh]:
     """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
-    result = []
-    for mesh in source.meshes:
-        matrix = source.to_bind @ mesh.geom_bind
-        flip = np.linalg.det(matrix[:3, :3]) < 0
-        faces = mesh.triangles[:, ::-1] if flip else mesh.triangles
-        result.append(
-            SkinnedMesh(str(mesh.prim.GetPath()), transformed(mesh.points, matrix), faces, mesh.indices, mesh.weights)
-        )
-    return result
+    return [
+        SkinnedMesh(str(mesh.prim.GetPath()), *mesh.in_bind(source.to_bind), mesh.indices, mesh.weights)
+        for mesh in source.meshes
+    ]
 
 
 def weight_notes(source: StageRig) -> list[str]:

@@ -19,7 +19,7 @@ from .border import transformed
 from .curves import moment, rest_points
 from .placement import Placement
 from .rig_source import StageRig
-from .surface import SkinnedMesh, rest_value
+from .surface import StageMesh, rest_value
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
@@ -39,7 +39,7 @@ class Seat:
 
     distance: float
     rig: StageRig
-    mesh: SkinnedMesh
+    mesh: StageMesh
     to_bind: np.ndarray
     way: int
     points: np.ndarray
@@ -67,7 +67,7 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement) -> Seat | Non
 
 def ways(
     rig: StageRig,
-    mesh: SkinnedMesh | None,
+    mesh: StageMesh | None,
     placement: Placement,
     when: float | None = None,
     *,

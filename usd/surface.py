@@ -17,7 +17,7 @@ from .placement import Placement
 
 
 @dataclass(frozen=True)
-class SkinnedMesh:
+class StageMesh:
     """One mesh that follows a skeleton.
 
     Attributes:
@@ -39,8 +39,14 @@ class SkinnedMesh:
     shapes: dict[str, Knots] = field(repr=False)
     placement: Placement = field(repr=False)
 
+    def in_bind(self, to_bind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (V, 3) [m] and outward triangles (F, 3) in bind world, by its rig's way there (4, 4)."""
+        matrix = to_bind @ self.geom_bind
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        return transformed(self.points, matrix), self.triangles[:, ::-1] if mirrored else self.triangles
 
-def bound_meshes(stage: Usd.Stage, source: JointSource, notes: list[str]) -> list[SkinnedMesh]:
+
+def bound_meshes(stage: Usd.Stage, source: JointSource, notes: list[str]) -> list[StageMesh]:
     """Visible meshes that the skeleton skins, in stage order.
 
     Raises:
@@ -135,7 +141,7 @@ def _in_effect(prim: Usd.Prim, name: str):
     return None
 
 
-def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
+def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
     """All meshes as one Body.
 
     Args:
@@ -147,11 +153,9 @@ def merged_body(meshes: list[SkinnedMesh], to_bind: np.ndarray, keep: set[str] |
         return None
     width = max(m.indices.shape[1] for m in meshes)
     ends = np.cumsum([0] + [len(m.points) for m in meshes])
-    points = np.concatenate([transformed(m.points, to_bind @ m.geom_bind) for m in meshes])
-    flip = [np.linalg.det((to_bind @ m.geom_bind)[:3, :3]) < 0 for m in meshes]
-    triangles = np.concatenate(
-        [(m.triangles[:, ::-1] if f else m.triangles) + start for m, f, start in zip(meshes, flip, ends)]
-    )
+    placed = [m.in_bind(to_bind) for m in meshes]
+    points = np.concatenate([own for own, _ in placed])
+    triangles = np.concatenate([faces + start for (_, faces), start in zip(placed, ends)])
     pad = [((0, 0), (0, width - m.indices.shape[1])) for m in meshes]
     shapes = {}
     for name, knots in knot_weights([mesh.shapes for mesh in meshes]).items():
@@ -187,7 +191,7 @@ def _ever_visible(prim: Usd.Prim) -> bool:
     return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
 
 
-def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh | None:
+def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | None:
     mesh, path = UsdGeom.Mesh(prim), prim.GetPath()
     points = rest_value(mesh.GetPointsAttr())
     if points is None or not len(points):
@@ -202,7 +206,7 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> SkinnedMesh 
         triangles = triangles[:, ::-1]
     indices, weights = joint_influences(prim, len(points), source)
     shapes = read_blend_shapes(prim, len(points), notes)
-    return SkinnedMesh(
+    return StageMesh(
         prim=prim,
         geom_bind=geom_bind(prim),
         points=points,
