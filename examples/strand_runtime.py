@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The strand network in a runtime of one's own: python examples/strand_runtime.py FOLDER SHOT BAKED
+"""The strand network in a runtime of one's own: python examples/strand_runtime.py FOLDER SHOT BAKED [NAME=VALUE ...]
 
 FOLDER is what `neuralocks export -o FOLDER --shot SHOT` wrote, BAKED what `neuralocks bake SHOT -o BAKED --no-resolve`
-did. Nothing of Neuralocks is imported: this is a worked example of `description.json` for whoever writes the same in an
-engine, and prints how far its strands lie from the bake's. The stage must be in metres, Y up, and the groom's strands of
+did, with `--material NAME=VALUE` where that is given here (bend, weight, damping or clumping). Nothing of Neuralocks is
+imported: this is a worked example of `description.json` for whoever writes the same in an engine, and prints how far its
+strands lie from the bake's. The stage must be in metres, Y up, and the groom's strands of
 24 vertices even in arc length, since those of the network are compared.
 """
 
@@ -18,18 +19,28 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 GRAVITY = np.array([0.0, -9.81, 0.0])
+DEFAULT = {"bend": 1e-3, "weight": 1.0, "damping": 10.0, "clumping": 60.0}
 
 
 class Runtime:
-    """One groom: what no frame changes is read once; `strands` makes a frame."""
+    """One groom in one material: what no frame changes is read once; `strands` makes a frame."""
 
-    def __init__(self, folder: Path, name: str):
+    def __init__(self, folder: Path, name: str, material: dict[str, float]):
         described = json.loads((folder / "description.json").read_text())
         self.model, self.parts = described["model"], described["boundary vector"]["parts"]
         self.weights = np.array(described["boundary vector"]["bin weights"])
         self.joints = described["grooms"]["files"][name]["joints"]
         self.fixed = dict(np.load(folder / name))
         self.frame, self.tail = (onnxruntime.InferenceSession(folder / f"{n}.onnx") for n in ("frame", "tail"))
+        material = DEFAULT | material
+        ratios = [np.log(material[name] / DEFAULT[name]) for name in ("bend", "weight", "damping")]
+        self.fixed["held"][slice(*self.parts["material"])] = [*ratios, 0]
+        for locks in ("", "lock_"):
+            self.fixed[f"{locks}anchor"][:] = 0
+            self.fixed[f"{locks}anchor"] = self.answer("offsets", self.made(self.fixed["held"]), locks)
+        length = np.maximum(self.fixed["length"], 1e-3)
+        own = 12.36 * material["bend"] / length**4 + 9.81 * material["weight"] / length
+        self.stray = ((own + 120) / (own + 2 * material["clumping"]))[:, None, None]
 
     def turns(self, rotations: np.ndarray) -> np.ndarray:
         """(T, n, 3, 3) world rotations of the joints named, since the bind pose."""
@@ -60,11 +71,26 @@ class Runtime:
         result[slice(*self.parts["history"])] = (np.array(means) * self.weights[:, None]).ravel()
         return result
 
+    def made(self, vector: np.ndarray) -> dict[str, np.ndarray]:
+        """What frame.onnx makes of a boundary vector."""
+        return {o.name: v for o, v in zip(self.frame.get_outputs(), self.frame.run(None, {"frame": vector[None]}))}
+
+    def answer(self, output: str, frame: dict[str, np.ndarray], locks: str = "") -> np.ndarray:
+        """An output of tail.onnx for the strands, or with "lock_" for the mean strands of their locks."""
+        same = {name: self.fixed[locks + name] for name in ("strand_part", "anchor", "edges")}
+        return self.tail.run([output], same | frame)[0]
+
     def strands(self, vector: np.ndarray, head: np.ndarray) -> np.ndarray:
         """World points (S, 24, 3) [m] for a boundary vector and the head joint's world transform (4, 4)."""
-        frame = {o.name: v for o, v in zip(self.frame.get_outputs(), self.frame.run(None, {"frame": vector[None]}))}
-        same = {name: self.fixed[name] for name in ("strand_part", "anchor", "edges")}
-        moved = self.tail.run(["displacement"], same | frame)[0].reshape(-1, 24, 3) * self.fixed["valid"][:, None, None]
+        frame = self.made(vector)
+        moved = self.answer("displacement", frame).reshape(-1, 24, 3)
+        if (self.stray != 1).any():
+            led = self.answer("displacement", frame, "lock_").reshape(-1, 24, 3)[self.fixed["lock"]]
+            edges = np.diff(self.fixed["rest"], axis=1)
+            wanted = edges + np.diff(led + self.stray * (moved - led), axis=1)
+            longer = np.linalg.norm(wanted, axis=2) / np.linalg.norm(edges, axis=2).clip(1e-12)
+            moved[:, 2:] = np.cumsum((wanted / longer[..., None].clip(1e-12) - edges)[:, 1:], axis=1)
+        moved *= self.fixed["valid"][:, None, None]
         to_world = head @ self.fixed["canonical_to_head"]
         return (self.fixed["rest"] + moved) @ to_world[:3, :3].T + to_world[:3, 3]
 
@@ -105,12 +131,12 @@ class Motion:
         return places, turns.reshape(len(times), -1, 3, 3)
 
 
-def largest_difference(folder: Path, shot: Path, baked: Path) -> float:
-    """How far this runtime's strands lie from a bake's at most [m]."""
+def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str, float]) -> float:
+    """How far this runtime's strands lie from a bake's in the same material at most [m]."""
     files = json.loads((folder / "description.json").read_text())["grooms"]["files"]
     stage, result, worst = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), 0.0
     for name, facts in files.items():
-        runtime, motion = Runtime(folder, name), Motion(stage, facts["joints"])
+        runtime, motion = Runtime(folder, name, material), Motion(stage, facts["joints"])
         boundary = runtime.model["boundary"]
         curves = UsdGeom.BasisCurves(result.GetPrimAtPath(facts["prim"]))
         for code in curves.GetPointsAttr().GetTimeSamples():
@@ -128,4 +154,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ("folder", "shot", "baked"):
         parser.add_argument(name, type=Path)
-    print(f"{largest_difference(**vars(parser.parse_args())):.2e} m at most from the bake")
+    parser.add_argument("material", nargs="*", metavar="NAME=VALUE", type=lambda word: word.split("="))
+    given = parser.parse_args()
+    numbers = {name: float(value) for name, value in given.material}
+    print(f"{largest_difference(given.folder, given.shot, given.baked, numbers):.2e} m at most from the bake")

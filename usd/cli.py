@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line `neuralocks`. Each command imports what it needs when it runs, so that `--help` comes at once."""
 
+import logging
 import sys
 from io import TextIOWrapper
 from pathlib import Path
@@ -35,6 +36,8 @@ def main(arguments: list[str] | None = None) -> None:
     # Redirected output may be in a code page that lacks a character of a file's name: better shown as its number.
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+    # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     app(arguments)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.measures import MEASURES
 
@@ -18,9 +19,7 @@ GRAPHS = {
     "strand.onnx": "once a groom: `strand` (S, 70): root UV 2, own code 32, mean code of its lock 32, root normal 3, "
     "length 1 [m] -> `strand_part` (S, 256)",
     "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, 256), and where the frame "
-    "changes the weights behind, `middle` (256, 256) and `out` (256, 72); `material` in it are logarithms of the ratios to "
-    "the default bend, weight and damping, and 0: clumping is no input, it scales how far a hair's displacement lies from "
-    "that of its lock's mean strand, by (k0 + 120) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 + 9.81 weight / length",
+    "changes the weights behind, `middle` (256, 256) and `out` (256, 72)",
     "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
     "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
     "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
@@ -35,7 +34,7 @@ BOUNDARY = {
     "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 but for upper arms",
     "gravity": "T(R_head(t)) g / 9.81",
     "shape": "ten lengths of the bind body [m], as in `held`",
-    "material": "logarithms of bend / 0.001, weight, damping / 10; 0",
+    "material": "logarithms of bend / 0.001, weight, damping / 10; 0, since clumping is no input",
     "history": "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the head joint's place and t_k = t - k dt: "
     "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
     "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
@@ -44,6 +43,20 @@ BOUNDARY = {
     "and of the quaternion's components; before the first sample the head goes on in a straight line and does not turn",
 }
 """How each part of the boundary vector is made, for a model whose `linear` is "gravity", as those shipped."""
+
+SLIDERS = {
+    "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, `anchor` anew: `offsets` of "
+    "tail.onnx with `anchor` zero and the frame `held`",
+    "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
+    "clumping": "scales how far a strand strays from its lock, by f = (k0 + 120) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 "
+    "+ 9.81 weight / length; 60 changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
+    "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
+    "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
+    "it, scaled to the rest edge's length",
+    "a cut": "steps of `history` that reach back over it count as 0; a bake of strands looks for none",
+    "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
+}
+"""What an artist or a game changes, and what it does to what is above."""
 
 
 def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None) -> list[Path]:
@@ -63,7 +76,12 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     """
     file = model_file.read(model)
     folder = Path(folder)
-    description = {"units": UNITS, "graphs": _graphs(file), "model": file.meta}
+    if shot is None and (grooms or skeleton or head):
+        raise NeuralocksError(
+            "--groom, --skeleton, --head: choose within a shot; give it with --shot, or leave them out"
+        )
+    training = {name: value for name, value in (file.meta.get("training") or {}).items() if name != "curve"}
+    description = {"units": UNITS, "graphs": _graphs(file)}
     spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
     description["boundary vector"] = {
         "length": spec.size,
@@ -74,6 +92,9 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         "bin weights": [float(weight) for weight in spec.bin_weights],
         "how": BOUNDARY,
     }
+    if file.kind == "strands":
+        description["sliders"] = SLIDERS
+    description["model"] = file.meta | {"training": training}
     tables = {}
     if shot is not None:
         from .groom_tables import ARRAYS, export_grooms

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core import model as model_file
+from neuralocks_core.clumping import Locks
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.runtime import StrandModel
@@ -34,6 +35,11 @@ ARRAYS = {
     "takes strands to the world",
     "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints named, in their order",
     "stance": "(p, 3, 3) float64, of the pose joints in their order",
+    "length": "(S,) float32, of each strand [m], for `clumping`",
+    "lock": "(S,) int32, each strand's lock, a row of the three that follow",
+    "lock_strand_part": "(L, 256) float32, input of tail.onnx for the mean strand of each lock",
+    "lock_anchor": "(L, 72) float32, as `anchor`",
+    "lock_edges": "(L, 72) float32, as `edges`",
 }
 """Arrays of a groom's file -> what they are."""
 
@@ -70,8 +76,10 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
     character = item.attachment.character
     sampler = model.sampler(character, item.attachment.rig.clip)
     strands, held = GroomPlacer(item).strands, sampler.held_bind()
-    session = StrandSession(model, strands)
+    locks = Locks.of(strands)
+    session, led = StrandSession(model, strands), StrandSession(model, locks.strands)
     session.anchor(held)
+    led.anchor(held)
     skeleton = character.skeleton
     arrays = {
         "rest": strands.rest,
@@ -84,5 +92,10 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
         "canonical_to_head": character.inverse_bind[character.head] @ character.canonical_to_bind,
         "bind": rotation_part(skeleton.bind[sampler.joints], "bind pose"),
         "stance": sampler.stance,
+        "length": strands.length.astype(np.float32),
+        "lock": locks.lock.astype(np.int32),
+        "lock_strand_part": led.strand_part,
+        "lock_anchor": led.anchor_offsets,
+        "lock_edges": rest_edges(locks.strands.rest),
     }
     return arrays, [skeleton.names[joint] for joint in sampler.joints]

@@ -33,8 +33,12 @@ def test_a_runtime_written_from_the_description_has_the_hair_of_the_bake(tmp_pat
     model = model_file.shipped("strands")
     files = export_model(model, tmp_path / "onnx", shot)
     assert {path.name for path in files} >= {"description.json", "tail.onnx", "Hero_Hair.npz"}
-    bake(shot, tmp_path / "baked.usdc", model, frames="1:40:13", resolve=False)
-    assert largest_difference(tmp_path / "onnx", shot, tmp_path / "baked.usdc") < 1e-5
+    for number, material in enumerate(({}, {"bend": 4e-4, "damping": 6.0}, {"weight": 1.4, "clumping": 5.0})):
+        baked = tmp_path / f"{number}.usdc"
+        bake(shot, baked, model, frames="1:40:13", resolve=False, material=material)
+        assert largest_difference(tmp_path / "onnx", shot, baked, material) < 1e-5
+        if material:
+            assert largest_difference(tmp_path / "onnx", shot, baked, {}) > 1e-4
 
 
 def test_every_array_of_a_groom_is_described(tmp_path, shot):
