@@ -85,11 +85,13 @@ class _Alike:
         weights = weights.reshape(*first.shape, spans.NODES).T
         low, late = first.min(axis=0), first.T - first.min(axis=0)[:, None]
         reach = late.max(axis=1) + spans.NODES
-        # Own vertices, a network vertex of each, and its weights (V', N); few own vertices need more than four.
+        # From the first to the last own vertex that needs it: a network vertex of each, and its weights (V', N). Few own
+        # vertices need more than four.
         self._terms = []
         for step in range(reach.max()):
-            own = np.flatnonzero(reach > step)
-            term = np.zeros((len(own), len(first)), np.float32)
+            needed = np.flatnonzero(reach > step)
+            own = slice(needed[0], needed[-1] + 1)
+            term = np.zeros((own.stop - own.start, len(first)), np.float32)
             for node in range(spans.NODES):
                 np.copyto(term, weights[node, own], where=late[own] + node == step)
             self._terms.append((own, low[own] + step, term))
@@ -99,14 +101,12 @@ class _Alike:
         count, vertices = displacement.shape[:2]
         network, spare = _network.arrays((3, vertices, count), result.shape)
         network[:] = displacement.transpose(2, 1, 0)
-        for step, (some, of, weights) in enumerate(self._terms):
-            part = spare[:, : len(some)] if step else result
+        for step, (own, of, weights) in enumerate(self._terms):
+            part = spare[:, own] if step else result
             network.take(of, axis=1, out=part, mode="clip")
             part *= weights[:, start : start + count]
-            if step >= spans.NODES:
-                result[:, some] += part
-            elif step:
-                result += part
+            if step:
+                result[:, own] += part
 
 
 class _Varied:

@@ -8,7 +8,7 @@ import numpy as np
 from .scratch import Scratch
 
 TINY = np.float32(1e-24)
-"""[m^2] Keeps edges of no length finite."""
+"""[m^2] Keeps edges of no length finite, and is too little to change others."""
 
 _scratch = Scratch()
 
@@ -39,7 +39,7 @@ def keep_lengths(points: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> N
     np.subtract(scale, np.float32(1.0), out=spare)
     spare *= smooth
     np.multiply(edges, spare, out=drift)
-    _add_up(drift, other)
+    drift, other = _add_up(drift, other)
     _dot(drift, edges, along)
     along /= squared
     drift -= np.multiply(edges, along, out=other)
@@ -49,7 +49,7 @@ def keep_lengths(points: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> N
     _measure(edges, lengths, squared, scale)
     edges *= scale
     edges -= before
-    _add_up(edges, other)
+    edges, _ = _add_up(edges, other)
     np.add(moved[:, :1], edges, out=moved[:, 1:])
 
 
@@ -76,19 +76,21 @@ def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarra
 
 def _measure(edges: np.ndarray, lengths: np.ndarray, squared: np.ndarray, scale: np.ndarray) -> None:
     """Squared lengths of edges, and the factors that give them the lengths whose squares are `lengths`."""
-    np.maximum(_dot(edges, edges, squared), TINY, out=squared)
+    _dot(edges, edges, squared)
+    squared += TINY
     np.sqrt(np.divide(lengths, squared, out=scale), out=scale)
 
 
-def _add_up(edges: np.ndarray, spare: np.ndarray) -> None:
-    """Sums along the strands, in place."""
+def _add_up(edges: np.ndarray, spare: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums along the strands, and what is left of the two arrays, in which anything may be now."""
     # Sums of 2, 4, 8 ... of them: the same numbers however many strands there are, in few calls, between which threads
     # take turns.
     reach = 1
     while reach < edges.shape[1]:
-        spare[:] = edges
-        edges[:, reach:] += spare[:, :-reach]
-        reach *= 2
+        spare[:, :reach] = edges[:, :reach]
+        np.add(edges[:, reach:], edges[:, :-reach], out=spare[:, reach:])
+        edges, spare, reach = spare, edges, 2 * reach
+    return edges, spare
 
 
 def _dot(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> np.ndarray:
