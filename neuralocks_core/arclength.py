@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .groom import Groom
+from neuralocks_core.groom import Groom
 
 SHORTEST = 2e-5
 """A strand shorter than this [m] counts as one point: its 23 edges would be below float32's resolution at a

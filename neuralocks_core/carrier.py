@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .arclength import arc_lengths
-from .following import Following
-from .scratch import Scratch
+from neuralocks_core.arclength import arc_lengths
+from neuralocks_core.following import Following
+from neuralocks_core.scratch import Scratch
 
 if TYPE_CHECKING:
-    from .groom import Groom
-    from .strands import StrandSet
+    from neuralocks_core.groom import Groom
+    from neuralocks_core.strands import StrandSet
 
 POINTS = 16384
 """Points carried at a time, about: what is touched for them stays in the processor's second-level cache."""

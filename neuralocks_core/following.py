@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import spans
-from .lengths import keep_lengths, keep_lengths_of_any
-from .scratch import Scratch
-from .turning import Coils
+from neuralocks_core import spans
+from neuralocks_core.lengths import keep_lengths, keep_lengths_of_any
+from neuralocks_core.scratch import Scratch
+from neuralocks_core.turning import Coils
 
 WIDEST = spans.NODES + 4
 """Strands are laid out as a grid where each own vertex depends on at most so many network vertices over all strands."""

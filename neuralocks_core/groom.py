@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError
 
 # Farther than this from the origin is no hair on a character, and float32 would no longer resolve a
 # millimetre.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scratch import Scratch
+from neuralocks_core.scratch import Scratch
 
 TINY = np.float32(1e-24)
 """[m^2] Keeps edges of no length finite, and is too little to change others."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import rotation
-from .character import Character, Skeleton
-from .errors import NeuralocksError
-from .formats.bvh import Motion
-from .humanoid import Humanoid
-from .motion import Clip
+from neuralocks_core import rotation
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats.bvh import Motion
+from neuralocks_core.humanoid import Humanoid
+from neuralocks_core.motion import Clip
 
 TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 LIMBS = {

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arclength import resample
-from .centreline import centre_lines
-from .groom import Groom
-from .locks import lock_of_roots
+from neuralocks_core.arclength import resample
+from neuralocks_core.centreline import centre_lines
+from neuralocks_core.groom import Groom
+from neuralocks_core.locks import lock_of_roots
 
 if TYPE_CHECKING:
-    from .character import Character
+    from neuralocks_core.character import Character
 
 K = 24
 """Vertices of a network strand, root first (72 network outputs are 24 x 3)."""

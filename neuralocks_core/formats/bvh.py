@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..character import Skeleton
-from ..errors import NeuralocksError
-from ..motion import LARGEST_CLIP, Clip
+from neuralocks_core.character import Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import LARGEST_CLIP, Clip
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; an hour of motion at 120 frames a second is about that."""

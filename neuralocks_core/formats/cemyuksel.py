@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import NeuralocksError
-from ..files import atomic_write
-from ..groom import Groom
-from .raw import RawGroom, bad_file, floats
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
+from neuralocks_core.formats.raw import RawGroom, bad_file, floats
+from neuralocks_core.groom import Groom
 
 _SEGMENTS, _POINTS, _THICKNESS = 1, 2, 4
 _HEADER = struct.Struct("<4sIIIIfffff88s")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .raw import RawGroom, bad_file
+from neuralocks_core.formats.raw import RawGroom, bad_file
 
 
 def read_hairsalon(content: bytes, subject: str) -> RawGroom:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError
 
 
 @dataclass(frozen=True, eq=False)

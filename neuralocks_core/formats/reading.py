@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arclength import SHORTEST, arc_lengths
-from ..errors import NeuralocksError
-from ..groom import LARGEST_COORDINATE, Groom
-from . import cemyuksel, counted, tressfx, tressfx_text
-from .raw import RawGroom, bad_file
-from .units import UNITS, metres_per_unit, upward_axis
+from neuralocks_core.arclength import SHORTEST, arc_lengths
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats import cemyuksel, counted, tressfx, tressfx_text
+from neuralocks_core.formats.raw import RawGroom, bad_file
+from neuralocks_core.formats.units import UNITS, metres_per_unit, upward_axis
+from neuralocks_core.groom import LARGEST_COORDINATE, Groom
 
 EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
 """What `read` knows by name; the content decides where it says what it is."""

@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from .raw import RawGroom, bad_file, floats
+from neuralocks_core.formats.raw import RawGroom, bad_file, floats
 
 HEADERS = {3: 296, 4: 160}
 """Bytes of the header of each version."""

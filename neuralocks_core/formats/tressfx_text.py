@@ -8,7 +8,7 @@ from array import array
 
 import numpy as np
 
-from .raw import RawGroom, bad_file
+from neuralocks_core.formats.raw import RawGroom, bad_file
 
 _HEADER_LINES = 1000
 

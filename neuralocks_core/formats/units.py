@@ -3,7 +3,7 @@
 
 import math
 
-from ..errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 """Name -> metres."""

@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import NeuralocksError
-from ..groom import Groom
-from ..strands import root_uv
-from . import loose, tied
-from .growth import Site, evenly, march
-from .obstacle import Obstacle
-from .scalp import Scalp, from_head
-from .shaping import shaped
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles import loose, tied
+from neuralocks_core.hairstyles.growth import Site, evenly, march
+from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.hairstyles.scalp import Scalp, from_head
+from neuralocks_core.hairstyles.shaping import shaped
+from neuralocks_core.strands import root_uv
 
 STYLES = (*loose.STYLES, *tied.STYLES)
 """Names of the styles that `grow` knows."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .obstacle import Obstacle
-from .scalp import Roots, Scalp
+from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.hairstyles.scalp import Roots, Scalp
 
 DOWN = np.array([0.0, -1.0, 0.0])
 

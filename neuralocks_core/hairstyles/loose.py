@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .growth import DOWN, Plan, Site, smooth, unit
-from .shaping import Shape
+from neuralocks_core.hairstyles.growth import DOWN, Plan, Site, smooth, unit
+from neuralocks_core.hairstyles.shaping import Shape
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import NeuralocksError
-from ..mesh import vertex_normals
-from .scalp import Scalp
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.hairstyles.scalp import Scalp
+from neuralocks_core.mesh import vertex_normals
 
 _CELL = 0.08
 """Grid spacing in head radii (7 mm on an adult)."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .growth import CHUNK, Site, at_vertices, smooth, unit
-from .obstacle import Obstacle
+from neuralocks_core.hairstyles.growth import CHUNK, Site, at_vertices, smooth, unit
+from neuralocks_core.hairstyles.obstacle import Obstacle
 
 
 @dataclass(frozen=True)

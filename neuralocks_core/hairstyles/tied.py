@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .growth import DOWN, Site, evenly, smooth, unit
-from .obstacle import Obstacle
-from .scalp import Scalp
-from .shaping import Shape
+from neuralocks_core.hairstyles.growth import DOWN, Site, evenly, smooth, unit
+from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.hairstyles.scalp import Scalp
+from neuralocks_core.hairstyles.shaping import Shape
 
 _ON_HEAD, _TAIL = 18, 60
 
