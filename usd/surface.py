@@ -69,11 +69,14 @@ def bound_skeleton(prim: Usd.Prim) -> str | None:
     if skeleton:
         return str(skeleton.GetPath())
     relation = prim.GetRelationship("skel:skeleton")
-    for spec in relation.GetPropertyStack() if relation else ():
-        for target in spec.targetPathList.GetAddedOrExplicitItems():
-            if UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(target)):
-                return str(target)
-    return None
+    specs = relation.GetPropertyStack() if relation else []
+    for target in (target for spec in specs for target in spec.targetPathList.GetAddedOrExplicitItems()):
+        if UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(target)):
+            return str(target)
+    # A layer that unbinds and moves the points is a bake; the binding that it ended may be of a prim above.
+    if any(spec.layer.GetNumTimeSamplesForPath(spec.path.ReplaceName("points")) for spec in specs):
+        skeleton = UsdSkel.BindingAPI(prim.GetParent()).GetInheritedSkeleton()
+    return str(skeleton.GetPath()) if skeleton else None
 
 
 def influences(prim: Usd.Prim) -> tuple[UsdGeom.Primvar | None, UsdGeom.Primvar | None]:

@@ -4,13 +4,15 @@
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
+from usd.bake import bake
 from usd.curves import rest_points
 from usd.stage import read_rigs, read_shot
+from usd.surface import bound_skeleton
 
 from .shots import HEAD, JOINTS, Recipe, write_shot
 
 
-def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path):
+def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_model):
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     place = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 2, 3), 40)) * Gf.Matrix4d().SetTranslate((0.3, 0.1, 0.2))
@@ -39,6 +41,13 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path):
     assert item.joint == JOINTS[HEAD] == skinning.GetJointOrder()[0]
     expected = [skinning.GetGeomBindTransform().Transform(Gf.Vec3d(*map(float, p))) for p in rest_points(item.prim)]
     np.testing.assert_allclose(item.groom.points, expected, atol=1e-6)
+    # What unbinds the hair leaves the group's binding, of which whoever reads the bake must know.
+    (again,) = read_shot(bake(path, tmp_path / "hair.usdc", still_model, frames="1:2").path).grooms
+    assert (again.joint, again.attachment.skinned) == (item.joint, True)
+    np.testing.assert_array_equal(again.groom.points, item.groom.points)
+    hair.GetPrim().GetRelationship("skel:skeleton").SetTargets([])
+    stage.Save()
+    assert bound_skeleton(read_shot(path, ["/Hero/Groom"]).grooms[0].prim) is None
 
 
 def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
