@@ -79,7 +79,9 @@ def train(
 def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
     """Refuse numbers that no training can use, before anything is read; None stands for a default."""
     if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
-        raise NeuralocksError("--seconds, --steps: must be at least 1; leave them out for the defaults")
+        raise NeuralocksError(
+            "--seconds must lie between 1 and 86400, --steps between 1 and 10 million; leave them out for the defaults"
+        )
     if hidden is not None and not 1 <= hidden <= 256:
         raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
     if clips is not None and not 2 <= clips <= 10000:
@@ -96,7 +98,9 @@ def bake(
     shot: Annotated[Path, typer.Argument(help="USD file with the animated character.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Override layer to write.")],
     model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
-    frames: Annotated[str | None, typer.Option(help="A:B[:STEP]; the shot's range if left out.")] = None,
+    frames: Annotated[
+        str | None, typer.Option(help="A:B[:STEP] of samples beside the animation's own; the shot's range if left out.")
+    ] = None,
     subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
     loop: Annotated[
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
