@@ -35,5 +35,5 @@ def test_a_failure_leaves_what_was_there_and_nothing_beside_it(tmp_path, error, 
 
 def test_a_folder_that_cannot_be_is_known_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(NeuralocksError, match="cannot be written"), atomic_write(tmp_path / "file" / "a.txt"):
+    with pytest.raises(NeuralocksError, match="a file, not a folder"), atomic_write(tmp_path / "file" / "a.txt"):
         pytest.fail("the work was begun")

@@ -103,7 +103,7 @@ def never_drawn():
     return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
 
 
-@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("file/hair.png", "cannot be written")])
+@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("file/hair.png", "a file, not a folder")])
 def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, name, said):
     (tmp_path / "file").write_text("")
     with pytest.raises(NeuralocksError, match=said):
