@@ -121,6 +121,10 @@ def _check_moves(hair: RiggedHair) -> None:
     head = hair.source.character.head
     moved = np.ptp(hair.source.clip.joints[:, head], axis=0).max()
     if moved < 1e-7:
+        prim = hair.source.source.animation
+        ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
+        if ignored and not hair.source.source.moves_joints:
+            raise NeuralocksError(ignored[0])
         name = hair.source.character.skeleton.names[head].rsplit("/", 1)[-1]
         raise NeuralocksError(
             f"{hair.source.path}: its head joint '{name}' is not animated, so the hair would not move; "

@@ -141,6 +141,16 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
 
 
+def test_an_animation_that_usd_ignores_is_named_as_such(tmp_path):
+    """With rotations alone UsdSkel shows the rest pose: it is not that nobody animated the head."""
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "shot.usda")))
+    stage = Usd.Stage.Open(str(tmp_path / "shot.usda"))
+    stage.GetPrimAtPath("/Who/Motion").RemoveProperty("scales")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="/Who/Motion: no scales, .*author all three channels"):
+        bake_rig(tmp_path / "shot.usda", tmp_path / "out.usda", model)
+
+
 def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
     """They are read as if they did."""
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.5))
