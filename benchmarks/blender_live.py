@@ -19,7 +19,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import bpy
+try:
+    import bpy
+except ModuleNotFoundError:
+    sys.exit("blender_live: needs a Python with bpy, such as .venv-blender-5.2/bin/python (make blender)")
 import numpy as np
 
 clock = time.process_time if "--cpu-time" in sys.argv else time.perf_counter

@@ -10,7 +10,7 @@ length, sliders off the solver's effect by more than 30 %. Only the card changes
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 from neuralocks_core import model
@@ -23,7 +23,9 @@ MOTION, POSITION, OFF = 0.6, 5.0, 0.3
 
 def main() -> None:
     """Command line."""
-    path = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path)
+    path = parser.parse_args().model
     file = model.read(path, "strands")
     meta = {**file.meta, "report": {**file.meta["report"], **measured(DOCS.read_text(encoding="utf-8"))}}
     model.write(path, meta, file.graphs)
