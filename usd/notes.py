@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user should know about a shot though it stops no bake, one line each: prim or file, fact, and what to check."""
+"""Notes: what a user should know about a shot though the bake goes on. One line each: prim or file, fact, remedy."""
 
 from pathlib import Path
 
@@ -16,12 +16,12 @@ from .rig_source import StageRig
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """What USD could not compose, missing layers say."""
+    """What USD could not compose: missing layers, for example."""
     return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
 
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
-    """The error for a stage without something that a bake needs: where layers are missing, it was in one of those."""
+    """The error for a stage that lacks what a bake needs; where layers are missing, it names those as the likely cause."""
     missing = composition_notes(stage, path)
     if missing:
         loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
@@ -30,7 +30,7 @@ def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> Neura
 
 
 def left_out(error) -> str:
-    """What is wrong with a skeleton that is not needed."""
+    """The note on a skeleton that cannot be used, beside others that can."""
     return f"{error} (this skeleton is left out)"
 
 
@@ -42,12 +42,12 @@ def few(lines: list[str], most: int = 3) -> list[str]:
 
 
 def no_points(path: str) -> str:
-    """Of an empty prim of curves beside others."""
+    """The note on a prim of curves without points, beside others that have some."""
     return f"{path}: the curves have no points; left out"
 
 
 def not_animated(rig: StageRig) -> str:
-    """Why a skeleton cannot be baked; where it has an animation that UsdSkel ignores, what is wrong with that."""
+    """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with that one."""
     animation = rig.source.animation
     said = [] if animation is None else [note for note in rig.notes if note.startswith(f"{animation.GetPath()}: ")]
     why = f" ({said[0].split(': ', 1)[1].split(';')[0]})" if said else ""
@@ -55,17 +55,17 @@ def not_animated(rig: StageRig) -> str:
 
 
 def stands_still(path: str, rig: StageRig) -> str:
-    """Of a groom whose character is not animated, beside others."""
+    """The note on a groom whose character is not animated, beside others that are."""
     return f"{path}: {rig.path}, which carries it, has no animation; left out"
 
 
 def another_carries(path: str, rig: StageRig) -> str:
-    """Of a groom of another skeleton than the one that was named."""
+    """The note on a groom that another skeleton carries than the one the user named."""
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
 def too_far(prim: Usd.Prim, found: Attachment) -> str:
-    """Why the curves of a prim are not taken for hair."""
+    """The note on curves that are not taken for hair because they start too far from any head."""
     return (
         f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{rig_joint(found).split('/')[-1]}' of {found.rig.path} "
         f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}, so it is not taken for hair; "
@@ -74,7 +74,7 @@ def too_far(prim: Usd.Prim, found: Attachment) -> str:
 
 
 def rig_notes(rig: StageRig) -> list[str]:
-    """Held poses, joints that no name told, heads of an unlikely size."""
+    """The notes on a held pose, on joints that were not recognized by name and on a head of an unlikely size."""
     notes = []
     if len(rig.time_codes) == 1:
         notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
@@ -94,7 +94,7 @@ def rig_notes(rig: StageRig) -> list[str]:
 
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
-    """What to say of frames (time codes) in which the character stands still, since its animation is elsewhere."""
+    """The note on a range of time codes that the animation does not reach, so that the character stands still."""
     samples = rig.source.samples
     if len(samples) < 2 or (samples[0] <= last and first <= samples[-1]):
         return []
@@ -105,7 +105,7 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
 
 
 def groom_notes(path: str, groom: Groom) -> list[str]:
-    """Strands of no length, and lengths that no hair has; `path` is the groom's prim."""
+    """The notes on strands without length and on lengths that no hair has; `path` is the groom's prim."""
     notes = []
     filled = np.flatnonzero(groom.counts > 0)
     spread = np.zeros(groom.strand_count, np.float32)

@@ -93,7 +93,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         )
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs)
-    # Of grooms that are not named, a skeleton that is gets its own.
+    # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     every = [] if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
     others = [rig for rig in every if rig.path != skeleton]
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
