@@ -77,9 +77,9 @@ class OverrideWriter:
             blocks: consecutive parts (n, 3) float32 of all P values: a large groom's are never all there twice.
         """
         array, first, corners = Vt.Vec3fArray(len(item.groom.points)), 0, []
+        inside = np.asarray(_Writable(array))
         for block in blocks:
-            # Flat arrays convert a fifth faster than rows of three.
-            array[first : first + len(block)] = Vt.Vec3fArray.FromNumpy(block.reshape(-1))
+            inside[first : first + len(block)] = block
             first += len(block)
             if name == "points":
                 corners += _corners(block)
@@ -180,6 +180,17 @@ def reload_open(path: Path) -> None:
     layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
     if layer:
         layer.Reload(force=True)
+
+
+class _Writable:
+    """A new USD array as numpy may fill it. USD itself lets its arrays be read only, and to convert and copy what goes into
+    them costs more than to write them.
+    """
+
+    def __init__(self, array: Vt.Vec3fArray):
+        self._array = array  # lives as long as what numpy makes of this
+        facts = np.asarray(array).__array_interface__
+        self.__array_interface__ = {**facts, "data": (facts["data"][0], False)}
 
 
 def _corners(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
