@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The body mesh at rest: surface, vertex groups and shape keys."""
 
+from dataclasses import replace
+
+import bpy
 import numpy as np
 
+from ..services.mirror import mirrored
 from ..services.rig import BodyArrays
 from ..session import session
+from .armature import matrix
 from .binding import carrying_bone
 
 PROBES = 500
@@ -18,32 +23,73 @@ def find(armature, objects) -> list:
 
 
 def read(mesh_object, armature) -> BodyArrays:
-    """Vertices of the basis shape, triangles, weights and shape keys; a body that rides on one bone of the armature, as
-    a whole, is weighted to it.
+    """Vertices of the basis shape, triangles, weights and shape keys, with what mirror modifiers add; a body that rides
+    on one bone of the armature, as a whole, is weighted to it.
     """
     mesh = mesh_object.data
     points = _coordinates(mesh.vertices)
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    shapes = {}
-    keys = mesh.shape_keys
+    groups = tuple(group.name for group in mesh_object.vertex_groups)
+    weights, shapes, keys = _weights(mesh, groups), {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
         basis = _coordinates(keys.reference_key.data)
         points = basis
         for block in keys.key_blocks:
             if block != keys.reference_key:
-                shapes[block.name] = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
-    groups = tuple(group.name for group in mesh_object.vertex_groups)
-    weights = _weights(mesh, groups)
-    bone = None if _deformed(mesh_object, armature) else carrying_bone(mesh_object, armature)
-    if bone is not None:
-        groups, weights = (bone,), np.array([[i, 0, 1] for i in range(len(points))], float)
-    return BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
+                offsets = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
+                shapes[block.name] = offsets * _mask(block, groups, weights, len(points))
+    body = BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
+    for modifier in _before_armature(mesh_object):
+        if modifier.type == "MIRROR" and modifier.show_render:
+            body = _mirrored(body, mesh_object, modifier)
+    if _deformed(mesh_object, armature):
+        bones = armature.data.bones  # a group may have the name of a bone that deforms nothing
+        moving = [name if name in bones and bones[name].use_deform else "" for name in groups]
+        return replace(body, groups=tuple(moving))
+    if (bone := carrying_bone(mesh_object, armature)) is not None:
+        rigid = np.array([[i, 0, 1] for i in range(len(body.points))], float)
+        return replace(body, groups=(bone,), weights=rigid)
+    return body
 
 
 def _deformed(mesh_object, armature) -> bool:
+    if mesh_object.parent == armature and mesh_object.parent_type == "ARMATURE":
+        return True
     return any(m.type == "ARMATURE" and m.object == armature for m in mesh_object.modifiers)
+
+
+def _before_armature(mesh_object) -> list:
+    """Modifiers whose result an armature deforms; all, where none does."""
+    types = [modifier.type for modifier in mesh_object.modifiers]
+    return list(mesh_object.modifiers)[: types.index("ARMATURE") if "ARMATURE" in types else None]
+
+
+def _mask(block, groups: tuple[str, ...], weights: np.ndarray, count: int):
+    """How much of a shape key each vertex takes, (V, 1); all take all of it where no vertex group limits it."""
+    if block.vertex_group not in groups:
+        return 1.0
+    mask = np.zeros((count, 1))
+    members = weights[weights[:, 1] == groups.index(block.vertex_group)]
+    mask[members[:, 0].astype(int), 0] = members[:, 2]
+    return mask
+
+
+def _mirrored(body: BodyArrays, mesh_object, modifier) -> BodyArrays:
+    way = np.eye(4)
+    if modifier.mirror_object is not None:
+        way = np.linalg.inv(matrix(modifier.mirror_object.matrix_world)) @ matrix(mesh_object.matrix_world)
+    partner = np.arange(len(body.groups))
+    if modifier.use_mirror_vertex_groups:
+        flipped = [bpy.utils.flip_name(name) for name in body.groups]
+        partner = np.array([body.groups.index(f) if f in body.groups else i for i, f in enumerate(flipped)], int)
+    for axis in np.flatnonzero(modifier.use_axis[:]):
+        across = np.eye(4)
+        across[axis, axis] = -1
+        merge = modifier.merge_threshold if modifier.use_mirror_merge else -1.0
+        body = mirrored(body, np.linalg.inv(way) @ across @ way, partner, merge)
+    return body
 
 
 def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:

@@ -12,6 +12,7 @@ import pytest
 from dcc_addon import build
 from dcc_addon.services import axes, bones, card, names, panel_errors, rig, training_job
 from dcc_addon.services.history import SampledBoundary
+from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
@@ -141,6 +142,24 @@ def test_weights_keep_the_strongest_four():
     assert list(indices[0]) == [1, 3, 4, 0]
     np.testing.assert_allclose(weights[0], [0.4, 0.3, 0.2, 0.1])
     np.testing.assert_allclose(weights[1:], [[1, 0, 0, 0]] * 2)
+
+
+def test_the_image_of_half_a_body_is_joined_along_the_seam():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 0, 1]])
+    half = rig.BodyArrays(
+        "Half",
+        points,
+        np.array([[0, 1, 2], [1, 3, 2]]),
+        ("arm.L", "arm.R"),
+        np.array([[0, 0, 0.5], [1, 0, 1.0]]),
+        {"wide": np.array([[0, 0, 0], [0.5, 0, 0.25], [0, 0, 0], [0, 0, 0.0]])},
+    )
+    whole = mirrored(half, np.diag([-1.0, 1, 1, 1]), np.array([1, 0]), 0.01)
+    assert np.array_equal(whole.points[4:], [[-1, 0, 0], [-1, 0, 1]])
+    assert np.array_equal(whole.triangles[2:], [[2, 4, 0], [2, 5, 4]])
+    assert np.array_equal(whole.weights, [[0, 0, 0.5], [1, 0, 1], [4, 1, 1]])
+    assert np.array_equal(whole.shapes["wide"][4:], [[-0.5, 0, 0.25], [0, 0, 0]])
+    assert len(mirrored(half, np.diag([-1.0, 1, 1, 1]), np.array([1, 0])).points) == 8
 
 
 def test_character_faces_forward_and_says_what_is_missing():

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Body meshes as artists build them."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from dcc_addon.services.axes import to_core, transformed
+from tests.blender import scenes
+
+
+def body_as_drawn(_folder: Path) -> None:
+    """The body that hair is kept out of is the one that Blender draws: with half of it made by a mirror modifier, shape
+    keys on a vertex group only, groups named like bones that deform nothing.
+    """
+    from dcc_addon.session import session
+
+    scene, rig = bpy.context.scene, scenes.armature(bones=(*scenes.BONES, ("scalp", "head", (0, 0.5, 1), (0, 0.6, 1))))
+    rig.data.bones["scalp"].use_deform = False
+    scenes.dance(rig)
+    body, strands = scenes.body(rig), scenes.hair(rig, 4)
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+
+    mesh, right = body.data, [v.index for v in body.data.vertices if v.co.x < -0.01]
+    everything = list(range(len(mesh.vertices)))
+    body.vertex_groups.new(name="scalp").add(everything, 0.5, "REPLACE")
+    upper = [v.index for v in mesh.vertices if v.co.z > 1.4]
+    body.vertex_groups.new(name="upper").add(upper, 0.7, "REPLACE")
+    body.shape_key_add(name="Basis")
+    key = body.shape_key_add(name="wide")
+    for point in key.data:
+        point.co.x *= 1.5
+    key.vertex_group, key.value = "upper", 0.8
+    _same(rig, body, session)
+
+    bpy.context.view_layer.objects.active = body
+    for index in everything:
+        mesh.vertices[index].select = index in right
+    for edge in mesh.edges:
+        edge.select = all(v in right for v in edge.vertices)
+    for face in mesh.polygons:
+        face.select = all(v in right for v in face.vertices)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.delete(type="VERT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    half = len(mesh.vertices)
+    assert half < len(everything)
+    mirror = body.modifiers.new("Mirror", "MIRROR")
+    while body.modifiers[0] != mirror:
+        bpy.ops.object.modifier_move_up(modifier=mirror.name)
+    assert _same(rig, body, session) > half
+    mirror.use_mirror_merge = False
+    mirror.mirror_object = bpy.data.objects.new("Middle", None)
+    scene.collection.objects.link(mirror.mirror_object)
+    mirror.mirror_object.parent, mirror.mirror_object.location = rig, (0.02, 0, 0)
+    assert _same(rig, body, session) == 2 * half
+
+
+def _same(rig, body, session) -> int:
+    """Compares the body of the sampled character with the evaluated mesh; its number of vertices."""
+    scene = bpy.context.scene
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    sampled = session.rigs[rig.name]
+    for frame in (1, 9):
+        scene.frame_set(frame)
+        evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        drawn = np.array([v.co[:] for v in evaluated.data.vertices])
+        drawn = transformed(transformed(drawn, np.array(evaluated.matrix_world)), to_core())
+        row = sampled.motion.row(frame)
+        ours = sampled.character.posed_body(
+            sampled.clip.joints[row], sampled.clip.shape_at([sampled.clip.times[row]])[0]
+        )
+        assert len(ours) == len(drawn) and np.abs(ours - drawn).max() < 2e-4, (len(ours), len(drawn), frame)
+    return len(drawn)
