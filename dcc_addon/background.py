@@ -7,8 +7,8 @@ import time
 
 import bpy
 
-from .live import needs_sampling, refresh
-from .scene.sampling import sample, stepping
+from .live import carriers, needs_sampling, refresh
+from .scene.sampling import notice, sample, stepping
 from .session import session
 
 SLICE = 0.05
@@ -17,17 +17,27 @@ PAUSE = 0.3
 """Time without a further edit before sampling begins [s]."""
 
 _work: list = []
+_wanted = {"at": 0.0, "closely": False}
+"""When to look, on the clock, and whether at how rigs are made up, too."""
 
 
 def request() -> None:
-    """Sample what is out of date, soon and from the start; without a window there is nobody to wait, and operators sample
-    when they need it.
+    """Sample what is out of date, once nothing has been edited for a while, and from the start; without a window there is
+    nobody to wait, and operators sample when they need it.
     """
     _work.clear()
     if bpy.app.background:
         return
+    _wanted["at"] = time.perf_counter() + PAUSE
     if not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=PAUSE)
+
+
+def doubt() -> None:
+    """A rig has changed, perhaps only its pose: see soon whether its motion is out of date."""
+    _wanted["closely"] = True
+    if not _work:
+        request()
 
 
 def cancel() -> None:
@@ -44,9 +54,15 @@ def look() -> float | None:
     scene = context.scene
     if _busy(context):
         return PAUSE
+    if (wait := _wanted["at"] - time.perf_counter()) > 0:
+        return wait
     if _work and _work[0][0] != scene.name_full:  # another one is shown since
         _work.clear()
     if not _work:
+        if _wanted["closely"]:
+            _wanted["closely"] = False
+            for armature in carriers(scene):
+                notice(armature, scene)
         todo = [a for a in needs_sampling(scene) if a.name_full not in session.failed]
         if not todo:
             session.sampling = None

@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
-from .live_strands import EDITING, live_hairs
+from .live_strands import EDITING, known, live_hairs, show_all_rest
 from .scene import blur
 from .scene.sampling import bodies_of, ensure
 from .session import session
@@ -39,7 +39,10 @@ def on_update(scene, graph):
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
-    if any(isinstance(o, bpy.types.Object) and (o.name_full in names or _mode_changed(o)) for o in changed):
+    objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
+    if names & objects.keys():
+        background.doubt()
+    if names & objects.keys() or any(_other_strands(o.original) for o in objects.values()):
         live.update(scene, graph)
     _catch_up()
 
@@ -68,6 +71,7 @@ def before_save(*_):
     blur.end()
     for scene in bpy.data.scenes:
         live.show_rest(scene)
+    show_all_rest()
 
 
 @persistent
@@ -79,13 +83,15 @@ def after_save(*_):
 
 @persistent
 def before_render(scene, *_):
-    """A render must be right: sample now what is out of date."""
-    for armature in live.needs_sampling(scene):
-        try:
-            ensure(bpy.context, armature)
-        except NeuralocksError as error:
-            session.messages[armature.name_full] = str(error)
-    live.refresh(scene, wait=True)
+    """A render must be right: sample now what is out of date, be it that only the pose drawn tells so."""
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):  # it need not be the one in view
+        live.refresh(scene, wait=True, moved=True)
+        for armature in live.carriers(scene):
+            try:
+                ensure(bpy.context, armature)
+            except NeuralocksError as error:
+                session.messages[armature.name_full] = str(error)
+        live.refresh(scene, wait=True)
     for hair in live_hairs(scene):
         blur.begin(hair, scene)
 
@@ -110,8 +116,9 @@ def _catch_up() -> None:
         background.request()
 
 
-def _mode_changed(candidate) -> bool:
-    return candidate.type == "CURVES" and candidate.mode in EDITING
+def _other_strands(thing) -> bool:
+    """Whether this is live hair that is being edited, or no longer, or was given other strands."""
+    return thing.type == "CURVES" and thing.neuralocks_hair.live and (thing.mode in EDITING or not known(thing))
 
 
 HANDLERS = {

@@ -36,13 +36,13 @@ def loop_changed(armature, scene) -> None:
     refresh(scene)
 
 
-def refresh(scene, wait: bool = False) -> None:
-    """Show the hair of the current frame, outside of a frame change; `wait` as for `update`."""
+def refresh(scene, wait: bool = False, moved: bool = False) -> None:
+    """Show the hair of the current frame, outside of a frame change; `wait` and `moved` as for `update`."""
     if session.paused or scene is None:
         return
     graph = _graph_of(scene)
     if graph is not None:
-        update(scene, graph, wait=wait)
+        update(scene, graph, moved, wait)
 
 
 def _graph_of(scene):

@@ -102,6 +102,9 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     if name in session.preparing and not wait:
         return None
     prepared = session.hairs.get(name)
+    if prepared is not None and not known(hair):
+        _let_go(prepared.of, hair)
+        session.doubtful.add(name)
     if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
         made_of, make = _recipe(hair, armature, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
@@ -110,9 +113,28 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
                 preparing.start(name, make, _arrived)
                 return None
             prepared = session.hairs[name] = make(lambda done, total: None)
+        prepared.of = _which(hair.data)
         session.doubtful.discard(name)
     prepared.follow(sampled.clip)
     return prepared
+
+
+def known(hair) -> bool:
+    """Whether what was prepared, or is being prepared, is of the curves that this hair object has now."""
+    prepared = session.hairs.get(hair.name_full)
+    return hair.name_full in session.preparing if prepared is None else prepared.of == _which(hair.data)
+
+
+def _which(data) -> tuple:
+    """Curves, and what tells at once that they are others: strands may be added or taken away outside of the modes."""
+    return data.name_full, len(data.points), len(data.curves)
+
+
+def _let_go(of: tuple, hair) -> None:
+    """Give curves their rest shape back that a live hair object had before it was given others."""
+    left = bpy.data.hair_curves.get(of[0])
+    if left is not None and left != hair.data:
+        curves.restore_rest(left)
 
 
 def _recipe(hair, armature, sampled, wanted: tuple):
@@ -121,14 +143,14 @@ def _recipe(hair, armature, sampled, wanted: tuple):
     """
     name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
-    radius = curves.radius(data)
+    radius, of = curves.radius(data), _which(data)
     # The hair keeps its character, so no other one gets its id.
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, id(sampled.character)
 
     def make(say) -> LiveHair:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
         prepared = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
-        prepared.made_of = made_of
+        prepared.made_of, prepared.of = made_of, of
         prepared.follow(sampled.clip)
         prepared.points(*wanted)
         return prepared
@@ -170,6 +192,15 @@ def rest(hair) -> None:
     """Live is over for this hair: rest shape and modifiers as before, nothing kept."""
     session.forget(hair.name_full)
     show_rest(hair)
+
+
+def show_all_rest() -> None:
+    """Give all curves of the file their rest shapes back, those too that live hair has left behind, in no scene or with
+    no object.
+    """
+    for data in bpy.data.hair_curves:
+        if data.library is None:
+            curves.restore_rest(data)
 
 
 def show_rest(hair) -> None:

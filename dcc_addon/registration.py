@@ -31,6 +31,7 @@ def unregister() -> None:
             live_strands.rest(hair)
         for armature in live_rig.live_armatures(scene):
             live_rig.rest(armature)
+    live_strands.show_all_rest()
     session.clear()
     menu.detach()
     properties.detach()

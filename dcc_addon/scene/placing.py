@@ -59,8 +59,10 @@ def mute_deformers(hair) -> None:
 def unmute_deformers(hair) -> None:
     """Switch them on again as they were."""
     settings = hair.neuralocks_hair
+    if not settings.muted:  # to write it would be an update of the hair, which may call here again
+        return
     try:
-        found = json.loads(settings.muted or "{}")
+        found = json.loads(settings.muted)
     except json.JSONDecodeError:
         found = {}
     for name, (viewport, render) in found.items():

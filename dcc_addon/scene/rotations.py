@@ -7,6 +7,8 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
+from .animated import animated
+
 SAME = 1e-7
 """Values that differ by less are the same turn."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
@@ -47,11 +49,11 @@ def give_back(armature, text: str) -> bool:
 
 def free_modes(armature, bones, modes=tuple(CHANNELS)) -> dict[str, str]:
     """For each bone the first rotation mode whose values no animation writes; the last one where all are animated."""
-    animated = _animated(armature.animation_data)
+    written = animated(armature.animation_data)
     found = {}
     for name in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
-        found[name] = next((mode for mode in modes if start + CHANNELS[mode] not in animated), modes[-1])
+        found[name] = next((mode for mode in modes if start + CHANNELS[mode] not in written), modes[-1])
     return found
 
 
@@ -90,20 +92,3 @@ def turn(bone, mode: str, wxyz) -> bool:
 def _axis_angle(wxyz) -> list[float]:
     axis, angle = Quaternion(wxyz).to_axis_angle()
     return [angle, *axis]
-
-
-def _animated(data) -> set[str]:
-    """Paths that actions, strips and drivers write."""
-    if data is None:
-        return set()
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    for strip in strips:  # grows: strips within strips
-        strips.extend(getattr(strip, "strips", ()))
-    actions = {data.action, *(strip.action for strip in strips)} - {None}
-    return {curve.data_path for curve in [*data.drivers, *(c for action in actions for c in _curves(action))]}
-
-
-def _curves(action) -> list:
-    if hasattr(action, "fcurves"):
-        return list(action.fcurves)
-    return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]

@@ -16,6 +16,7 @@ from . import body as body_reader
 from .binding import bind_places, hidden
 from .lookup import find
 from .placing import world
+from .rigging import rigging
 from .unkeyed import Unkeyed
 
 
@@ -71,6 +72,18 @@ def key_of(armature, scene) -> tuple:
     )
 
 
+def rigging_of(armature, scene) -> int:
+    """A number that changes when what moves this armature, its hair or its bodies is put together otherwise."""
+    return rigging([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
+
+
+def notice(armature, scene) -> None:
+    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints."""
+    sampled = session.rigs.get(armature.name_full)
+    if sampled is not None and not sampled.stale:
+        sampled.stale = sampled.rigging != rigging_of(armature, scene)
+
+
 def sample(context, armature) -> Iterator[tuple[int, int]]:
     """Step through the frames; yields (done, total) and puts the result into the session at the end.
 
@@ -96,7 +109,7 @@ class _Recording:
         self._rig.humanoid()
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
-        self._key = key_of(armature, self._scene)
+        self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._joints = np.empty((len(self.frames), len(self._rig.bones), 4, 4))
         self._places = {name: np.empty((len(self.frames), 4, 4)) for name in ["", *self._tracked]}
@@ -155,7 +168,18 @@ class _Recording:
             character = before.character
         trim = trim_of(untrimmed, self.name)
         drawn = (self._joints @ trim).astype(np.float32)
-        return SampledRig(rig, motion, character, clip, trim, self._key, binds, bind_metres=metres, drawn=drawn)
+        return SampledRig(
+            rig,
+            motion,
+            character,
+            clip,
+            trim,
+            self._key,
+            binds,
+            bind_metres=metres,
+            drawn=drawn,
+            rigging=self._rigging,
+        )
 
 
 def _found(name: str):
@@ -189,6 +213,7 @@ class stepping:
 
 def ensure(context, armature) -> SampledRig:
     """The sampled motion, sampled now if there is none or it is stale."""
+    notice(armature, context.scene)
     found = session.rigs.get(armature.name_full)
     if found is None or found.stale or found.key != key_of(armature, context.scene):
         with stepping(context.scene):

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How what moves a rig is put together: strips, drivers, constraints, parents, the rest pose. Where one of these is edited
+Blender says only that the object has changed, as it does when a bone is posed; of keys it names the action.
+"""
+
+import zlib
+
+import bpy
+import numpy as np
+
+from .animated import animated, strips_of
+
+REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, "use_deform": 1}
+IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
+LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axis in "xyz")
+"""Settings of bones that posing does not change."""
+NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
+"""What only tells how something is shown; and, of strips, what Blender itself writes."""
+_written: dict[type, list[str]] = {}
+
+
+def rigging(things) -> int:
+    """A number that changes when one of these objects, or one that it depends on, is put together otherwise."""
+    return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
+
+
+def _reached(things) -> list:
+    """Objects on whose place or pose these depend, and they themselves."""
+    found = {thing.name_full: thing for thing in things}
+    waiting = list(found.values())
+    while waiting:
+        thing = waiting.pop()
+        bones = thing.pose.bones if thing.pose else ()
+        others = [thing.parent]
+        for constraint in [*thing.constraints, *(c for bone in bones for c in bone.constraints)]:
+            others += [getattr(constraint, name, None) for name in ("target", "pole_target")]
+            others += [target.target for target in getattr(constraint, "targets", ())]
+        for data in _animation(thing):
+            drivers = [curve.driver for curve in data.drivers]
+            others += [target.id for d in drivers for variable in d.variables for target in variable.targets]
+        for other in others:
+            if isinstance(other, bpy.types.Object) and other.name_full not in found:
+                found[other.name_full] = other
+                waiting.append(other)
+    return list(found.values())
+
+
+def _animation(thing) -> list:
+    """Animation data of an object, its data and its shape keys."""
+    owners = (thing, thing.data, getattr(thing.data, "shape_keys", None))
+    return [data for owner in owners if (data := getattr(owner, "animation_data", None))]
+
+
+def _object(thing) -> list:
+    moving = animated(thing.animation_data)
+    found = [thing.name_full, thing.parent and thing.parent.name_full, thing.parent_type, thing.parent_bone]
+    found += [row[:] for row in thing.matrix_parent_inverse]
+    found += [_constraint(c, f'constraints["{_quoted(c)}"].', moving) for c in thing.constraints]
+    found += [_numbers(thing, "", moving), *(_animated_by(data) for data in _animation(thing))]
+    if thing.pose is not None:
+        found += [_channels(thing.data.bones, REST), _channels(thing.pose.bones, dict.fromkeys((*IK, *LIMITED), 1))]
+        for bone in thing.pose.bones:
+            start = f'pose.bones["{_quoted(bone)}"]'
+            found += [bone.name, bone.parent and bone.parent.name, _numbers(bone, start, moving)]
+            found += [_constraint(c, f'{start}.constraints["{_quoted(c)}"].', moving) for c in bone.constraints]
+    return found
+
+
+def _channels(bones, names: dict[str, int]) -> list[int]:
+    found = []
+    for name, size in names.items():
+        values = np.empty(len(bones) * size, bool if name.startswith(("use_", "lock_")) else np.float32)
+        bones.foreach_get(name, values)
+        found.append(zlib.crc32(values))
+    return found
+
+
+def _numbers(owner, start: str, moving: set[str]) -> list:
+    """Numbers among the custom properties that no animation writes: switches between IK and FK, say."""
+    return [
+        (key, value)
+        for key, value in owner.items()
+        if isinstance(value, (int, float)) and f'{start}["{bpy.utils.escape_identifier(key)}"]' not in moving
+    ]
+
+
+def _constraint(constraint, start: str, moving: set[str]) -> list:
+    still = [name for name in (*_settings(constraint), "influence") if start + name not in moving]
+    several = [(t.target and t.target.name_full, t.subtarget) for t in getattr(constraint, "targets", ())]
+    return [constraint.name, constraint.type, several, *_values(constraint, still)]
+
+
+def _animated_by(data) -> list:
+    """Action, strips and drivers."""
+    found = _values(data, _settings(data))
+    for track in data.nla_tracks:
+        found += [track.name, track.mute, track.is_solo]
+    for strip in strips_of(data):
+        found += [strip.name, *_values(strip, _settings(strip)), *(_keys(curve) for curve in strip.fcurves)]
+    for curve in data.drivers:
+        driver = curve.driver
+        found += [curve.data_path, curve.array_index, curve.mute, _keys(curve), driver.type, driver.expression]
+        for variable in driver.variables:
+            found += [variable.name, variable.type]
+            found += [part for target in variable.targets for part in _values(target, _settings(target))]
+    return found
+
+
+def _keys(curve) -> list:
+    modifiers = [[modifier.type, *_values(modifier, _settings(modifier))] for modifier in curve.modifiers]
+    return [*modifiers, *((*key.co, key.interpolation) for key in curve.keyframe_points)]
+
+
+def _settings(thing) -> list[str]:
+    """Names of the settings of a kind of thing."""
+    kind = type(thing)
+    if kind not in _written:
+        _written[kind] = [
+            p.identifier
+            for p in kind.bl_rna.properties
+            if p.identifier not in NOT_SET and not p.is_readonly and p.type != "COLLECTION"
+        ]
+    return _written[kind]
+
+
+def _values(thing, names) -> list:
+    found = []
+    for name in names:
+        value = getattr(thing, name)
+        if isinstance(value, bpy.types.ID):
+            value = value.name_full
+        elif isinstance(value, bpy.types.bpy_prop_array):
+            value = value[:]
+        elif isinstance(value, set):
+            value = sorted(value)
+        if not isinstance(value, bpy.types.bpy_struct):
+            found.append(value)
+    return found
+
+
+def _quoted(named) -> str:
+    return bpy.utils.escape_identifier(named.name)
