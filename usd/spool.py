@@ -105,8 +105,11 @@ class Spool:
         self.discard()
 
     def close(self) -> None:
-        """Leave the finished frames for a later bake to go on from."""
-        self._lock.close()
+        """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
+        if any(self.folder.glob("*.frame")):
+            self._lock.close()
+        else:
+            self.discard()
 
     def discard(self) -> None:
         """Remove the folder."""

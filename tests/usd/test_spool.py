@@ -3,6 +3,7 @@
 
 import shutil
 
+import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
@@ -37,3 +38,13 @@ def test_the_folder_is_locked_until_it_is_gone(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "rmtree", checked)
     spool.discard()
     assert not list(tmp_path.iterdir())
+
+
+def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
+    for finished in (False, True):
+        spool = Spool(tmp_path / "bake.usdc", "a")
+        if finished:
+            spool.write(0, 1.0, np.zeros((2, 3)))
+        spool.close()
+        assert (tmp_path / ".bake.usdc.baking").exists() == finished
+    assert Spool(tmp_path / "bake.usdc", "a").holds(0, 1.0, 2)
