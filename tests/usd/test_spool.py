@@ -47,4 +47,6 @@ def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
             spool.write(0, 1.0, np.zeros((2, 3)))
         spool.close()
         assert (tmp_path / ".bake.usdc.baking").exists() == finished
-    assert Spool(tmp_path / "bake.usdc", "a").holds(0, 1.0, 2)
+    again = Spool(tmp_path / "bake.usdc", "a")
+    assert again.holds(0, 1.0, 2)
+    again.discard()
