@@ -9,7 +9,7 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.humanoid import find_humanoid
+from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
 from neuralocks_core.rotation import sizes
 
@@ -113,10 +113,10 @@ def read_rig(
     posed = source.posed(time_codes)
     meshes = bound_meshes(stage, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
-    to_bind = _to_bind(source, border, posed, by_hand)
+    humanoid = _humanoid(source, by_hand)
+    to_bind = _to_bind(source, border, posed, humanoid)
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
-    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
     knots = knot_weights([mesh.shapes for mesh in meshes])
     weights = dict(zip(knots, source.shape(list(knots), time_codes).T, strict=True))
     used = {name: column for name, column in weights.items() if all_shapes or column.any()}
@@ -189,7 +189,14 @@ def _time_codes(source: JointSource, border: Border) -> np.ndarray:
     return np.unique(np.concatenate([frames[wide], samples]))
 
 
-def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) -> np.ndarray:
+def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
+    try:
+        return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
+    except NeuralocksError as error:
+        raise NeuralocksError(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
+
+
+def _to_bind(source: JointSource, border: Border, posed: np.ndarray, humanoid: Humanoid) -> np.ndarray:
     """Authored bind space to bind world [m], (4, 4).
 
     Bind transforms are meant in world space, yet skinning takes them as the skeleton's own space, and files of both
@@ -202,7 +209,6 @@ def _to_bind(source: JointSource, border: Border, posed: np.ndarray, by_hand) ->
         raise NeuralocksError(
             f"{source.path}: its root is mirrored (negative scale); apply or remove the negative scale"
         )
-    humanoid = find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
     head = humanoid.get("head", 0)
     shown = sizes_shown(posed[:, head], source.bind[head])
     if (shown < 0).any():

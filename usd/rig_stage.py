@@ -9,6 +9,7 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
@@ -79,7 +80,9 @@ def read_rigged_hair(
             continue
         found.append(RiggedHair(stage, border, source, rig))
     if not found:
-        raise errors[0]
+        # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
+        hairy = [any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ())) for prim in prims]
+        raise errors[hairy.index(True) if any(hairy) else 0]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")

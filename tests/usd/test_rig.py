@@ -9,6 +9,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from usd.inspect import as_text, inspect
 from usd.rig_bake import bake_rig
 from usd.rig_layer import NAME
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
@@ -139,6 +140,22 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     with pytest.raises(NeuralocksError, match=words):
         bake_rig(shot, tmp_path / "out.usda", model)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
+
+
+def test_hair_with_a_skeleton_of_its_own_is_told_what_it_needs(tmp_path):
+    """Not that the body's skeleton, which comes first, has no hair; with the joint named it is read."""
+    stage = Usd.Stage.Open(str(small_shot(tmp_path / "shot.usda")))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Who/Rig", stage.GetRootLayer(), "/Who/Wig")
+    body, wig = (UsdSkel.Skeleton(stage.GetPrimAtPath(f"/Who/{name}")) for name in ("Rig", "Wig"))
+    for skeleton, old, new in ((body, "hair", "tie"), (wig, "head", "top")):
+        skeleton.GetJointsAttr().Set([joint.replace(old, new) for joint in skeleton.GetJointsAttr().Get()])
+    stage.GetPrimAtPath("/Who/Motion").GetAttribute("joints").Set(wig.GetJointsAttr().Get())
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetSkeletonRel().SetTargets(["/Who/Wig"])
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="^/Who/Wig: no joint is named like a head; name it with --head JOINT"):
+        read_rigged_hair(tmp_path / "shot.usda")
+    assert "note: /Who/Wig: no joint is named like a head" in as_text(inspect(tmp_path / "shot.usda"))
+    assert len(read_rigged_hair(tmp_path / "shot.usda", head="top").rig.chains) == 3
 
 
 def test_an_animation_that_usd_ignores_is_named_as_such(tmp_path):
