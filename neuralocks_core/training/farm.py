@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +38,9 @@ class RolloutFarm:
         # One thread each: the trainer has the other cores.
         kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
         os.environ.update({name: "1" for name in kept})
-        for process in self._processes:
-            process.start()
+        with _deaf_to_interrupts():
+            for process in self._processes:
+                process.start()
         for name, value in kept.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
         return self
@@ -62,6 +66,20 @@ class RolloutFarm:
         return any(process.exitcode not in (None, 0) for process in self._processes)
 
 
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """What is started meanwhile leaves Ctrl-C, which a terminal sends to all, to the trainer, and tells no traceback."""
+    try:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except ValueError:  # not the main thread, which alone has a say in this
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def save(path: Path, rollout: Rollout) -> None:
     """Write a rollout at once under its final name."""
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
@@ -85,6 +103,7 @@ def load(path: Path) -> Rollout:
 
 
 def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not inherited, as on Windows
     parent = multiprocessing.parent_process()
     maker = RolloutMaker(scene)
     for index in indices:
