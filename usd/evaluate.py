@@ -7,12 +7,15 @@ import numpy as np
 
 from neuralocks_core import comparison, metrics
 from neuralocks_core.arclength import arc_lengths
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY, G
 from neuralocks_core.pose_energies import energies, stretch_energy
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import K, StrandSet, strands_on
 
 from .baked import Baked, read_baked
@@ -205,10 +208,6 @@ class _Subject:
 
     def _held(self, material: Material, model, few) -> np.ndarray | None:
         """The model's answer for each pose as if it were held, if there is a model."""
-        from neuralocks_core.errors import NeuralocksError
-        from neuralocks_core.runtime import StrandModel
-        from neuralocks_core.strand_session import StrandSession
-
         rig = self.item.attachment.rig
         try:
             model = model if isinstance(model, StrandModel) else StrandModel.load(model)

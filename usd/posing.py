@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.materials import Material
+from neuralocks_core.resolve import Resolver
 from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import StrandSet
@@ -49,8 +50,6 @@ class GroomPoser:
             self._session.anchor(self._sampler.held_bind(self._material))
             self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
             if resolve and character.body is not None:
-                from neuralocks_core.resolve import Resolver
-
                 self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
                 self._resolver.prepare()
 

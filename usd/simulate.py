@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.comparison import simulated, whole_locks
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 
@@ -72,8 +73,6 @@ class _SimulatedPoser:
     """Points of one groom out of a simulation of some of its strands."""
 
     def __init__(self, item: StageGroom, codes: list[float], material, count: int, volume: float, progress):
-        from neuralocks_core.comparison import simulated, whole_locks
-
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
         chosen = whole_locks(every, count)
