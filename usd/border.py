@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Ar, Gf, Tf, Usd, UsdGeom
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
@@ -56,16 +56,20 @@ class Border:
     def foreign(self, attribute: Usd.Attribute) -> str:
         """A remark where an attribute's layer counts in another unit or axis: references convert neither. '' if not."""
         for spec in attribute.GetPropertyStack(Usd.TimeCode.EarliestTime()):
-            root, said = spec.layer.pseudoRoot, []
-            unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else self.metres_per_unit
-            if abs(unit / self.metres_per_unit - 1) > 1e-3:
-                said.append(f"counts in {unit:g} m, the stage in {self.metres_per_unit:g} m")
-            if root.HasInfo("upAxis") and root.GetInfo("upAxis") != self.up_axis:
-                said.append(f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}")
-            if said:
+            if differs := self.differing(spec.layer):
                 name = spec.layer.GetDisplayName()
-                return f" (its layer {name} {' and '.join(said)}: USD converts neither, the prim needs a transform)"
+                return f" (its layer {name} {differs}: USD converts neither, the prim needs a transform)"
         return ""
+
+    def differing(self, layer: Sdf.Layer) -> str:
+        """In which unit and axis a layer is written, where they are not these; '' if it says nothing else."""
+        root, said = layer.pseudoRoot, []
+        unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else self.metres_per_unit
+        if abs(unit / self.metres_per_unit - 1) > 1e-3:
+            said.append(f"counts in {unit:g} m, the stage in {self.metres_per_unit:g} m")
+        if root.HasInfo("upAxis") and root.GetInfo("upAxis") != self.up_axis:
+            said.append(f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}")
+        return " and ".join(said)
 
     def seconds(self, time_codes) -> np.ndarray:
         """Times [s] of time codes."""

@@ -17,7 +17,17 @@ from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
 from .hair_search import HairSearch
-from .notes import composition_notes, few, groom_notes, left_out, not_animated, out_of_range, rig_notes
+from .notes import (
+    composition_notes,
+    few,
+    groom_notes,
+    layer_notes,
+    left_out,
+    no_groom,
+    not_animated,
+    out_of_range,
+    rig_notes,
+)
 from .placement import Placement
 from .rig_source import StageRig, find_skeletons, read_each_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
@@ -60,8 +70,8 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
 def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     stage = open_stage(path)
     stops: list[str] = []
-    spoils = composition_notes(stage, path)
     border = Border.of(stage)
+    spoils = composition_notes(stage, path) + layer_notes(stage, path)
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
@@ -86,7 +96,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:
-        stops.append(f"{path.name}: holds no groom (no BasisCurves prim); add one, or import a hair file")
+        stops.append(str(no_groom(stage, Path(path.name))))
     return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
 
 

@@ -4,7 +4,7 @@
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.character import HEAD_WIDTHS
@@ -12,12 +12,33 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
 from .attach import Attachment, rig_joint
+from .border import Border
 from .rig_source import StageRig
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose: missing layers, for example."""
     return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+
+
+def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
+    """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them."""
+    border = Border.of(stage)
+    for layer in stage.GetLayerStack(includeSessionLayers=False)[1:]:
+        if differs := border.differing(layer):
+            return [
+                f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
+            ]
+    return []
+
+
+def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
+    """The error for a stage without BasisCurves."""
+    other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
+    remedy = "add one, or import a hair file with 'neuralocks import'"
+    if other:
+        remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
+    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
 
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:

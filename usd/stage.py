@@ -15,7 +15,18 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .hair_search import HairSearch
-from .notes import composition_notes, few, groom_notes, left_out, not_animated, nothing_found, rig_notes, stands_still
+from .notes import (
+    composition_notes,
+    few,
+    groom_notes,
+    layer_notes,
+    left_out,
+    no_groom,
+    not_animated,
+    nothing_found,
+    rig_notes,
+    stands_still,
+)
 from .placement import Placement
 from .rig_source import StageRig, find_skeletons, read_each_rig
 
@@ -85,12 +96,10 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     path = Path(path)
     stage = open_stage(path)
     border = Border.of(stage)
-    notes = composition_notes(stage, path)
+    notes = composition_notes(stage, path) + layer_notes(stage, path)
     curves = find_curves(stage, grooms)
     if not curves:
-        raise nothing_found(
-            stage, path, "groom (no BasisCurves prim)", "add one, or import a hair file with 'neuralocks import'"
-        )
+        raise no_groom(stage, path)
     rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
     _check_animated(rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.

@@ -183,3 +183,24 @@ def test_joints_named_by_hand_serve_and_missing_ones_are_said(tmp_path):
     for joints, fact in (({"left_shoulder": "nose"}, "nose"), ({"tail": "hips"}, "tail")):
         with pytest.raises(NeuralocksError, match=fact):
             read_shot(path, joints=joints)
+
+
+def test_layers_of_another_axis_below_a_bare_first_layer_are_said(tmp_path):
+    write_shot(tmp_path, Recipe(unit=0.01, up="Z"))
+    first = Sdf.Layer.CreateNew(str(tmp_path / "first.usda"))
+    first.subLayerPaths.append("./shot.usda")
+    first.Save()
+    expected = "first.usda: its layer shot.usda has Z up, the stage Y: the first layer's count; author them there"
+    assert expected in read_shot(tmp_path / "first.usda").notes
+    assert expected in inspect(tmp_path / "first.usda")["spoils"]
+
+
+def test_curves_of_another_kind_are_told_to_become_basis_curves(tmp_path):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    stage.RemovePrim("/Hero/Hair")
+    UsdGeom.NurbsCurves.Define(stage, "/Hero/Locks")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="no groom .* convert the NurbsCurves /Hero/Locks"):
+        read_shot(path)
+    assert any("/Hero/Locks" in line for line in inspect(path)["stops"])
