@@ -7,17 +7,18 @@ from neuralocks_core.joint_names import leaf
 
 _HAIR = (
     "hair|pony|braid|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|pigtail|twintail|ahoge|kami|mane|plait|dread"
-    "|bun(?!ny)|forelock|sideburn|tuft"
+    "|bun(?!ny)|forelock|sidelock|sideburn|wig(?!gle)|topknot|cowlick|ringlet|mohawk|quiff|ponite"
 )
 _FACE = (
-    "eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead|pupil|iris"
-    "|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn|whisker|m(?:o)?ustache|bunny"
-    "|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
+    "(?:left|right)?eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead"
+    "|pupil|iris|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
+    "|whisker|mo?ustache|bunny|neko"
+    "|snout|muzzle|beak|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
     "|antenna|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
     "|(?:bow|pin|clip|cap|hood|veil|mask|halo|bell|gem|wing|mic)s?$"
 )
 _HAIR_ANYWHERE = re.compile(
-    "hair|pigtail|twintail|sidetail"
+    "hair|pigtail|twintail|sidetail|(?:mae|ushiro|yoko)gami"
     "|髪|アホ毛|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ"
     "|头发|髮|刘海|马尾|辫|呆毛|머리카락|앞머리|뒷머리|옆머리"
 )
@@ -43,7 +44,7 @@ def says_hair(name: str) -> bool:
     if _begins(name, _HAIR) or _HAIR_ANYWHERE.search(whole):
         return True
     # Below a head these are hair, unless another word says what is meant: `brow_tail`, まつ毛.
-    return not says_face(name) and (_begins(name, "tail") or "毛" in whole)
+    return not says_face(name) and (_begins(name, "tail|tuft") or "毛" in whole)
 
 
 def says_face(name: str) -> bool:

@@ -9,6 +9,7 @@ import pytest
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import HairChains, find_chains
+from neuralocks_core.rig.hair_names import says_face, says_hair
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character, skin, tail
 
@@ -39,6 +40,17 @@ def test_an_end_joint_may_have_an_end_of_its_own():
     assert chains.names == ("hair_1", "hair_2")
     assert chains.chain_length(0) == pytest.approx(2 * np.hypot(0.06, 0.01))
     assert len(find_chains(who)) == 3  # without skin, nothing tells
+
+
+def test_what_names_of_many_conventions_say():
+    """VRoid, Unity, Unreal, 3ds Max, MikuMikuDance, and what artists call hair, faces and what is worn."""
+    hair = "J_Sec_Hair1_01 J_L_HairFront_00_SJ hair_01_l Bip001_HairA01 bangs_C_1 PonyTail_L SideLock_R maegami_01 tail_L_01 wig_01 "
+    hair += "HairBun_L 前髪_01 左もみあげ 三つ編み1 横毛2 头发01"
+    other = "leftEye eye_L brow_tail ear_tuft EarRing_L_02 CatEar_R nekomimi HairRibbon_L hair_clip_L HeadBand Sunglasses horn_L "
+    other += "mustache_L bangle_1 BunnyEar_L wiggle_2 両目 まつ毛 舌1 髪飾り左 髪リボン1 メガネ 猫耳_L"
+    assert [name for name in hair.split() if not says_hair(name)] == []
+    assert [name for name in other.split() if says_hair(name)] == []
+    assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
 
 
 @pytest.mark.parametrize("name", ["hair_group", "head_twist"])
