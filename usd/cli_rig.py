@@ -175,7 +175,10 @@ def export_onnx(
     data = model_file.read(model or model_file.shipped("rig"), "rig").graphs["rig.onnx"]
     with atomic_write(out) as part:
         part.write_bytes(data)
-    typer.echo(f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz")
+    typer.echo(
+        f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz; neuralocks export writes a description "
+        "of both and the joints' names beside it, neuralocks rig export-c the code that makes the features"
+    )
 
 
 @command("inspect")
