@@ -47,39 +47,58 @@ class Stepper:
         device: str,
     ):
         self.wp = wp = start_warp(device)
-        from neuralocks_core.reference import banded_kernels, energy_kernels, rod_kernels, step_kernels
+        from neuralocks_core.reference import rod_kernels, step_kernels
 
         self.rod_kernels, self.kernels = rod_kernels, step_kernels
         self.device = wp.get_device(device)
         self.strands, self.vertices = rods.mass.shape
         self.widest, self.tolerance = margin, tolerance
         self.gravity = wp.vec3d(0.0, -gravity, 0.0)
-        self.rest = self._vectors(rods.points)
+        self._upload_strands(rods, material, neighbours)
         self.support = self._vectors(rods.support * (gravity / G))
+        self._empty_state(margin, collision)
+        self.mesh, self.volume = None, None
+        if volume > 0:
+            from neuralocks_core.reference.volume import Volume
+
+            self.volume = Volume(self.rest, self.constants.mass, volume)
+
+    def _upload_strands(self, rods: RestRods, material: dict[str, np.ndarray], neighbours: np.ndarray) -> None:
+        """What stays the same for the whole simulation."""
+        from neuralocks_core.reference import energy_kernels
+
+        wp = self.wp
+        self.rest = self._vectors(rods.points)
         self.constants = energy_kernels.Rods()
         self.constants.length = self._reals(rods.length)
         self.constants.mass = self._reals(rods.mass)
         self.constants.curl = self._vectors(rods.curl)
         # 2 B / l: energy B/2 l |2/l (b - b0)|^2 per interior vertex, l half its adjacent edges, which is its mass
         self.constants.bend = self._reals(2.0 * material["bend"][:, None] / rods.mass)
-        self.weight = wp.array(material["weight"], dtype=wp.float64, device=device)
-        self.damping = wp.array(material["damping"], dtype=wp.float64, device=device)
-        self.clumping = wp.array(material["clumping"], dtype=wp.float64, device=device)
+        self.weight = wp.array(material["weight"], dtype=wp.float64, device=self.device)
+        self.damping = wp.array(material["damping"], dtype=wp.float64, device=self.device)
+        self.clumping = wp.array(material["clumping"], dtype=wp.float64, device=self.device)
         self.clumped = neighbours.shape[1] > 0
-        self.neighbours = wp.array(np.ascontiguousarray(neighbours.T), dtype=wp.int32, device=device)
+        self.neighbours = wp.array(np.ascontiguousarray(neighbours.T), dtype=wp.int32, device=self.device)
         if not self.clumped:
-            self.neighbours = wp.empty((0, self.strands), dtype=wp.int32, device=device)
+            self.neighbours = wp.empty((0, self.strands), dtype=wp.int32, device=self.device)
+
+    def _empty_state(self, margin: float, collision: float) -> None:
+        """Arrays that every step writes, with no body near."""
+        from neuralocks_core.reference import banded_kernels, energy_kernels
+
+        wp = self.wp
         shape = (self.vertices, self.strands)
         self.x, self.last, self.before = (self._empty(wp.vec3d, shape) for _ in range(3))
         self.tension = self._empty(wp.float64, shape)
         self.load = energy_kernels.Load()
         self.load.target, self.load.pull = self._empty(wp.vec3d, shape), self._empty(wp.float64, shape)
-        self.load.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=device)
-        self.load.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=device)
+        self.load.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=self.device)
+        self.load.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=self.device)
         self.load.collision = collision
         self.seen, self.corner = self._empty(wp.vec3d, shape), self._empty(wp.vec2, shape)
-        self.clear = wp.array(np.full(shape, -1e3), dtype=wp.float64, device=device)
-        self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=device)
+        self.clear = wp.array(np.full(shape, -1e3), dtype=wp.float64, device=self.device)
+        self.face = wp.array(np.full(shape, -1), dtype=wp.int32, device=self.device)
         self.residual = self._empty(wp.float64, (self.strands,))
         self.used, self.wake = (self._empty(wp.int32, (self.strands,)) for _ in range(2))
         self.points = self._empty(wp.vec3, shape[::-1])
@@ -88,11 +107,6 @@ class Stepper:
         self.stride = 0 if self.device.is_cpu else 1
         column = (self.vertices, self.strands if self.stride else 1)
         self.scratch = self._columns(banded_kernels.Scratch(), column)
-        self.mesh, self.volume = None, None
-        if volume > 0:
-            from neuralocks_core.reference.volume import Volume
-
-            self.volume = Volume(self.rest, self.constants.mass, volume)
 
     def attach_body(self, bind: np.ndarray, triangles: np.ndarray) -> None:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""

@@ -38,7 +38,7 @@ def moment_losses(
         hair: the hair of each, all with the same number of strands.
         inputs: what the network reads of each groom's strands, one (S, 70) a groom.
         spec: of the boundary vectors.
-        options: see there.
+        options: weights of the potentials, ranges of the materials, the device.
         rng: draws the materials.
         dynamics: factor on inertia and damping; 0 is the quasi-static problem.
 
