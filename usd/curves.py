@@ -104,7 +104,7 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         name=path,
         points=placed,
         counts=counts,
-        widths=_widths(curves, len(points), len(counts), scale, notes),
+        widths=_widths(curves, counts, scale, notes),
         root_uv=None if uv is None else uv.astype(np.float32),
         guides=None if guides is None else guides.astype(bool),
         group=None if group is None else group.astype(np.int32),
@@ -125,20 +125,45 @@ def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:
     return counts
 
 
-def _widths(
-    curves: UsdGeom.BasisCurves, points: int, strands: int, scale: float, notes: list[str]
-) -> np.ndarray | None:
-    values = rest_value(curves.GetWidthsAttr())
+def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes: list[str]) -> np.ndarray | None:
+    """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that can be meant."""
+    primvar = UsdGeom.PrimvarsAPI(curves).GetPrimvar("widths")
+    values = rest_primvar(primvar) if primvar and primvar.HasValue() else rest_value(curves.GetWidthsAttr())
     if values is None or not len(values):
         return None
     values = np.asarray(values, np.float32) * np.float32(scale)
-    if len(values) in (1, strands, points) and np.isfinite(values).all() and (values >= 0).all():
-        return values
+    strands = len(counts)
+    if np.isfinite(values).all() and (values >= 0).all():
+        if len(values) in (1, strands, counts.sum()):
+            return values
+        for knots in _knots(curves, counts):
+            if knots.sum() == len(values) and knots.min() > 0:
+                # Strand i runs from 2 i to 2 i + 1.
+                ends, places = (np.repeat(2.0 * np.arange(strands), each) + _places(each) for each in (knots, counts))
+                return np.interp(places, ends, values).astype(np.float32)
     notes.append(
         f"{curves.GetPath()}: {len(values)} widths do not fit {strands} strands or are not finite; "
         "they are left as they are"
     )
     return None
+
+
+def _knots(curves: UsdGeom.BasisCurves, counts: np.ndarray) -> list[np.ndarray]:
+    """How many varying values each cubic strand has, (S,): one for every end of a segment. Of strands with pinned ends
+    some tools take the ones that pinning adds for none.
+    """
+    if curves.GetTypeAttr().Get() != UsdGeom.Tokens.cubic:
+        return []
+    wrap = curves.GetWrapAttr().Get()
+    if curves.GetBasisAttr().Get() == UsdGeom.Tokens.bezier:
+        return [counts // 3 if wrap == UsdGeom.Tokens.periodic else (counts - 4) // 3 + 2]
+    return [] if wrap == UsdGeom.Tokens.periodic else [counts - 2]
+
+
+def _places(each: np.ndarray) -> np.ndarray:
+    """Where values lie along their strands, each strand's evenly from 0 to 1; `each` (S,) is how many it has."""
+    number = np.arange(each.sum()) - np.repeat(np.cumsum(each) - each, each)
+    return number / np.repeat(np.maximum(each - 1, 1), each)
 
 
 def _per_strand(prim: Usd.Prim, names, counts: np.ndarray, width: int) -> np.ndarray | None:

@@ -39,6 +39,33 @@ def test_texture_coordinates_of_roots(interpolation, kind, values, indices, expe
     assert expected is None or np.allclose(read, expected, atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["widths", "primvars:widths"])
+def test_varying_widths_of_cubic_curves_are_those_of_segments_ends(name):
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    curves.CreateTypeAttr("cubic")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.arange(33, dtype=np.float32).reshape(11, 3)))
+    curves.CreateCurveVertexCountsAttr([4, 7])
+    values, notes = {}, []
+    for basis, wrap in (("bezier", "nonperiodic"), ("bspline", "nonperiodic"), ("catmullRom", "pinned")):
+        curves.CreateBasisAttr(basis)
+        curves.CreateWrapAttr(wrap)
+        size = curves.ComputeVaryingDataSize(Usd.TimeCode.Default())
+        # Of thickness that shrinks evenly along each strand, every point has what lies at its place.
+        ends = {5: [0, 1, 0, 0.5, 1], 7: [0, 1, 0, 0.25, 0.5, 0.75, 1]}[size]
+        attribute = curves.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.FloatArray)
+        attribute.Set((0.001 - 0.0009 * np.array(ends)).tolist())
+        UsdGeom.Primvar(attribute).SetInterpolation("varying") if name != "widths" else None
+        values[basis] = read_groom(curves.GetPrim(), np.eye(4), notes).widths
+    expected = 0.001 - 0.0009 * np.concatenate([np.linspace(0, 1, 4), np.linspace(0, 1, 7)])
+    for widths in values.values():
+        np.testing.assert_allclose(widths, expected, rtol=1e-5)
+    assert not notes
+    curves.GetPrim().GetAttribute(name).Set([0.001] * 8)
+    read_groom(curves.GetPrim(), np.eye(4), notes)
+    assert notes == ["/Hair: 8 widths do not fit 2 strands or are not finite; they are left as they are"]
+
+
 def test_caches_may_repeat_their_counts_but_not_change_them():
     stage = Usd.Stage.CreateInMemory()
     curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
