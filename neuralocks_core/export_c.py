@@ -41,7 +41,7 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
 
 
 def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
-    """The header."""
+    """The text of the header: the template rig/hair.h.in with the model's numbers in place of @NAME@."""
     text = (_TEXTS / "hair.h.in").read_text(encoding="utf-8")
     history = (_TEXTS / "history.h.in").read_text(encoding="utf-8") if model.dynamic else ""
     text = text.replace("@HISTORY@", history)
@@ -49,15 +49,6 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
     chains = model.chains
     size = np.float32(np.sin(model.max_angle / 2))
     layers = _padded(model.layers, len(chains))
-    tables, buffers, code, below = [], [], [], "x"
-    for index, (weight, bias) in enumerate(layers):
-        rows, columns = weight.shape
-        table = ",\n".join(" {" + ", ".join(_float(v) for v in row) + "}" for row in weight)
-        tables.append(f"  static const float w{index}[{rows}][{columns}] = {{\n{table}}};")
-        tables.append(f"  static const float b{index}[{columns}] = {{{', '.join(_float(v) for v in bias)}}};")
-        buffers.append(f"  float h{index}[{columns}];")
-        code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
-        below = f"h{index}"
     spec = model.spec
     values = {
         "PREFIX": prefix,
@@ -68,10 +59,6 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
         "CHAINS": re.sub(r"[^\w ,.:-]", "_", ", ".join(chains.chain_name(c) for c in range(len(chains.roots)))[:300]),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
-        "TABLES": "\n".join(tables),
-        "BUFFERS": "\n".join(buffers),
-        "LAYERS": "\n".join(code),
-        "RAW": below,
         "ROWS": len(layers[0][0]),
         "WIDTH": layers[-1][0].shape[1] // 3,
         "LIMITS": ", ".join(_float(v) for v in model.limits),
@@ -83,8 +70,23 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "BINSTEPS": ", ".join(str(b) for b in spec.bins),
         "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
         "DT": repr(float(spec.dt)),
+        **_network(layers),
     }
     return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:
+    """C text of the padded layers: weights, buffers of their outputs, loops, and the last buffer's name."""
+    tables, buffers, code, below = [], [], [], "x"
+    for index, (weight, bias) in enumerate(layers):
+        rows, columns = weight.shape
+        table = ",\n".join(" {" + ", ".join(_float(v) for v in row) + "}" for row in weight)
+        tables.append(f"  static const float w{index}[{rows}][{columns}] = {{\n{table}}};")
+        tables.append(f"  static const float b{index}[{columns}] = {{{', '.join(_float(v) for v in bias)}}};")
+        buffers.append(f"  float h{index}[{columns}];")
+        code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
+        below = f"h{index}"
+    return {"TABLES": "\n".join(tables), "BUFFERS": "\n".join(buffers), "LAYERS": "\n".join(code), "RAW": below}
 
 
 def _padded(layers, joints: int) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -62,7 +62,7 @@ def descend(
     Args:
         optimisers: each with parameters of its own; their step sizes are set anew before each step.
         losses: called once a step; whatever else should happen now and then may happen in it.
-        schedule: see there.
+        schedule: budget and step sizes.
         step, done: where an earlier run with the same budget stopped.
 
     Yields:

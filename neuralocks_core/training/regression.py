@@ -160,7 +160,7 @@ def regress(
     Args:
         bank: holds rollouts already; grows by what `new_files` gives.
         net: normalised, on `options.device`.
-        options: see there.
+        options: budget and settings.
         optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
         new_files: the rollouts on disk by now.
         step, done: where an earlier run stopped.

@@ -42,7 +42,7 @@ def train_on_moments(
         pool: has moments already; grows to `options.pool` meanwhile.
         inputs: what the network reads of each groom's strands, one (S, 70) a groom.
         net: normalised, on `options.device`.
-        options: see there.
+        options: budget and settings.
         optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
         step, done: where an earlier run stopped.
     """
