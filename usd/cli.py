@@ -224,3 +224,7 @@ def demo_command(
     for name, path in {"shot": str(done.shot), **outputs}.items():
         took = f" ({done.seconds[name]:.1f} s)" if name in done.seconds else ""
         typer.echo(f"{name}: {path}{took}")
+
+
+_IN_ORDER = "demo inspect bake preview evaluate simulate import grow body train export".split()
+app.registered_commands.sort(key=lambda each: _IN_ORDER.index(each.name))  # of first need, as help lists them

@@ -64,7 +64,7 @@ def simulate_command(
     ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
-    """Bake with the slow reference solver instead of the network, to compare with."""
+    """Bake with the slow reference solver instead of the network, to compare with (extra 'compare')."""
     from .progress import progress_bar
     from .simulate import simulate
 
