@@ -145,9 +145,11 @@ class StrandSession:
 
 def rest_edges(rest: np.ndarray) -> np.ndarray:
     """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
-    edges = np.zeros(rest.shape, np.float32)
-    np.subtract(rest[:, 1:], rest[:, :-1], out=edges[:, 1:])
-    return edges.reshape(len(rest), -1)
+    flat, edges = rest.reshape(-1), np.empty(rest.size, np.float32)
+    np.subtract(flat[3:], flat[:-3], out=edges[3:])  # one long row; what reaches from strand to strand is the first
+    edges = edges.reshape(len(rest), -1)
+    edges[:, :3] = 0
+    return edges
 
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
