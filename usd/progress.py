@@ -40,7 +40,8 @@ class _Log:
         if now - self._written <= LOG_EVERY:
             return
         self._written, gone = now, done - self._first
-        left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if gone > 0 else ""
+        # The first frame of a bake takes as long as a hundred others: of one alone, hours were foretold.
+        left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if 100 * gone > total else ""
         print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
 
     def close(self) -> None:

@@ -29,6 +29,15 @@ def test_the_time_before_work_gets_going_is_not_taken_for_its_speed(monkeypatch,
     assert ", 0.5 min left" in capsys.readouterr().err.splitlines()[-1]
 
 
+def test_nothing_is_foretold_of_the_first_frame_alone(monkeypatch, capsys):
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.progress_bar("baking") as say:
+        for done in (0, 1, 50):
+            say(done, 241, "Hair")
+    assert ["left" in line for line in capsys.readouterr().err.splitlines()] == [False, False, True]
+
+
 def test_quick_work_shows_nothing_and_slow_work_on_a_terminal_a_bar(monkeypatch, capsys):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with progress.progress_bar("baking") as say:
