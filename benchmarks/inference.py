@@ -51,7 +51,7 @@ def main() -> None:
     print(f"bfloat16 matrix products: {'refused by onnxruntime: ' + refused if refused else 'possible here'}")
     for strands in arguments.strands:
         session = Inputs(model, real, strands)
-        a, whole_ms = timed(lambda s=session, v=vector: s.whole(whole, v, arguments.threads))
+        a, whole_ms = timed(lambda s=session, v=vector: s.whole(whole, v))
         b, split_ms = timed(lambda s=session, v=vector: s.split(model, v))
         c, int8_ms = timed(lambda s=session, v=vector: s.split(model, v, eight)) if eight else (b, float("nan"))
         floor_ms = floor(strands, arguments.threads)
@@ -104,7 +104,7 @@ class Inputs:
         model.by_chunk(work, len(result))
         return result
 
-    def whole(self, session, vector, threads: int) -> np.ndarray:
+    def whole(self, session, vector) -> np.ndarray:
         """The network as one: every strand's input holds the body too, all strands in one call."""
         inputs = np.concatenate([self.strand, np.broadcast_to(vector, (len(self.strand), len(vector)))], axis=1)
         return session.run(["displacement"], {"input": inputs, "anchor": self.anchor, "edges": self.edges})[0]

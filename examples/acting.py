@@ -63,7 +63,7 @@ def act(character: Character, rate: float = 24.0) -> Clip:
     puppet.bend_spine((-1.8 * twist - 0.5 * lag)[:, None] * UP)
     puppet.bend_spine((0.05 * walking + 1.1 * crouch)[:, None] * SIDE)
     _head(puppet, times, twist, lag, crouch)
-    _arms(puppet, times, walking, phase, crouch)
+    _arms(puppet, times, walking, phase)
     _legs(puppet, prints, hips, pelvis, yaw, rise)
     return puppet.clip()
 
@@ -80,7 +80,7 @@ def _head(puppet, times, twist, lag, crouch):
     puppet.turn_neck(end * (UP * 0.22 + SIDE * 0.06 + FRONT * 0.12))
 
 
-def _arms(puppet, times, walking, phase, crouch):
+def _arms(puppet, times, walking, phase):
     back = pulse(times, JUMP - 0.1, 0.4, 0.0, 0.16)
     up = pulse(times, JUMP + 0.36, 0.24, 0.12, 0.5)
     bind, humanoid = puppet.character.skeleton.bind[:, :3, 3], puppet.character.humanoid
