@@ -23,7 +23,7 @@ from neuralocks_core.training.rig_report import static_report, within
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
-_COLLISION, _HELD_COLLISION = 1e-4, 3e-4
+_COLLISION, _HELD_COLLISION = 1.5e-4, 3e-4
 """Of the skinned mesh's contact in motion and in held poses [m^2/s^2] against squared errors [m^2]."""
 _POOL = 256
 """Bodies held ready, as many in motion."""
@@ -31,8 +31,9 @@ _HELD, _MOVING = 16, 8
 """Bodies in held poses and in motion of which the contact is felt in a step."""
 _MOMENTS = 16
 """Of each simulated motion, from which those in motion are drawn."""
-_ROOM = 0.006
-"""Kept from the body over the material's margin while learning [m]: the network cannot hit the mark to the millimetre."""
+_ROOM, _HELD_ROOM = 0.008, 0.012
+"""Kept from the body over the material's margin while learning, in motion and in held poses [m]: the network cannot hit the
+mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
 
 
 def train_dynamic(
@@ -70,9 +71,8 @@ def train_dynamic(
     say = progress or (lambda done, total, message: None)
     spec = rig_spec(dynamic=True)
     features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
-    strict = replace(material, margin=material.margin + _ROOM)
-    held = HairOnBodies(rig, strict, _POOL, rng, spec)
-    moving = HairOnBodies(rig, strict, _POOL, rng, spec, moments)
+    held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
+    moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
     with torch.no_grad():
         wanted = held.energy.pose(torch.as_tensor(turns.reshape(-1, len(rig.chains), 4)))[2]
     wanted = wanted.reshape(*turns.shape[:2], -1, 3)
