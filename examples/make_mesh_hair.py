@@ -12,32 +12,50 @@ and body motion; the hair joints rest), both on top of `examples/shot/body.usdc`
 
 import argparse
 import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.collider import Collider
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.motion import Clip
 from neuralocks_core.puppet import Puppet
 from neuralocks_core.rotation import to_quaternion
 from usd.border import Border, open_stage, row_matrix
+from usd.joints import JointSource
 from usd.rig_source import read_rig
 
 HERE = Path(__file__).resolve().parent
-LOCKS = {  # name: where it leaves the head (degrees from the face, height [m]), length [m], half width, half thickness [m]
-    "front_l": (62, 0.045, 0.24, 0.019, 0.009),
-    "front_r": (-62, 0.045, 0.24, 0.019, 0.009),
-    "side_l": (100, 0.050, 0.27, 0.030, 0.011),
-    "side_r": (-100, 0.050, 0.27, 0.030, 0.011),
-    "back_l": (136, 0.045, 0.29, 0.032, 0.012),
-    "back_r": (-136, 0.045, 0.29, 0.032, 0.012),
-    "nape_l": (168, 0.040, 0.30, 0.030, 0.013),
-    "nape_r": (-168, 0.040, 0.30, 0.030, 0.013),
+
+
+class Lock(NamedTuple):
+    """Where a lock leaves the head (degrees from the face, height above the head joint [m]) and its size [m]."""
+
+    degrees: float
+    height: float
+    length: float
+    half_width: float
+    half_thickness: float
+
+
+LOCKS = {
+    "front_l": Lock(62, 0.045, 0.24, 0.019, 0.009),
+    "front_r": Lock(-62, 0.045, 0.24, 0.019, 0.009),
+    "side_l": Lock(100, 0.050, 0.27, 0.030, 0.011),
+    "side_r": Lock(-100, 0.050, 0.27, 0.030, 0.011),
+    "back_l": Lock(136, 0.045, 0.29, 0.032, 0.012),
+    "back_r": Lock(-136, 0.045, 0.29, 0.032, 0.012),
+    "nape_l": Lock(168, 0.040, 0.30, 0.030, 0.013),
+    "nape_r": Lock(-168, 0.040, 0.30, 0.030, 0.013),
 }
 JOINTS, RINGS, SIDES = 4, 15, 10
 CLEARANCE = 0.008
 """From the skin to the middle of a lock, over its half thickness [m]."""
+RATE, SECONDS = 24, 8.0
+"""Of the shot."""
 
 
 def main() -> None:
@@ -50,63 +68,108 @@ def main() -> None:
     make_shot(out / "shot.usda", out / "character.usda")
 
 
+@dataclass
+class Hair:
+    """Hair joints and the mesh that they move.
+
+    Attributes:
+        names: joint paths, roots of locks below the head.
+        parents: index of each joint's parent among the body's joints and these.
+        bind: bind transforms (4, 4), world.
+        points: of the mesh (V, 3) [m], world.
+        faces: vertex indices of each.
+        indices, weights: joints that move each vertex and their shares, (V, 2).
+    """
+
+    names: list[str]
+    parents: list[int]
+    bind: list[np.ndarray]
+    points: np.ndarray
+    faces: list[list[int]]
+    indices: np.ndarray
+    weights: np.ndarray
+
+
 def make_character(path: Path, body_path: Path) -> None:
     """Body with hair joints and hair mesh, at rest."""
     body_stage = open_stage(body_path)
     skeleton_prim = next(p for p in body_stage.Traverse() if p.IsA(UsdSkel.Skeleton))
     rig = read_rig(body_stage, skeleton_prim, Border.of(body_stage))
-    character = rig.character
-    head_at = character.skeleton.bind[character.head, :3, 3]
-    collider = Collider(character.body.points - head_at, character.body.triangles)
-    names, parents, binds = [], [], []
-    points, faces, indices, weights = _cap(body_stage, character, head_at)
-    head = character.head
-    for name, lock in LOCKS.items():
-        curve, flats = _curve(collider, *lock)
-        first = len(character.skeleton.names) + len(names)
-        for i in range(JOINTS):
-            names.append(f"{names[-1] if i else character.skeleton.names[head]}/hair_{name}_{i + 1}")
-            parents.append(first + i - 1 if i else head)
-            binds.append(_bone_frame(*_bone(curve, i), head_at))
-        ring_points, ring_faces, along = _tube(curve, flats, lock[3], lock[4])
-        faces += [[f + len(points) for f in face] for face in ring_faces]
-        points = np.concatenate([points, ring_points])
-        own, share = _influences(along, head, first)
-        indices, weights = np.concatenate([indices, own]), np.concatenate([weights, share])
+    hair = _hair(body_stage, rig.character)
     stage = _layer_over(path, body_path)
-    skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_prim.GetPath()))
-    joints = list(rig.source.names) + names
-    bind = np.concatenate([rig.source.bind, binds])
-    rest = list(rig.source.rest)
-    for parent, matrix in zip(parents, binds):
-        rest.append(np.linalg.inv(bind[parent]) @ matrix)
-    skeleton.GetJointsAttr().Set(joints)
+    _add_joints(stage, skeleton_prim.GetPath(), rig.source, hair)
+    _add_mesh(stage, skeleton_prim.GetPath(), hair)
+    stage.GetRootLayer().Save()
+
+
+def _hair(body_stage, character) -> Hair:
+    """The cap and all locks."""
+    head = character.head
+    head_at = character.skeleton.bind[head, :3, 3]
+    collider = Collider(character.body.points - head_at, character.body.triangles)
+    hair = Hair([], [], [], *_cap(body_stage, character, head_at))
+    for name, lock in LOCKS.items():
+        curve, flats = _curve(collider, lock)
+        first = len(character.skeleton.names) + len(hair.names)
+        for i in range(JOINTS):
+            hair.names.append(f"{hair.names[-1] if i else character.skeleton.names[head]}/hair_{name}_{i + 1}")
+            hair.parents.append(first + i - 1 if i else head)
+            hair.bind.append(_bone_frame(*_bone(curve, i), head_at))
+        ring_points, ring_faces, along = _tube(curve, flats, lock)
+        hair.faces += [[f + len(hair.points) for f in face] for face in ring_faces]
+        hair.points = np.concatenate([hair.points, ring_points])
+        own, share = _influences(along, head, first)
+        hair.indices, hair.weights = np.concatenate([hair.indices, own]), np.concatenate([hair.weights, share])
+    hair.points = hair.points + head_at
+    return hair
+
+
+def _add_joints(stage, skeleton_path, body: JointSource, hair: Hair) -> None:
+    """Put the hair's joints behind the body's."""
+    skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_path))
+    bind = np.concatenate([body.bind, hair.bind])
+    rest = [*body.rest, *(np.linalg.inv(bind[parent]) @ matrix for parent, matrix in zip(hair.parents, hair.bind))]
+    skeleton.GetJointsAttr().Set([*body.names, *hair.names])
     skeleton.GetBindTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in bind]))
     skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in rest]))
-    mesh = UsdGeom.Mesh.Define(stage, skeleton_prim.GetPath().GetParentPath().AppendChild("Hair"))
-    world = (points + head_at).astype(np.float32)
+
+
+def _add_mesh(stage, skeleton_path, hair: Hair) -> None:
+    """The skinned mesh, beside the skeleton."""
+    mesh = UsdGeom.Mesh.Define(stage, skeleton_path.GetParentPath().AppendChild("Hair"))
+    world = hair.points.astype(np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(world))
-    mesh.CreateFaceVertexCountsAttr([len(f) for f in faces])
-    mesh.CreateFaceVertexIndicesAttr([i for f in faces for i in f])
+    mesh.CreateFaceVertexCountsAttr([len(f) for f in hair.faces])
+    mesh.CreateFaceVertexIndicesAttr([i for f in hair.faces for i in f])
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateExtentAttr([Gf.Vec3f(*map(float, world.min(0))), Gf.Vec3f(*map(float, world.max(0)))])
     mesh.CreateDisplayColorAttr([Gf.Vec3f(0.35, 0.16, 0.10)])
     mesh.CreateDoubleSidedAttr(True)
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([skeleton_prim.GetPath()])
-    binding.CreateJointIndicesPrimvar(False, 2).Set(Vt.IntArray.FromNumpy(indices.astype(np.int32).ravel()))
-    binding.CreateJointWeightsPrimvar(False, 2).Set(Vt.FloatArray.FromNumpy(weights.astype(np.float32).ravel()))
+    binding.CreateSkeletonRel().SetTargets([skeleton_path])
+    binding.CreateJointIndicesPrimvar(False, 2).Set(Vt.IntArray.FromNumpy(hair.indices.astype(np.int32).ravel()))
+    binding.CreateJointWeightsPrimvar(False, 2).Set(Vt.FloatArray.FromNumpy(hair.weights.astype(np.float32).ravel()))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
-    stage.GetRootLayer().Save()
 
 
 def make_shot(path: Path, character_path: Path) -> None:
-    """Eight seconds that loop: a nod, a look aside, a shake, a bow and a hop."""
+    """The character in motion."""
     source = open_stage(character_path)
     skeleton_prim = next(p for p in source.Traverse() if p.IsA(UsdSkel.Skeleton))
     rig = read_rig(source, skeleton_prim, Border.of(source))
-    rate, seconds = 24, 8.0
-    puppet = Puppet(rig.character, np.arange(int(rate * seconds) + 1) / rate)
+    clip = _motion(rig.character)
+    stage = _layer_over(path, character_path)
+    _add_animation(stage, skeleton_prim.GetPath(), rig.source.names, clip, rig.character.skeleton.parents)
+    stage.SetStartTimeCode(1)
+    stage.SetEndTimeCode(len(clip.times))
+    stage.SetTimeCodesPerSecond(RATE)
+    stage.SetFramesPerSecond(RATE)
+    stage.GetRootLayer().Save()
+
+
+def _motion(character) -> Clip:
+    """Eight seconds that loop: a nod, a look aside, a shake, a bow and a hop."""
+    puppet = Puppet(character, np.arange(int(RATE * SECONDS) + 1) / RATE)
     t = puppet.times
 
     def bump(start, length):
@@ -121,31 +184,27 @@ def make_shot(path: Path, character_path: Path) -> None:
     puppet.bend_spine(np.outer(0.7 * bump(4.9, 1.6), side))
     hop = np.clip((t - 6.6) / 0.5, 0, 1)
     puppet.position[:, 1] += 4 * 0.25 * hop * (1 - hop) - 0.06 * (bump(6.2, 0.5) + bump(7.05, 0.5))
-    clip = puppet.clip()
-    stage = _layer_over(path, character_path)
-    animation = UsdSkel.Animation.Define(stage, skeleton_prim.GetPath().AppendChild("Motion"))
-    animation.CreateJointsAttr(list(rig.source.names))
+    return puppet.clip()
+
+
+def _add_animation(stage, skeleton_path, names, clip: Clip, parents) -> None:
+    """The clip as a SkelAnimation below the skeleton, one sample a frame from 1 on."""
+    animation = UsdSkel.Animation.Define(stage, skeleton_path.AppendChild("Motion"))
+    animation.CreateJointsAttr(list(names))
     for attribute in (
         animation.CreateTranslationsAttr(),
         animation.CreateRotationsAttr(),
         animation.CreateScalesAttr(),
     ):
         attribute.SetVariability(Sdf.VariabilityVarying)
-    parents = rig.character.skeleton.parents
     animation.GetScalesAttr().Set(Vt.Vec3hArray([Gf.Vec3h(1)] * len(parents)))
     for frame, joints in enumerate(clip.joints):
-        local = [np.linalg.inv(joints[p]) @ m if p >= 0 else m for p, m in zip(parents, joints)]
-        local = np.stack(local)
+        local = np.stack([np.linalg.inv(joints[p]) @ m if p >= 0 else m for p, m in zip(parents, joints)])
         turns = [Gf.Quatf(*map(float, q)) for q in to_quaternion(local[:, :3, :3])]
         animation.GetRotationsAttr().Set(Vt.QuatfArray(turns), frame + 1)
         animation.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(local[:, :3, 3].astype(np.float32)), frame + 1)
-    binding = UsdSkel.BindingAPI.Apply(stage.OverridePrim(skeleton_prim.GetPath()))
+    binding = UsdSkel.BindingAPI.Apply(stage.OverridePrim(skeleton_path))
     binding.CreateAnimationSourceRel().SetTargets([animation.GetPath()])
-    stage.SetStartTimeCode(1)
-    stage.SetEndTimeCode(len(clip.times))
-    stage.SetTimeCodesPerSecond(rate)
-    stage.SetFramesPerSecond(rate)
-    stage.GetRootLayer().Save()
 
 
 def _layer_over(path: Path, below: Path) -> Usd.Stage:
@@ -160,24 +219,24 @@ def _layer_over(path: Path, below: Path) -> Usd.Stage:
     return stage
 
 
-def _curve(collider, degrees, height, length, half_width, half_thickness):
+def _curve(collider, lock: Lock):
     """Middle of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
-    angle = np.radians(degrees)
+    angle = np.radians(lock.degrees)
     out = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    clearance = half_thickness + CLEARANCE
+    clearance = lock.half_thickness + CLEARANCE
     # Down the skull on a slope, then free fall that keeps clear of neck and shoulders.
     points, flats = [], []
     place = np.array([0.0, 0.115, 0.015]) + 0.05 * out
     step, travelled, falling = 0.004, 0.0, False
     heading = out.copy()
-    while travelled < length:
+    while travelled < lock.length:
         distance, normal = collider.distance(place[None], limit=0.1)
         place = place + normal[0] * max(0.0, clearance - distance[0]) if distance[0] < clearance else place
         if not falling and distance[0] > clearance + 0.002:
             place = place - normal[0] * (distance[0] - clearance) * 0.5
         points.append(place)
         flats.append(normal[0] if distance[0] < 0.06 and not falling else out)
-        falling |= place[1] < height
+        falling |= place[1] < lock.height
         pull = np.array([0.0, -1.0, 0.0]) + (0.0 if falling else 0.6) * out
         heading = heading + (0.25 if falling else 0.15) * (pull / np.linalg.norm(pull) - heading)
         heading /= np.linalg.norm(heading)
@@ -190,7 +249,7 @@ def _curve(collider, degrees, height, length, half_width, half_thickness):
     distance, normal = collider.distance(points, limit=0.1)
     points = points + normal * np.maximum(0, clearance - distance)[:, None]
     points[1:-1] = (points[:-2] + 2 * points[1:-1] + points[2:]) / 4
-    start = int(np.argmax(points[:, 1] < height))
+    start = int(np.argmax(points[:, 1] < lock.height))
     arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     return (points, arc - arc[start]), flats / np.linalg.norm(flats, axis=1, keepdims=True)
 
@@ -217,7 +276,7 @@ def _bone_frame(begin, end, head_at):
     return frame
 
 
-def _tube(curve, flats, half_width, half_thickness):
+def _tube(curve, flats, lock: Lock):
     """A flat tapered tube: points (n, 3), faces, and arc length over the chain's per point (n,)."""
     arcs = np.concatenate([np.linspace(curve[1][0], 0, 4, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
     middle = _at(curve, arcs)
@@ -232,8 +291,8 @@ def _tube(curve, flats, half_width, half_thickness):
     angle = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
     rings = (
         middle[:, None]
-        + (size * half_width)[:, None, None] * np.cos(angle)[:, None] * wide[:, None]
-        + (size * half_thickness)[:, None, None] * np.sin(angle)[:, None] * thick[:, None]
+        + (size * lock.half_width)[:, None, None] * np.cos(angle)[:, None] * wide[:, None]
+        + (size * lock.half_thickness)[:, None, None] * np.sin(angle)[:, None] * thick[:, None]
     )
     faces = []
     for ring in range(len(arcs) - 1):
@@ -256,7 +315,7 @@ def _influences(along, head, first):
 
 
 def _cap(stage, character, head_at):
-    """The scalp, a little larger, tied to the head."""
+    """Points, faces, joints and weights of the scalp, a little larger, tied to the head."""
     mesh = next(p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh))
     subset = UsdGeom.Subset(next(p for p in mesh.GetChildren() if p.GetName() == "scalp"))
     counts = np.asarray(UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Get())
