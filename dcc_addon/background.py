@@ -8,6 +8,7 @@ import time
 import bpy
 
 from .live import carriers, needs_sampling, refresh
+from .scene.redraw import redraw
 from .scene.sampling import notice, sample, stepping
 from .session import session
 
@@ -66,9 +67,19 @@ def look() -> float | None:
         todo = [a for a in needs_sampling(scene) if a.name_full not in session.failed]
         if not todo:
             session.sampling = None
-            _redraw(context)
+            redraw()
             return None
         _work.append((scene.name_full, todo[0].name_full, sample(context, todo[0])))
+    _go_on(scene)
+    if not _work:
+        session.sampling = None
+        refresh(scene)
+    redraw()
+    return 0.01
+
+
+def _go_on(scene) -> None:
+    """Sample the armature in work for SLICE; afterwards `_work` is empty if it is done, or has failed."""
     _, name, frames = _work[0]
     end = time.perf_counter() + SLICE
     try:
@@ -76,27 +87,13 @@ def look() -> float | None:
             for done, total in frames:
                 session.sampling = done / total
                 if time.perf_counter() > end:
-                    break
-            else:
-                _work.clear()
+                    return
     except Exception as error:
         session.tell(name, error)
         session.failed.add(name)
-        _work.clear()
-    if not _work:
-        session.sampling = None
-        refresh(scene)
-    _redraw(context)
-    return 0.01
+    _work.clear()
 
 
 def _busy(context) -> bool:
     playing = any(w.screen.is_animation_playing for w in context.window_manager.windows)
     return playing or bpy.app.is_job_running("RENDER")
-
-
-def _redraw(context) -> None:
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
