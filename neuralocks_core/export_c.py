@@ -57,7 +57,8 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "FEATURES": model.inputs,
         "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
         "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
-        "CHAINS": re.sub(r"[^\w ,.:-]", "_", ", ".join(chains.chain_name(c) for c in range(len(chains.roots)))[:300]),
+        "CHAINS": _plain(", ".join(chains.chain_name(c) for c in range(len(chains.roots)))),
+        "READS": _reads(model),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
         "ROWS": len(layers[0][0]),
         "WIDTH": layers[-1][0].shape[1] // 3,
@@ -145,6 +146,20 @@ def _example(model: RigModel, header: str, prefix: str) -> str:
     text = _parts_for(model, (_TEXTS / "example.c.in").read_text(encoding="utf-8"))
     names = {"HEADER": header, "STEM": Path(header).stem, "PREFIX": prefix, "UPPER": prefix.upper()}
     return re.sub("@([A-Z]+)@", lambda m: names[m[1]], text)
+
+
+def _reads(model: RigModel) -> str:
+    """A line of the header's comment with the joints that the inputs are of, if the model file has their names."""
+    reads = model.training.get("reads")
+    if not isinstance(reads, dict) or not all(isinstance(name, str) for name in reads.values()):
+        return ""
+    named = ", ".join(f"{part.replace('_', ' ')} {name}" for part, name in reads.items())
+    return f" *   the joints that it reads, as they are named in its rig: {_plain(named)}\n"
+
+
+def _plain(text: str) -> str:
+    """What may stand in a comment, whoever made the model."""
+    return re.sub(r"[^\w ,.:-]", "_", text[:300])
 
 
 def _float(value) -> str:

@@ -72,6 +72,9 @@ def train_rig(
     if command:
         model.training["command"] = command
     model.training["character"] = Path(character).name
+    who = hair.source.character
+    read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
+    model.training["reads"] = {name: path.rsplit("/", 1)[-1] for name, path in read.items()}
     model.save(out)
     return model, notes
 

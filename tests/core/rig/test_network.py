@@ -254,7 +254,8 @@ def test_names_of_any_alphabet_stay_apart_in_the_header(tmp_path):
     """Joint names are UTF-8 in C; nothing in a name, whoever made the model, gets out of its literal or comment."""
     names = ["左髪", "右髪", 'a"b\\', "*/ int x; /*", "**//", "t??/", "n\nl"]
     model = random_model((1,) * len(names))
-    model = replace(model, chains=replace(model.chains, names=tuple(names)))
+    reads = {"head": "*/ int y; /*", "neck": "首"}
+    model = replace(model, chains=replace(model.chains, names=tuple(names)), training={"reads": reads})
     export_c(model, tmp_path / "hair.h")
     source = """#include "hair.h"
 #include <stdio.h>
@@ -266,3 +267,5 @@ int main(void) {
 """
     printed = subprocess.run([compiled(tmp_path, source)], capture_output=True, check=True).stdout.decode()
     assert printed.split("|")[:-1] == names
+    header = (tmp_path / "hair.h").read_text(encoding="utf-8")
+    assert "as they are named in its rig: head __ int y_ __, neck 首\n" in header
