@@ -62,6 +62,11 @@ def arc_lengths(groom: Groom) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(arc, 0.0), length
 
 
+def count_pointlike(groom: Groom) -> int:
+    """How many strands have no two distinct points (`SHORTEST`)."""
+    return int((arc_lengths(groom)[1] <= SHORTEST).sum())
+
+
 def _keep_uniform(groom: Groom, own: np.ndarray, share: np.ndarray, valid: np.ndarray, sampled: np.ndarray) -> None:
     """Put a strand's own points where they differ from the samples by rounding only."""
     vertices = sampled.shape[1]

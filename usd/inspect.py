@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdGeom
 
+from neuralocks_core.arclength import arc_lengths, count_pointlike
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.finding import NoHairChains
@@ -180,9 +181,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
 
 def groom_facts(groom: Groom) -> dict:
     """Counts and lengths of a groom's strands [m], as plain values."""
-    step = np.linalg.norm(np.diff(groom.points.astype(float), axis=0), axis=1)
-    inside = groom.strand_of_point[1:] == groom.strand_of_point[:-1]
-    lengths = np.bincount(groom.strand_of_point[1:][inside], step[inside], groom.strand_count)
+    _, lengths = arc_lengths(groom)
     return {
         "name": groom.name,
         "strands": groom.strand_count,
@@ -193,7 +192,7 @@ def groom_facts(groom: Groom) -> dict:
             "median": round(float(np.median(lengths)), 4),
             "longest": round(float(lengths.max()), 4),
         },
-        "without two distinct points": int((lengths <= 1e-7).sum()),
+        "without two distinct points": count_pointlike(groom),
     }
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
@@ -133,7 +134,7 @@ def groom_notes(path: str, groom: Groom) -> list[str]:
     low = np.minimum.reduceat(groom.points, groom.starts[filled])
     high = np.maximum.reduceat(groom.points, groom.starts[filled])
     spread[filled] = (high - low).max(axis=1)
-    still = int((spread <= 1e-7).sum())
+    still = count_pointlike(groom)
     if still:
         notes.append(
             f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"

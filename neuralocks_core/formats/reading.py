@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core.arclength import SHORTEST, arc_lengths
+from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats import cemyuksel, counted, tressfx, tressfx_text
 from neuralocks_core.formats.raw import RawGroom, bad_file
@@ -75,7 +75,7 @@ def read_with_notes(
     if not (np.abs(points) <= LARGEST_COORDINATE).all():
         raise bad_file(str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit")
     groom = Groom(path.stem or "groom", points, raw.counts, widths, root_uv)
-    still = int((arc_lengths(groom)[1] <= SHORTEST).sum())
+    still = count_pointlike(groom)
     if still:
         fact = f"{still} of {groom.strand_count} strands have no two distinct points"
         notes.append(f"{path}: {fact}; they are kept, but will not move on their own")

@@ -10,10 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core.arclength import resample
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from usd.border import Border
-from usd.inspect import inspect
+from usd.inspect import groom_facts, inspect
+from usd.notes import groom_notes
 from usd.stage import read_rigs, read_shot
 
 from .shots import HEAD, POSITIONS, Recipe, write_shot
@@ -204,3 +207,12 @@ def test_curves_of_another_kind_are_told_to_become_basis_curves(tmp_path):
     with pytest.raises(NeuralocksError, match="no groom .* convert the NurbsCurves /Hero/Locks"):
         read_shot(path)
     assert any("/Hero/Locks" in line for line in inspect(path)["stops"])
+
+
+def test_strands_too_short_to_move_are_counted_alike_everywhere():
+    step = np.array([0.05, 0.05, 5e-6, 0.0])[:, None] * [0, -1, 0]
+    points = np.array([0, 1.7, 0.1]) + np.arange(3)[None, :, None] * step[:, None]
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(4, 3, np.int32))
+    assert (~resample(groom, 24)[1]).sum() == groom_facts(groom)["without two distinct points"] == 2
+    (said,) = groom_notes("/Hair", groom)
+    assert said == "/Hair: 2 of 4 strands have no two distinct points; they follow the head rigidly"
