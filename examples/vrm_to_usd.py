@@ -9,6 +9,7 @@ of Blender's files are the pose at the first frame; bind transforms are right, a
 
 import argparse
 import json
+import re
 import shutil
 import struct
 import tempfile
@@ -30,23 +31,34 @@ def main() -> None:
         bpy.ops.import_scene.gltf(filepath=str(copy))
     for shape in [o for o in bpy.data.objects if o.type == "MESH" and not o.modifiers]:
         bpy.data.objects.remove(shape)  # the importer's own drawing of bones
-    bpy.ops.wm.usd_export(filepath=str(options.out), export_armatures=True, only_deform_bones=False)
+    bpy.ops.wm.usd_export(filepath=str(options.out), export_armatures=True, only_deform_bones=False, allow_unicode=True)
     print(" ".join(f"--chains {name}" for name in spring_bone_names(options.avatar)))
 
 
 def spring_bone_names(path: Path) -> list[str]:
-    """Names of the joints that a VRM 0.x file's spring-bone groups below the head start from; none for plain glTF."""
+    """Names, as Blender writes them to USD, of the joints that a VRM 0.x or 1.0 file's spring bones below the head start
+    from; none for plain glTF.
+    """
     with open(path, "rb") as file:
         magic, _, _, length, kind = struct.unpack("<4sIII4s", file.read(20))
         if magic != b"glTF" or kind != b"JSON" or length > path.stat().st_size:
             return []
         scene = json.loads(file.read(length))
-    vrm = scene.get("extensions", {}).get("VRM", {})
-    nodes = scene.get("nodes", [])
-    head = {bone["node"] for bone in vrm.get("humanoid", {}).get("humanBones", ()) if bone["bone"] == "head"}
-    below = {child for node in head for child in nodes[node].get("children", ())}
-    springs = {bone for group in vrm.get("secondaryAnimation", {}).get("boneGroups", ()) for bone in group["bones"]}
-    return [nodes[i]["name"] for i in sorted(springs & below)]
+    nodes, extensions = scene.get("nodes", []), scene.get("extensions", {})
+    old, new = extensions.get("VRM", {}), extensions.get("VRMC_vrm", {})
+    heads = [bone["node"] for bone in old.get("humanoid", {}).get("humanBones", ()) if bone["bone"] == "head"]
+    heads += [bone["node"] for name, bone in new.get("humanoid", {}).get("humanBones", {}).items() if name == "head"]
+    springs = {bone for group in old.get("secondaryAnimation", {}).get("boneGroups", ()) for bone in group["bones"]}
+    for spring in extensions.get("VRMC_springBone", {}).get("springs", ()):
+        springs |= {joint["node"] for joint in spring["joints"][:1]}
+    starts, todo = [], [child for head in heads for child in nodes[head].get("children", ())]
+    while todo:
+        node = todo.pop()
+        if node in springs:
+            starts.append(node)
+        else:
+            todo += nodes[node].get("children", ())
+    return [re.sub(r"\W", "_", nodes[node]["name"]) for node in sorted(starts)]
 
 
 if __name__ == "__main__":

@@ -103,7 +103,12 @@ class JointSource:
             if not Sdf.Path.IsValidPathString(name):
                 raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is no path; rename it")
             if name in seen:
-                raise NeuralocksError(f"{self.path}: joint '{name}' is listed twice; make joint paths unique")
+                # Exporters put '_' for each letter that they do not take: all names of a Japanese rig become alike.
+                lost = not any(letter.isalnum() for letter in name.rsplit("/", 1)[-1])
+                remedy = (
+                    "export it with Unicode names allowed, or rename its bones" if lost else "make joint paths unique"
+                )
+                raise NeuralocksError(f"{self.path}: joint '{name}' is listed twice; {remedy}")
             above = Sdf.Path(name).GetParentPath()
             while (
                 not above.isEmpty

@@ -68,6 +68,18 @@ def test_train_bake_export(tmp_path, joints, dynamic):
     assert np.abs(rotations(own, 1) - flip * rotations(new, 1)).max() < (2e-2 if dynamic else 1e-5)
 
 
+def test_names_whose_letters_an_exporter_lost_are_told_as_such(tmp_path):
+    """Blender before 5.0 writes '_' for each byte of a Japanese name, so that those of one length are the same."""
+    write_character(tmp_path / "who.usda", 24)
+    stage = Usd.Stage.Open(str(tmp_path / "who.usda"))
+    joints = UsdSkel.Skeleton(stage.GetPrimAtPath("/Fbx/Armature")).GetJointsAttr()
+    names = [str(name) for name in joints.Get()]
+    joints.Set([*names[:-2], "______", "______"])
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="'______' is listed twice; export it with Unicode names allowed"):
+        read_rigged_hair(tmp_path / "who.usda")
+
+
 def test_names_that_are_no_paths_are_refused(tmp_path):
     """A ':' of a namespace is told in one line: UsdSkel and every importer would see no joint at all."""
     write_character(tmp_path / "who.usda", 24, prefix="rig:")
