@@ -23,7 +23,7 @@ from neuralocks_core.training.rig_report import static_report, within
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
-_COLLISION, _HELD_COLLISION = 1.5e-4, 3e-4
+_COLLISION, _HELD_COLLISION = 1e-4, 3e-4
 """Of the skinned mesh's contact in motion and in held poses [m^2/s^2] against squared errors [m^2]."""
 _POOL = 256
 """Bodies held ready, as many in motion."""
@@ -31,7 +31,7 @@ _HELD, _MOVING = 16, 8
 """Bodies in held poses and in motion of which the contact is felt in a step."""
 _MOMENTS = 16
 """Of each simulated motion, from which those in motion are drawn."""
-_ROOM, _HELD_ROOM = 0.008, 0.012
+_ROOM, _HELD_ROOM = 0.006, 0.012
 """Kept from the body over the material's margin while learning, in motion and in held poses [m]: the network cannot hit the
 mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
 
