@@ -40,26 +40,6 @@ def _command(version: str) -> list[str]:
     return [str(python), script]
 
 
-@pytest.fixture(scope="session")
-def random_model(tmp_path_factory):
-    """A strand model of random weights, whose hair moves a lot."""
-    torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
-    from neuralocks_core import model
-    from neuralocks_core.boundary import BoundarySpec
-    from neuralocks_core.training.autoencoder import StrandAutoencoder
-    from neuralocks_core.training.export import strand_graphs
-    from neuralocks_core.training.networks import StrandNet
-
-    spec = BoundarySpec()
-    torch.manual_seed(0)
-    net, encoder = StrandNet(spec.size), StrandAutoencoder()
-    with torch.no_grad():
-        net.out.weight.mul_(20)
-    meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": True, "output": "direction"}
-    path = tmp_path_factory.mktemp("model") / "random.neuralocks"
-    return model.write(path, meta, strand_graphs(encoder, net, "direction"))
-
-
 @pytest.mark.parametrize("scenario", scenarios.modules())
 @pytest.mark.parametrize("version", _wanted())
 def test_scenario(version, scenario, random_model, tmp_path):

@@ -12,9 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from .test_blender import ROOT, random_model
-
-__all__ = ["random_model"]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_panel_in_a_window(random_model, tmp_path):
