@@ -6,7 +6,6 @@ Blender objects are looked up by name each time: a pointer kept over an undo or 
 
 import traceback
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -47,11 +46,6 @@ class SampledRig:
     def bodies(self) -> tuple[str, ...]:
         """Names of the body meshes."""
         return self.key[1]
-
-    @cached_property
-    def world(self) -> np.ndarray:
-        """Joints (T, J, 4, 4) in Blender's world space."""
-        return self.motion.world()
 
 
 @dataclass(eq=False)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
 
 from ..services import rig as rig_service
 from ..services.axes import to_core
@@ -18,6 +19,9 @@ from .lookup import find
 from .placing import world
 from .rigging import rigging
 from .unkeyed import Unkeyed
+
+BLOCK = 16
+"""Frames whose poses are made channels together: each then costs little, and all of them less than a slice of work."""
 
 
 def hairs_of(armature, scene) -> list:
@@ -101,18 +105,25 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
 
 
 class _Recording:
-    """An armature's motion, and that of what it carries, while the scene's frames are stepped."""
+    """An armature's motion, and that of what it carries, while the scene's frames are stepped. Poses become channels some
+    frames at a time: for hundreds of bones all at once would hold Blender up for seconds.
+    """
 
     def __init__(self, context, armature):
         self._context, self._scene, self.name = context, context.scene, armature.name_full
         self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
-        self._rig.humanoid()
+        self._head = self._rig.humanoid()["head"]
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
-        self._joints = np.empty((len(self.frames), len(self._rig.bones), 4, 4))
-        self._places = {name: np.empty((len(self.frames), 4, 4)) for name in ["", *self._tracked]}
+        self._rate = self._scene.render.fps / self._scene.render.fps_base
+        self._unit = self._scene.unit_settings.scale_length
+        count, bones = len(self.frames), len(self._rig.bones)
+        self._joints, self._parts = np.empty((BLOCK, bones, 4, 4)), []
+        self._drawn, self._world = np.empty((count, bones, 4, 4), np.float32), np.empty((count, bones, 4, 4))
+        self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
+        self._places = {name: np.empty((count, 4, 4)) for name in ["", *self._tracked]}
         self._shapes = []
         self.reader = None
 
@@ -128,56 +139,64 @@ class _Recording:
             raise hidden(armature)
         if not row:
             self.reader = armature_reader.PoseReader(armature, self._rig.bones)
+            self._bind = armature_reader.matrix(evaluated.matrix_world) @ self._rig.rest
+            self._trim = trim_of(self._bind, self.name)
             self._binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        self._joints[row] = self.reader.world(evaluated)
+        self._joints[row % BLOCK] = self.reader.world(evaluated)
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in self._tracked:
             self._places[other][row] = world(_found(other), graph)
         values = [body_reader.shape_values(find(body)) for body in self._bodies]
         self._shapes.append(np.concatenate([np.zeros(0), *values]))
+        if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
+            self._store(row - row % BLOCK, row + 1)
+
+    def _store(self, first: int, end: int) -> None:
+        """Make channels of the poses of some rows."""
+        rows, joints = slice(first, end), self._joints[: end - first]
+        part = Motion.from_world(
+            frames=self.frames[rows],
+            rate=self._rate,
+            metres_per_unit=self._unit,
+            parents=self._rig.parents,
+            bind=self._bind,
+            joints=joints,
+            shape=np.array(self._shapes[rows]),
+            places={},
+            subject=self.name,
+        )
+        world = part.world()
+        self._parts.append(part)
+        self._world[rows] = to_core(self._unit) @ world
+        self._drawn[rows] = joints @ self._trim
+        self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
     def sampled(self) -> SampledRig:
         """What was read, as the character and clip that live view and bake use."""
         rig, places, armature = self._rig, self._places, find(self.name)
-        rate = self._scene.render.fps / self._scene.render.fps_base
-        unit = self._scene.unit_settings.scale_length
-        untrimmed = places[""][0] @ rig.rest
-        motion = Motion.from_world(
-            frames=self.frames,
-            rate=rate,
-            metres_per_unit=unit,
-            parents=rig.parents,
-            bind=untrimmed,
-            joints=self._joints,
-            shape=np.array(self._shapes),
-            places=places,
-            subject=self.name,
-        )
-        head, binds = rig.humanoid()["head"], self._binds
+        motion, binds = Motion.joined(self._parts, places), self._binds
         for other in self._tracked:
-            own = rig_service.on_head(places[other], places[""], self._joints[:, head], untrimmed[head])
+            own = rig_service.on_head(places[other], places[""], self._heads, self._bind[self._head])
             binds[other] = binds[other] if own is None else own
         arrays = [(body_reader.read(find(body), armature), binds[body]) for body in self._bodies]
-        metres = unit * rig_service.size_shown(rig, places[""][0], motion)
+        metres = self._unit * rig_service.size_shown(rig, places[""][0], self._shown)
         character = rig_service.character(rig, places[""][0], arrays, metres)
-        clip = motion.clip(to_core(unit), armature.neuralocks_character.loop)
+        clip = Clip(motion.times, self._world, motion.shape, armature.neuralocks_character.loop)
         before = session.rigs.get(self.name)
         if before is not None and rig_service.same(before.character, character):
             character = before.character
-        trim = trim_of(untrimmed, self.name)
-        drawn = (self._joints @ trim).astype(np.float32)
         return SampledRig(
             rig,
             motion,
             character,
             clip,
-            trim,
+            self._trim,
             self._key,
             binds,
             bind_metres=metres,
-            drawn=drawn,
+            drawn=self._drawn,
             rigging=self._rigging,
         )
 

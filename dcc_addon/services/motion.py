@@ -5,12 +5,11 @@ Blender's matrices are turned at once into the float32 channels of a SkelAnimati
 these: live view, bake and the exported stage then see the very same numbers.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import Mirrored, from_quaternion, rotation_part, sizes, to_quaternion
 
 TOLERANCE = 1e-4
@@ -149,6 +148,13 @@ class Motion:
             places=dict(places),
         )
 
+    @classmethod
+    def joined(cls, parts, places) -> "Motion":
+        """Parts of one motion, one after the other, with the world transforms (T, 4, 4) of other objects, by name."""
+        channels = ("frames", "translation", "rotation", "scale", "shape")
+        whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in channels}
+        return replace(parts[0], places=dict(places), **whole)
+
     @property
     def times(self) -> np.ndarray:
         """(T,) [s]."""
@@ -160,10 +166,6 @@ class Motion:
         for level in _levels(self.parents)[1:]:
             joints[:, level] = joints[:, self.parents[level]] @ joints[:, level]
         return joints
-
-    def clip(self, to_core: np.ndarray, loop: bool = False) -> Clip:
-        """The same as the core reads it."""
-        return Clip(self.times, to_core @ self.world(), self.shape, loop)
 
     def gap(self) -> float:
         """How far the last pose is from the first [degrees]: largest turn of any joint against its parent. A loop has

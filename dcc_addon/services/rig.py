@@ -14,7 +14,7 @@ from neuralocks_core.mesh import inside_out
 
 from . import names
 from .axes import to_core, transformed
-from .motion import TOLERANCE, Motion, similar, trim_of
+from .motion import TOLERANCE, similar, trim_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +140,12 @@ def same(a: Character, b: Character) -> bool:
     return all(np.array_equal(one, other) for one, other in pairs)
 
 
-def size_shown(rig: RigArrays, place: np.ndarray, motion: Motion) -> float:
-    """How much larger than in the bind pose the motion shows the head, as `usd` measures the same in a stage."""
+def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
+    """How much larger than in the bind pose a motion shows the head, whose world transforms (T, 4, 4) are of its channels,
+    as `usd` measures the same in a stage; `place` as for `character`.
+    """
     head = rig.humanoid()["head"]
-    size = float(np.median(sizes_shown(motion.world()[:, head], bind_world(rig, place)[head])))
+    size = float(np.median(sizes_shown(heads, bind_world(rig, place)[head])))
     return 1.0 if abs(size - 1) < 1e-4 else size
 
 

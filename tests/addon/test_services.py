@@ -104,9 +104,21 @@ def test_a_character_is_measured_at_the_size_shown(size):
     bind, world = _motion(np.random.default_rng(4))
     world[:, 3, :3, :3] *= size
     motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
-    assert rig.size_shown(rig.RigArrays("Rig", BONES, PARENTS, _rest()), np.eye(4), motion) == pytest.approx(
-        size, rel=1e-3
-    )
+    shown = rig.size_shown(rig.RigArrays("Rig", BONES, PARENTS, _rest()), np.eye(4), motion.world()[:, 3])
+    assert shown == pytest.approx(size, rel=1e-3)
+
+
+def test_a_motion_in_parts_is_the_whole():
+    bind, world = _motion(np.random.default_rng(4))
+    frames, shape, places = np.arange(9), np.arange(18.0).reshape(9, 2), {"": world[:, 0]}
+
+    def of(rows):
+        return Motion.from_world(frames[rows], 24, 1.0, PARENTS, bind, world[rows], shape[rows], {})
+
+    whole, joined = of(slice(9)), Motion.joined([of(slice(4)), of(slice(4, 9))], places)
+    for name in ("frames", "translation", "rotation", "scale", "shape"):
+        assert np.array_equal(getattr(whole, name), getattr(joined, name)), name
+    assert joined.places == places
 
 
 def test_frame_numbers():
