@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender calls: each handler a few lines, all work in `live`."""
 
+from contextlib import nullcontext
+
 import bpy
 from bpy.app.handlers import persistent
 
@@ -84,7 +86,7 @@ def after_save(*_):
 @persistent
 def before_render(scene, *_):
     """A render must be right: sample now what is out of date, be it that only the pose drawn tells so."""
-    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):  # it need not be the one in view
+    with _in_view(scene):
         live.refresh(scene, wait=True, moved=True)
         for armature in live.carriers(scene):
             try:
@@ -100,6 +102,13 @@ def before_render(scene, *_):
 def after_render(*_):
     """The render has ended, or was cancelled."""
     blur.end()
+
+
+def _in_view(scene):
+    """Meanwhile Blender works on this scene; scripts render others than the one in view."""
+    if scene == bpy.context.scene:
+        return nullcontext()
+    return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
 
 
 def _mark_stale() -> None:

@@ -4,7 +4,7 @@
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
-from .models import model_path
+from .models import model_path, stamp
 from .pose import pose
 from .scene import rotations
 from .scene.sampling import shown_frame
@@ -50,14 +50,15 @@ def _update(armature, scene, graph, moved) -> None:
 
 def bind(armature, sampled) -> LiveBones:
     """The rig model bound to this armature, once."""
-    bones = session.chains.get(armature.name_full)
-    if bones is None:
-        settings = armature.neuralocks_character
-        model = RigModel.load(model_path(settings.rig_model, "rig"))
+    bones, settings = session.chains.get(armature.name_full), armature.neuralocks_character
+    path = model_path(settings.rig_model, "rig")
+    file = path, stamp(path)
+    if bones is None or bones.file != file:
+        model = RigModel.load(path)
         bones = session.chains[armature.name_full] = LiveBones.of(
             model, sampled.rig, sampled.character, settings.chains
         )
-        bones.modes = rotations.free_modes(armature, bones.bones)
+        bones.modes, bones.file = rotations.free_modes(armature, bones.bones), file
     bones.follow(sampled.character, sampled.clip)
     return bones
 

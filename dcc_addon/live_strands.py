@@ -11,7 +11,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
 from . import preparing
-from .models import load_model, model_path
+from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
 from .scene.lookup import find
@@ -105,6 +105,9 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     if prepared is not None and not known(hair):
         _let_go(prepared.of, hair)
         session.doubtful.add(name)
+    path = model_path(hair.neuralocks_hair.model)
+    if prepared is not None and prepared.file != (path, stamp(path)):
+        session.doubtful.add(name)
     if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
         made_of, make = _recipe(hair, armature, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
@@ -145,12 +148,13 @@ def _recipe(hair, armature, sampled, wanted: tuple):
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(data)
     # The hair keeps its character, so no other one gets its id.
-    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), path, id(sampled.character)
+    file = path, stamp(path)
+    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(sampled.character)
 
     def make(say) -> LiveHair:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
         prepared = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
-        prepared.made_of, prepared.of = made_of, of
+        prepared.made_of, prepared.of, prepared.file = made_of, of, file
         prepared.follow(sampled.clip)
         prepared.points(*wanted)
         return prepared

@@ -12,11 +12,19 @@ from .session import session
 
 def load_model(found: str) -> StrandModel:
     """The model of an absolute path, read once while it does not change; calls nothing of Blender."""
-    stamp = (os.path.getmtime(found), os.path.getsize(found)) if os.path.isfile(found) else None
-    kept = session.models.get(found)
-    if kept is None or kept[0] != stamp:
-        kept = session.models[found] = stamp, StrandModel.load(found)
+    now, kept = stamp(found), session.models.get(found)
+    if kept is None or kept[0] != now:
+        kept = session.models[found] = now, StrandModel.load(found)
     return kept[1]
+
+
+def stamp(found: str) -> tuple | None:
+    """What tells whether the file of an absolute path is another one; None where there is none."""
+    try:
+        status = os.stat(found)
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
 
 
 def model_path(path: str, kind: str = "strands") -> str:

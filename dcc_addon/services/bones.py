@@ -49,12 +49,14 @@ class LiveBones:
         bones: names of the hair bones, (N), as in Blender.
         joints: their places in the skeleton, (N,).
         modes: by bone, the rotation mode in which it is turned.
+        file: whatever tells its maker that the model file was replaced.
     """
 
     model: RigModel
     bones: tuple[str, ...]
     joints: np.ndarray
     modes: dict[str, str] = field(default_factory=dict)
+    file: object = None
 
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":

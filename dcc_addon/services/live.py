@@ -27,11 +27,12 @@ class LiveHair:
 
     Attributes:
         made_of: whatever tells its maker that it must be made again.
-        of: whatever tells its maker quickly that it is of something else.
+        of, file: whatever tells its maker quickly that it is of other curves, or of a model file that was replaced.
     """
 
     made_of: object = None
     of: object = None
+    file: object = None
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model

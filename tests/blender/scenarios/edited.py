@@ -2,13 +2,15 @@
 """Edits of which Blender tells little: of what moves a rig, besides keys, and of live hair itself."""
 
 import math
+import shutil
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from neuralocks_core.model import shipped
 from tests.blender import scenes
-from tests.blender.checks import apart, baked_points, make_live, messages, points_at
+from tests.blender.checks import MODEL, apart, baked_points, make_live, messages, points_at
 
 
 def rearranged(_folder: Path) -> None:
@@ -145,6 +147,29 @@ def other_strands(folder: Path) -> None:
     strands.use_fake_user = True
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "left.blend"))
     assert not curves.has_rest(short), "hair that is in no scene is saved at rest"
+
+
+def replaced_model(folder: Path) -> None:
+    """A model file that is written anew, by another training say, is what live hair is moved by from the next frame on, as
+    a bake would be.
+    """
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands, model = scenes.hair(rig, 20), folder / "mine.neuralocks"
+    shutil.copy(MODEL, model)
+    make_live(rig, strands)
+    strands.neuralocks_hair.model = str(model)
+    before = points_at(strands, 9)
+    new = folder / "new.neuralocks"
+    shutil.copy(shipped("strands"), new)
+    new.replace(model)
+    after = points_at(strands, 9)
+    strands.neuralocks_hair.model = ""
+    assert apart(before, after) > 0.005 and apart(after, points_at(strands, 9)) == 0.0
+    strands.neuralocks_hair.model = str(model)
+    model.unlink()
+    points_at(strands, 9)
+    assert "mine.neuralocks" in messages()["Hair"], messages()
 
 
 class _Returned:
