@@ -78,7 +78,7 @@ class Inputs:
         self.part = model.run("strand.onnx", "strand_part", strand=self.strand)
 
     def split(self, model, vector, tail=None) -> np.ndarray:
-        """As the runtime does it: the body once, then chunks of strands."""
+        """The network as the runtime runs it: the body's part once, then chunks of strands."""
         frame = model.frame(vector)
         result = np.empty_like(self.edges)
         if tail:

@@ -144,7 +144,7 @@ def roots(groom: Groom) -> np.ndarray:
 
 
 def lengths(groom: Groom) -> np.ndarray:
-    """Of the strands (S,) [m]."""
+    """Arc lengths of the strands (S,) [m]."""
     from neuralocks_core.arclength import arc_lengths
 
     return arc_lengths(groom)[1]

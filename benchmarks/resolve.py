@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 MEASURED = 4
-"""Of so many strands one is measured."""
+"""One strand in so many is measured."""
 
 
 def main() -> None:

@@ -90,7 +90,7 @@ def carriers(scene) -> list:
 
 
 def needs_sampling(scene) -> list:
-    """Those whose motion is unknown or out of date."""
+    """Those of `carriers` whose motion is unknown or out of date."""
     found = []
     for armature in carriers(scene):
         sampled = session.rigs.get(armature.name_full)

@@ -81,7 +81,7 @@ def _loop_changed(character, context) -> None:
 
 
 class HairSettings(bpy.types.PropertyGroup):
-    """On a hair Curves object."""
+    """The settings of a hair Curves object."""
 
     armature: PointerProperty(
         name="Armature",
@@ -162,7 +162,7 @@ class HairSettings(bpy.types.PropertyGroup):
 
 
 class CharacterSettings(bpy.types.PropertyGroup):
-    """On an armature object."""
+    """The settings of an armature object."""
 
     body: PointerProperty(
         name="Body",
@@ -221,7 +221,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
 
 
 class SceneSettings(bpy.types.PropertyGroup):
-    """On a scene: what the panel works on, and where bakes go."""
+    """The settings of a scene: what the panel works on, and where bakes go."""
 
     armature: PointerProperty(
         name="Armature", description="The character shown in this panel", type=bpy.types.Object, poll=_is_armature

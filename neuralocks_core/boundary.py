@@ -66,7 +66,7 @@ class BoundarySpec:
 
     @classmethod
     def from_json(cls, values: dict) -> "BoundarySpec":
-        """From what `to_json` gave; unknown keys mean a later version."""
+        """Make it from what `to_json` gave; unknown keys mean a later version."""
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
             raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")

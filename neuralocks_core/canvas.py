@@ -111,7 +111,7 @@ class PlainCanvas:
         self._backdrop = backdrop(width, height).astype(np.float32)
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
-        """As `VtkCanvas.draw`."""
+        """See `VtkCanvas.draw`."""
         wide, high = (round(side * self._scale) for side in self.size)
         samples = [self._segments(camera, hair, hair_colours, high)]
         if body is not None:

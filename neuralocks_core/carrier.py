@@ -41,7 +41,7 @@ class Placing(NamedTuple):
 
     @classmethod
     def of(cls, transform: np.ndarray, centre: np.ndarray) -> Placing:
-        """From the transform (4, 4) of bind-world points and the head's own place (3,) there."""
+        """Make it from the transform (4, 4) of bind-world points and the head's own place (3,) there."""
         centre = centre.astype(np.float32)
         origin = transform[:3, :3] @ centre.astype(float) + transform[:3, 3]
         return cls(transform[:3, :3].astype(np.float32), centre, origin.astype(np.float32))

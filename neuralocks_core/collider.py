@@ -62,7 +62,7 @@ class Collider:
         return distance, normal
 
     def closest(self, points: np.ndarray, limit: float = 0.03, proven: bool = True):
-        """As `distance`, and the index (...,) of the nearest triangle among `triangles`."""
+        """Like `distance`, with the index (...,) of the nearest triangle among `triangles`."""
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
             return np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape, int)

@@ -125,7 +125,7 @@ def penetration_of(points: np.ndarray, rest_distance: np.ndarray, colliders: lis
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Of two curves (T, 3) about their means."""
+    """Correlation of two curves (T, 3) about their means."""
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
     both = np.sqrt(np.square(a).sum() * np.square(b).sum())
     return float((a * b).sum() / both) if both > 1e-12 else float("nan")

@@ -78,7 +78,7 @@ class Material:
 
     @classmethod
     def parse(cls, settings: list[str] | tuple[str, ...]) -> Material:
-        """From `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
+        """Make it from `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
 
         Raises:
             NeuralocksError: an unknown name, no number, or a value outside its range.

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.collider import split_triangle
 
 SPACING = 0.010
-"""Of samples on the skin [m]; a half or a quarter of it where triangles are as small."""
+"""Distance between samples on the skin [m]; a half or a quarter of it where triangles are as small."""
 NEIGHBOURS = 8
 """Samples that are blended; the first is the sample itself."""
 CELL = 0.012

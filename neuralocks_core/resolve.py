@@ -17,7 +17,7 @@ from neuralocks_core.strands import StrandSet
 MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
 ROUNDS = 5
-"""Of finding the planes under a strand and laying it over them."""
+"""Rounds of finding the planes under a strand and laying it over them."""
 SLACK = np.float32(1e-5)
 """Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
 CLAMPED = 2

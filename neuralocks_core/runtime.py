@@ -49,7 +49,7 @@ class StrandModel:
 
     @classmethod
     def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
-        """From a file; the shipped model where `path` is None."""
+        """Load a file, or the shipped model where `path` is None."""
         return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
 
     def sampler(self, character: Character, clip: Clip) -> BoundarySampler:

@@ -14,7 +14,7 @@ from .border import transformed
 from .stage import Shot, StageGroom, read_shot
 
 MOST_BODY_POINTS = 400_000
-"""Of a body drawn in a preview."""
+"""Largest number of body points drawn in a preview."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
 
 
 def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
-    """Those of the curves that are empty, unless all are: exporters leave such prims behind."""
+    """The curves that are empty, unless all are: exporters leave such prims behind."""
     empty = []
     for prim in prims:
         points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())

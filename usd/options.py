@@ -50,7 +50,7 @@ def pairs(words: list[str] | None, option: str) -> dict[str, str]:
 
 
 def numbers(words: list[str] | None, option: str) -> dict[str, float]:
-    """As `pairs`, of numbers."""
+    """Like `pairs`, with numbers for values."""
     try:
         return {name: float(text) for name, text in pairs(words, option).items()}
     except ValueError:

@@ -228,7 +228,7 @@ def rest_value(attribute: Usd.Attribute):
 
 
 def rest_primvar(primvar: UsdGeom.Primvar):
-    """As `rest_value`, one value for each element."""
+    """Like `rest_value`, with one value for each element."""
     value = primvar.ComputeFlattened(Usd.TimeCode.Default())
     return primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if value is None else value
 

@@ -20,7 +20,7 @@ KEEPS_CACHES = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_
 nodes that resample or mesh the hair would use the old ones.
 """
 RADIUS = 0.005
-"""Of hair without the attribute `radius`, as Cycles draws it, in the object's space."""
+"""Radius of hair without the attribute `radius`, as Cycles draws it, in the object's space."""
 
 
 def counts(data) -> np.ndarray:

@@ -12,7 +12,7 @@ from .animated import animated
 SAME = 1e-7
 """Values that differ by less are the same turn."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
-"""By rotation mode, where a bone keeps how it is turned."""
+"""Rotation mode -> the property in which a bone keeps its rotation."""
 KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
 """Modes for keys, best first: the axis of a small turn is anywhere, so between two keys it swings."""
 

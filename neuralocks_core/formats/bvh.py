@@ -214,7 +214,7 @@ def _values(words: _Words, frames: int, width: int) -> np.ndarray:
 
 
 def _likely_unit(joints: list[_Joint]) -> float:
-    """That unit in which the skeleton, legs and trunk stretched out, is as high as a person."""
+    """The unit in which the skeleton, legs and trunk stretched out, is as high as a person."""
     rest = _rest(joints)
     # From the lowest end of any chain to the highest, along the bones: bent or spread rest poses count in full.
     length = np.zeros(len(joints))

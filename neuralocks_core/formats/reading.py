@@ -98,7 +98,7 @@ def _content(path: Path) -> bytes:
 
 
 def _reader(path: Path, content: bytes):
-    """By content where the format marks itself, else by extension."""
+    """The reader of a format, by content where the format marks itself, else by extension."""
     suffix = path.suffix.lower()
     if content[:4] == b"HAIR":
         return cemyuksel.read

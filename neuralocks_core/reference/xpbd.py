@@ -122,7 +122,7 @@ class _Hair:
         self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *pose, *self._carry(a, b), self.x, self.plane)
 
     def go(self, a: int, b: int, step: float) -> None:
-        """From substep a to b, each of `step` [s]."""
+        """Advance from substep a to b, each of `step` [s]."""
         wp = self.wp
         turns = wp.array(self.way.turn[a : b + 1].astype(np.float32), dtype=wp.quat, device=self.device)
         origins = wp.array(self.way.origin[a : b + 1].astype(np.float32), dtype=wp.vec3, device=self.device)

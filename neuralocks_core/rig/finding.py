@@ -14,7 +14,7 @@ from neuralocks_core.rig.measuring import measured_chains
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 CAP = 0.7
-"""Of the head's width and depth, what skin must cover to be a cap."""
+"""Share of the head's width and depth that skin must cover to be a cap."""
 
 
 class NoHairChains(NeuralocksError):
