@@ -32,6 +32,18 @@ def messages():
     return session.messages
 
 
+def refused(call, *words):
+    """The call raises an error that has all these words, as operators do that refuse, and no unexpected one."""
+    try:
+        result = call()
+    except Exception as error:
+        text = str(error)
+        assert "unexpected" not in text, text
+        assert all(word in text for word in words), text
+    else:
+        raise AssertionError(f"not refused: {result}")
+
+
 def points_at(strands, frame, subframe=0.0):
     """Points (P, 3) of a hair object at a frame, as it is drawn."""
     bpy.context.scene.frame_set(frame, subframe=subframe)
