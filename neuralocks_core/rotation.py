@@ -78,8 +78,8 @@ def volumes(linear: np.ndarray) -> np.ndarray:
 def inverse(transform: np.ndarray) -> np.ndarray:
     """Inverse (4, 4) of one affine transform (4, 4), written out.
 
-    numpy's own wakes, in Blender 4, threads that then wait in a loop on the cores that hair is computed on, an eighth of
-    what a frame of live hair costs; and its last bits are another numpy's others.
+    numpy's own wakes, in Blender 4, a thread that then waits in a loop on a core that hair is computed on; and its last
+    bits differ from one numpy to the next.
 
     Raises:
         NeuralocksError: the transform is flat or not finite.
