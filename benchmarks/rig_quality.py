@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Quality of the rig models that are shipped, beside spring bones, in one run: held poses, motion, frame rates, teleports.
 
-    python benchmarks/rig_quality.py [MODEL...] [--poses 1000] [--seed 1] [--json]
+    python benchmarks/rig_quality.py [MODEL...] [--poses 1000] [--seed 1] [--floor] [--json]
 
 Poses, body shapes and motion are held out: their seed is not that of training, and the scripted clips are in no training.
 """
@@ -11,13 +11,18 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from neuralocks_core import model as model_file  # noqa: E402
-from neuralocks_core.rig import RigModel  # noqa: E402
+from neuralocks_core.motion import Clip  # noqa: E402
+from neuralocks_core.random_motion import KINDS, scripted_clip  # noqa: E402
+from neuralocks_core.rig import RigModel, rig_spec  # noqa: E402
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices  # noqa: E402
 from neuralocks_core.training.rig_energy import RigMaterial  # noqa: E402
-from neuralocks_core.training.rig_motion import motion_report  # noqa: E402
+from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions  # noqa: E402
 from neuralocks_core.training.rig_report import static_report  # noqa: E402
 from usd.rig_stage import read_rigged_hair  # noqa: E402
 
@@ -32,11 +37,15 @@ def main() -> None:
     parser.add_argument("--character", type=Path, default=EXAMPLE / "character.usda")
     parser.add_argument("--poses", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--floor", action="store_true", help="only what a network that forgets cannot do better than")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     rig = read_rigged_hair(options.character, all_shapes=True).rig
     models = {path.stem: RigModel.load(path) for path in options.models}
     material = RigMaterial(**next(iter(models.values())).training["material"])
+    if options.floor:
+        print(f"floor of forgetting: motion error {floor_of_forgetting(rig, material):.3f}")
+        return
     held = {name: static_report(m, rig, material, options.poses, options.seed) for name, m in models.items()}
     motion = motion_report(rig, material, models)
     if options.json:
@@ -65,6 +74,28 @@ def main() -> None:
             row += [*motion["rates"][name].values(), *motion["teleport"][name].values()]
             row += [motion["cost"][name]["bytes_carried_on"]]
         print("| " + " | ".join(map(str, row + ["-"] * (10 - len(row)))) + " |")
+
+
+def floor_of_forgetting(rig, material: RigMaterial, moments: int = 8) -> float:
+    """Motion error of the simulation itself, restarted at rest as long before as the dynamic network's history reaches, at
+    a few moments of each scripted clip.
+    """
+    steps = rig_spec(dynamic=True).steps
+    clips = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in KINDS]
+    truth = simulate_motions(rig, material, rig_spec(), clips)[1]
+    at = np.linspace(steps, truth.shape[1] - 1, moments).astype(int)
+    short = [
+        Clip(np.arange(steps + 1) / RATE, clip.at(clip.start + np.arange(end - steps, end + 1) / RATE))
+        for clip in clips
+        for end in at
+    ]
+    again = simulate_motions(rig, material, rig_spec(), short)[1][:, -1]
+    ends, true = (
+        bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns.astype(float))))
+        for turns in (again, truth[:, at].reshape(again.shape))
+    )
+    rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
+    return float(np.sqrt(np.square(ends - true).sum() / np.square(rest - true).sum()))
 
 
 def _held_row(name: str, report: dict, key: str) -> None:
