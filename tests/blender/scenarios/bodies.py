@@ -3,6 +3,7 @@
 
 from pathlib import Path
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -22,7 +23,7 @@ def body_as_drawn(_folder: Path) -> None:
     body, strands = scenes.body(rig), scenes.hair(rig, 4)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
 
-    mesh, right = body.data, [v.index for v in body.data.vertices if v.co.x < -0.01]
+    mesh, right = body.data, {v.index for v in body.data.vertices if v.co.x < -0.01}
     everything = list(range(len(mesh.vertices)))
     body.vertex_groups.new(name="scalp").add(everything, 0.5, "REPLACE")
     upper = [v.index for v in mesh.vertices if v.co.z > 1.4]
@@ -35,16 +36,12 @@ def body_as_drawn(_folder: Path) -> None:
     _same(rig, body, session)
 
     bpy.context.view_layer.objects.active = body
-    for index in everything:
-        mesh.vertices[index].select = index in right
-    for edge in mesh.edges:
-        edge.select = all(v in right for v in edge.vertices)
-    for face in mesh.polygons:
-        face.select = all(v in right for v in face.vertices)
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.delete(type="VERT")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    half = len(mesh.vertices)
+    half_of = bmesh.new()
+    half_of.from_mesh(body.data)
+    bmesh.ops.delete(half_of, geom=[v for v in half_of.verts if v.index in right], context="VERTS")
+    half_of.to_mesh(body.data)
+    half_of.free()
+    half = len(body.data.vertices)
     assert half < len(everything)
     mirror = body.modifiers.new("Mirror", "MIRROR")
     while body.modifiers[0] != mirror:
