@@ -122,7 +122,7 @@ def main() -> None:
     options = parser.parse_args()
     rows = {}
     with tempfile.TemporaryDirectory() as folder:
-        for name, dynamic, hidden in (("quasi-static, 2 x 16", False, 16), ("dynamic, 2 x 48", True, 48)):
+        for name, dynamic, hidden in (("quasi-static, 2 x 16", False, 16), ("dynamic, 2 x 32", True, 32)):
             model = _model(max(1, options.joints // 4), hidden, dynamic)
             export_c(model, Path(folder) / "hair.h")
             for flags in ("-O2", "-O3 -march=native"):

@@ -81,9 +81,10 @@ def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:
     tables, buffers, code, below = [], [], [], "x"
     for index, (weight, bias) in enumerate(layers):
         rows, columns = weight.shape
-        table = ",\n".join(" {" + ", ".join(_float(v) for v in row) + "}" for row in weight)
-        tables.append(f"  static const float w{index}[{rows}][{columns}] = {{\n{table}}};")
-        tables.append(f"  static const float b{index}[{columns}] = {{{', '.join(_float(v) for v in bias)}}};")
+        kind, number = ("double", _double) if index == 0 else ("float", _float)
+        table = ",\n".join(" {" + ", ".join(number(v) for v in row) + "}" for row in weight)
+        tables.append(f"  static const {kind} w{index}[{rows}][{columns}] = {{\n{table}}};")
+        tables.append(f"  static const {kind} b{index}[{columns}] = {{{', '.join(number(v) for v in bias)}}};")
         buffers.append(f"  float h{index}[{columns}];")
         code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
         below = f"h{index}"
@@ -118,20 +119,24 @@ def _round_up(count: int, unit: int) -> int:
 def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
     """Outer products whose inner loop has a constant length, so that it vectorises. Blocks of columns keep the sums in
     registers, four rows at a time spare three of four trips to memory, and rows are added in the order in which
-    matrix libraries add them, bias last, so that the rounding is theirs.
+    matrix libraries add them, bias last, so that the rounding is theirs. The first layer is summed in double precision, as
+    everywhere: it has many large terms.
     """
     block = next(size for size in (48, 40, 32, 24, 16, 8) if columns % size == 0)
-    total = "s[k]"
+    total, kind, zero, narrow = "s[k]", "float", "0.0f", ""
+    if index == 0:
+        kind, zero, narrow = "double", "0.0", "(float)"
     for row in range(_AT_ONCE):
         total = f"({total} + w{index}[i + {row}][j + k] * {below}[i + {row}])"
     lines = [
         f"  for (j = 0; j < {columns}; j += {block}) {{",
-        f"    float s[{block}];",
-        f"    for (k = 0; k < {block}; ++k) s[k] = 0.0f;",
+        f"    {kind} s[{block}];",
+        f"    for (k = 0; k < {block}; ++k) s[k] = {zero};",
         f"    for (i = 0; i < {rows}; i += {_AT_ONCE})",
         f"      for (k = 0; k < {block}; ++k) s[k] = {total[1:-1]};",
         f"    for (k = 0; k < {block}; ++k) s[k] += b{index}[j + k];",
-        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = {'s[k] > 0.0f ? s[k] : 0.0f' if hidden else 's[k]'};",
+        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = "
+        + (f"s[k] > {zero} ? {narrow}s[k] : 0.0f;" if hidden else f"{narrow}s[k];"),
         "  }",
     ]
     return "\n".join(lines)
@@ -165,6 +170,10 @@ def _plain(text: str) -> str:
 def _float(value) -> str:
     text = str(np.float32(value))
     return (text if "." in text or "e" in text else f"{text}.0") + "f"
+
+
+def _double(value) -> str:
+    return repr(float(np.float32(value)))
 
 
 def _c_text(name: str) -> str:

@@ -30,7 +30,7 @@ def train(
     ] = True,
     seconds: Annotated[float | None, typer.Option(help="Seconds to descend; 120, and 75 quasi-static.")] = None,
     steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
-    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 48, and 16 quasi-static.")] = None,
+    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
     weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,

@@ -5,6 +5,9 @@ import numpy as np
 
 from neuralocks_core.onnx_graph import OnnxGraph
 
+_FLOAT, _DOUBLE = 1, 11
+"""Of onnx.TensorProto."""
+
 
 def rig_graph(model) -> bytes:
     """ONNX bytes of a `RigModel`: input `features` (B, F) float32, output `turns` (B, N, 4) wxyz, as `evaluate`.
@@ -16,9 +19,14 @@ def rig_graph(model) -> bytes:
     limits = np.asarray(model.limits, np.float32)
     value = graph.node("Min", ["features", graph.constant("most", limits)], "capped")
     value = graph.node("Max", [value, graph.constant("least", -limits)], "clipped")
+    value = graph.node("Cast", [value], "wide", to=_DOUBLE)
     for index, (weight, bias) in enumerate(model.layers):
+        if index == 0:  # as `RigModel` does, in double precision
+            weight, bias = weight.astype(float), bias.astype(float)
         names = [value, graph.constant(f"weight{index}", weight), graph.constant(f"bias{index}", bias)]
         value = graph.node("Gemm", names, f"layer{index}", transB=1)
+        if index == 0:
+            value = graph.node("Cast", [value], "narrow", to=_FLOAT)
         if index + 1 < len(model.layers):
             value = graph.node("Relu", [value], f"relu{index}")
     joints = len(model.chains)

@@ -109,12 +109,14 @@ class RigModel:
         return result[0] if features.ndim == 1 else result
 
     def _raw(self, rows: np.ndarray) -> np.ndarray:
-        value = np.clip(rows, -self.limits, self.limits)
-        for index, (weight, bias) in enumerate(self.layers):
+        (weight, bias), *others = self.layers
+        # Over a hundred large terms: in single precision their order would show, and every library has its own.
+        value = np.clip(rows, -self.limits, self.limits).astype(float) @ weight.T.astype(float)
+        value = (value + bias).astype(np.float32)
+        for weight, bias in others:
+            np.maximum(value, 0, out=value)
             value = value @ weight.T
             value += bias
-            if index + 1 < len(self.layers):
-                np.maximum(value, 0, out=value)
         return value
 
     def canonical_turns(self, features: np.ndarray) -> np.ndarray:

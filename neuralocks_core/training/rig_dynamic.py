@@ -42,7 +42,7 @@ def train_dynamic(
     *,
     seconds: float = 120.0,
     steps: int | None = None,
-    hidden: int = 48,
+    hidden: int = 32,
     seed: int = 0,
     max_angle: float = 2.4,
     clips: int = 256,
@@ -98,7 +98,7 @@ def train_dynamic(
         return result
 
     began = time.monotonic()
-    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=1e-3)
+    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.1)
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=4e-3, warm_up=50)
     for state in descend([optimiser], losses, schedule):
         say(200 + int(550 * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
