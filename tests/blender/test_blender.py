@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from .. import blenders
 from . import scenarios
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,10 +35,7 @@ def _command(version: str) -> list[str]:
         if not shutil.which("blender"):
             pytest.skip("no blender program is installed")
         return ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script, "--"]
-    python = ROOT / f".venv-blender-{version}" / "bin" / "python"
-    if not python.exists():
-        pytest.skip(f"Blender {version} is not installed as a Python module ({python.parent.parent.name} is missing)")
-    return [str(python), script]
+    return [str(blenders.python_of(version)), script]
 
 
 @pytest.mark.parametrize("scenario", scenarios.modules())
@@ -57,7 +55,7 @@ def test_scenario(version, scenario, random_model, tmp_path):
         "BLENDER_USER_RESOURCES": str(resources),
     }
     if version == WINDOWED:
-        environment["PYTHONPATH"] = str(next((ROOT / ".venv-blender-4.2" / "lib").glob("python*")) / "site-packages")
+        environment["PYTHONPATH"] = str(blenders.packages_of("4.2"))
     try:
         done = subprocess.run(
             [*command, scenario, str(tmp_path / "work")],

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from .. import blenders
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -20,9 +22,7 @@ def test_panel_in_a_window(random_model, tmp_path):
     for program in ("blender", "xvfb-run", "xdotool"):
         if not shutil.which(program):
             pytest.skip(f"{program} is not installed")
-    packages = next((ROOT / ".venv-blender-4.2" / "lib").glob("python*"), None)
-    if packages is None:
-        pytest.skip("the add-on's packages for Python 3.11 are not installed (.venv-blender-4.2 is missing)")
+    packages = blenders.packages_of("4.2")  # The window's Blender runs the same Python 3.11.
     window = [
         "blender",
         "--factory-startup",
@@ -36,7 +36,7 @@ def test_panel_in_a_window(random_model, tmp_path):
     ]
     command = ["xvfb-run", "-a", "-s", "-screen 0 1280x960x24", *window, "--", str(tmp_path)]
     environment = os.environ | {
-        "PYTHONPATH": str(packages / "site-packages"),
+        "PYTHONPATH": str(packages),
         "NEURALOCKS_TEST_MODEL": str(random_model),
         "OMP_NUM_THREADS": "1",
     }

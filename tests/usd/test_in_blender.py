@@ -2,17 +2,16 @@
 """A bake opens in a real Blender as moving hair, frame for frame."""
 
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from usd.bake import bake
 
+from ..blenders import installed
 from .shots import Recipe, samples, world_points, write_shot
 
-ROOT = Path(__file__).parents[2]
-PYTHONS = sorted(ROOT.glob(".venv-blender-*/bin/python"))
+PYTHONS = installed()
 
 SCRIPT = """
 import os, sys
@@ -40,7 +39,9 @@ os._exit(0)
 """
 
 
-@pytest.mark.skipif(not PYTHONS, reason="no .venv-blender-* with a Blender wheel (make test installs them)")
+@pytest.mark.skipif(
+    not PYTHONS, reason="no Blender is installed as a Python module (make blender installs 4.2 and 5.2)"
+)
 @pytest.mark.parametrize("python", PYTHONS or [None], ids=lambda path: path.parents[1].name if path else "none")
 @pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z", bound="mesh")], ids=["m_y_up", "cm_z_up"])
 def test_blender_shows_the_baked_points(tmp_path, model, recipe, python):

@@ -14,6 +14,7 @@ from usd.rig_bake import bake_rig
 from usd.rig_layer import NAME
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
 
+from ..blenders import installed
 from .rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 
@@ -204,9 +205,9 @@ def test_the_example_and_its_command_line(tmp_path):
 def test_a_vrm_avatar_through_blender(tmp_path):
     """Its seven hair chains of one joint and an end are found, as its spring-bone groups name them."""
     avatar = EXAMPLE.parents[2] / "shared" / "data" / "rigged" / "godette.vrm"
-    blender = next(iter(sorted(EXAMPLE.parents[1].glob(".venv-blender-*/bin/python"))), None)
+    blender = next(iter(installed()), None)
     if not avatar.is_file() or blender is None:
-        pytest.skip("needs ../shared/data/rigged/godette.vrm and a Python with bpy in .venv-blender-*")
+        pytest.skip("needs ../shared/data/rigged/godette.vrm and Blender as a Python module (make blender)")
     script = EXAMPLE.parent / "vrm_to_usd.py"
     command = [str(blender), str(script), str(avatar), "-o", str(tmp_path / "g.usdc")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)

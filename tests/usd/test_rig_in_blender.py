@@ -10,6 +10,8 @@ import pytest
 from neuralocks_core.rig import RigModel
 from usd.rig_bake import bake_rig
 
+from ..blenders import python_of
+
 ROOT = Path(__file__).parents[2]
 SHOT = ROOT / "examples" / "mesh_hair" / "shot.usda"
 FRAMES = (1, 20, 47, 90, 131, 160)
@@ -36,9 +38,7 @@ os._exit(0)
 @pytest.mark.parametrize("version", ["4.2", "5.2"])
 def test_only_hair_bones_move_otherwise(tmp_path, version):
     """Pose and rest matrices of every bone, before and after, at frames of each kind of motion in the shot."""
-    python = ROOT / f".venv-blender-{version}" / "bin" / "python"
-    if not python.exists():
-        pytest.skip(f"no Blender {version} wheel in .venv-blender-{version} (make test installs it)")
+    python = python_of(version)
     model = RigModel.load()
     result = bake_rig(SHOT, tmp_path / "baked.usda", model)
     words = [
