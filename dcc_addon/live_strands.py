@@ -109,7 +109,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     if prepared is not None and prepared.file != (path, stamp(path)):
         session.doubtful.add(name)
     if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
-        made_of, make = _recipe(hair, armature, sampled, wanted)
+        made_of, make = _recipe(hair, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
             session.forget(name)
             if not wait:
@@ -140,7 +140,7 @@ def _let_go(of: tuple, hair) -> None:
         curves.restore_rest(left)
 
 
-def _recipe(hair, armature, sampled, wanted: tuple):
+def _recipe(hair, sampled, wanted: tuple):
     """What the prepared hair is made of, to be compared, and a function of a progress callback that makes it without
     Blender, with all that its first frame needs.
     """

@@ -33,7 +33,7 @@ class Seat:
         distance: of its roots from the mesh, in the median [m].
         rig, mesh: on what.
         to_bind: its way to bind world, (4, 4).
-        way: that way's place among `ways`.
+        way: whether that way is unlikely, and its place among `ways`.
         points: the mesh's nearest point to each root.
     """
 
@@ -41,7 +41,7 @@ class Seat:
     rig: StageRig
     mesh: StageMesh
     to_bind: np.ndarray
-    way: int
+    way: tuple[bool, int]
     points: np.ndarray
 
 
@@ -50,7 +50,7 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement) -> Seat | Non
     roots, when, best = some_roots(prim), moment(prim), None
     trees = [cKDTree(transformed(mesh.points, rig.to_bind @ mesh.geom_bind)) for mesh in rig.meshes]
 
-    def nearest(best: Seat | None, mesh, tree, way: int, to_bind) -> Seat:
+    def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat:
         distance, points = tree.query(transformed(roots, to_bind))
         middle = float(np.median(distance))
         better = best is None or middle < best.distance - 1e-4
@@ -58,8 +58,8 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement) -> Seat | Non
 
     for likely in (True, False):
         for mesh, tree in zip(rig.meshes, trees, strict=True):
-            for way, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely)):
-                best = nearest(best, mesh, tree, way if likely else way + 9, to_bind)
+            for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely)):
+                best = nearest(best, mesh, tree, (not likely, place), to_bind)
         if best is not None and best.distance <= NEAR:
             break
     return best

@@ -4,12 +4,12 @@ section 4.4).
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import numpy as np
 import torch
 
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend
@@ -25,7 +25,6 @@ _ROOM = 0.01
 nor can it hit the mark to the millimetre, and so goes less deep into the body."""
 _STRICTER = 10 / 3
 """The body is so many times as stiff while learning, for the same reason."""
-Progress = Callable[[int, int, str], None]
 
 
 def train_static(
@@ -57,7 +56,7 @@ def train_static(
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     spec = rig_spec()
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     say(0, 1, "posing bodies")
     strict = replace(material, margin=material.margin + _ROOM, collision=_STRICTER * material.collision)
     held = HairOnBodies(rig, strict, _POOL, rng, spec)

@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import torch
 
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.random_motion import random_clip
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
@@ -49,7 +50,7 @@ def train_dynamic(
     clip_seconds: float = 4.0,
     batch: int = 256,
     report_poses: int = 1000,
-    progress=None,
+    progress: Progress | None = None,
 ) -> RigModel:
     """Train the dynamic network of one rig.
 
@@ -68,7 +69,7 @@ def train_dynamic(
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     spec = rig_spec(dynamic=True)
     features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
     held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from neuralocks_core.motion import GRAVITY, G
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig_poses import PosePool, rest_clearance
@@ -55,7 +56,7 @@ class RodTree:
         own = np.array([lengths[chains.bone_joint == j].mean() for j in range(len(chains))])
         before = np.array([lengths[to_joint[j]] if j in to_joint else 0.0 for j in range(len(chains))])
         self.stiffness = material.bend / ((own + before) / 2) / total
-        gravity = np.array([0.0, -9.81 * material.weight, 0.0])
+        gravity = GRAVITY * material.weight
         self.support = np.zeros((bones, 3))
         pull = np.zeros((bones, 3))
         # Tip to root: what tension along the bone cannot carry of the weight is held.
@@ -152,7 +153,7 @@ class RigEnergy(torch.nn.Module):
             some: which hair vertices collide; all if left out. Their planes are those of the state itself.
         """
         rotation, position, ends = self.pose(quaternions)
-        elastic = self.elastic(quaternions, torch.as_tensor(gravity, dtype=ends.dtype) * 9.81, ends)
+        elastic = self.elastic(quaternions, torch.as_tensor(gravity, dtype=ends.dtype) * G, ends)
         if not pool.collides:
             return elastic, torch.zeros_like(elastic)
         points = self.skin(rotation, position, some)

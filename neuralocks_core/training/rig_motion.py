@@ -8,6 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from neuralocks_core.motion import Clip
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
@@ -42,7 +43,9 @@ def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, rate: f
     return np.stack(features), solver.simulate(np.stack(heads), 1 / rate, body)
 
 
-def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigModel], kinds=KINDS, progress=None) -> dict:
+def motion_report(
+    rig: HairRig, material: RigMaterial, models: dict[str, RigModel], kinds=KINDS, progress: Progress | None = None
+) -> dict:
     """Held-out scripted clips: models and spring bones against the simulation, and hair carried rigidly.
 
     Args:
@@ -61,7 +64,7 @@ def motion_report(rig: HairRig, material: RigMaterial, models: dict[str, RigMode
         `rates`: rms difference at shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm];
         `teleport`: see `_teleports`; `cost`: see `_network_cost`.
     """
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     say(0, 4, "simulating held-out motion")
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)

@@ -4,12 +4,15 @@
 import numpy as np
 import torch
 
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, bounded_turns
 from neuralocks_core.training.rig_poses import PosePool, rest_distances
 
 
-def static_report(model, rig, material: RigMaterial, count: int, seed: int, progress=None, optimised: int = 32) -> dict:
+def static_report(
+    model, rig, material: RigMaterial, count: int, seed: int, progress: Progress | None = None, optimised: int = 32
+) -> dict:
     """The report of a model over held-out poses and body shapes.
 
     Args:
@@ -28,7 +31,7 @@ def static_report(model, rig, material: RigMaterial, count: int, seed: int, prog
         percent of what direct optimisation saves against hair carried rigidly, which does not depend on where the
         zero lies. `penetration_*`: of the vertices that lie outside at rest, exact distances.
     """
-    say = progress or (lambda done, total, message: None)
+    say = progress or silent
     pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)
     poses = np.arange(count)
     gravity = pool.gravity(poses)
