@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of bones as joint paths that every USD reader accepts."""
+"""Names of bones as joint paths, of objects as names of prims."""
 
 import re
 
@@ -12,12 +12,20 @@ def identifier(name: str) -> str:
     return f"_{plain}" if plain[0].isdigit() else plain
 
 
-def unique(names: list[str]) -> list[str]:
+def joint_identifier(name: str) -> str:
+    """`name` as the last part of a joint path: with letters of all scripts, for a rig's words say which bone is which, in
+    Japanese ones too. A prim's name is plain, since USD before 24.03 takes no other.
+    """
+    kept = "".join(c if (c.isalpha() or c.isdecimal()) and f"_{c}".isidentifier() else "_" for c in name) or "_"
+    return kept if kept[0].isidentifier() else f"_{kept}"
+
+
+def unique(names: list[str], made=identifier) -> list[str]:
     """Identifiers of `names`, each different from all others (Blender reads only the last part of a joint path)."""
     taken: set[str] = set()
     result = []
     for name in names:
-        base = identifier(name)[:58]
+        base = made(name)[:58]
         candidate, number = base, 1
         while candidate in taken:
             number += 1
@@ -30,7 +38,7 @@ def unique(names: list[str]) -> list[str]:
 def joint_paths(bones: list[str], parents: list[int]) -> list[str]:
     """Joint paths (J) of bones listed parents first."""
     paths: list[str] = []
-    for leaf, parent in zip(unique(bones), parents, strict=True):
+    for leaf, parent in zip(unique(bones, joint_identifier), parents, strict=True):
         paths.append(leaf if parent < 0 else f"{paths[parent]}/{leaf}")
     return paths
 

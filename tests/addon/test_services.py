@@ -8,6 +8,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from pxr import Sdf
 
 from dcc_addon import build
 from dcc_addon.services import axes, bones, card, names, panel_errors, rig, training_job
@@ -135,11 +136,30 @@ def test_blender_front_becomes_core_front():
                                [[0, 0, 1], [0, 1, 0], [1, 0, 0]], atol=1e-12)  # fmt: skip
 
 
-def test_joint_paths_are_unique_and_plain():
-    paths = names.joint_paths(["a.b", "a-b", "1c", "ä"], [-1, 0, 0, 1])
-    assert paths == ["a_b", "a_b/a_b_2", "a_b/_1c", "a_b/a_b_2/_"]
+def test_joint_paths_are_unique_and_accepted_by_usd():
+    paths = names.joint_paths(["a.b", "a-b", "1c", "ä²", ""], [-1, 0, 0, 1, 1])
+    assert paths == ["a_b", "a_b/a_b_2", "a_b/_1c", "a_b/a_b_2/ä_", "a_b/a_b_2/_"]
+    assert all(Sdf.Path.IsValidPathString(path) for path in paths)
+    assert names.unique(["Hair_ä"]) == ["Hair__"]  # a prim
     long = names.unique(["x" * 90, "x" * 90])
     assert len(set(long)) == 2 and max(map(len, long)) < 63
+
+
+def test_a_rig_with_japanese_names_is_read_by_them():
+    """As MMD's rigs come into Blender: the sides at the end, some numbers of full width."""
+    bones = ("センター", "上半身", "上半身２", "首", "頭", "髪１", "腕.L", "ひじ.L", "腕.R", "ひじ.R", "下半身")
+    parents = np.array([-1, 0, 1, 2, 3, 4, 2, 6, 2, 8, 0])
+    miku = rig.RigArrays("Miku", bones, parents, np.broadcast_to(np.eye(4), (11, 4, 4)))
+    assert all(Sdf.Path.IsValidPathString(path) for path in miku.paths)
+    found = {part: bones[joint] for part, joint in miku.humanoid().items()}
+    wanted = {
+        "head": "頭",
+        "neck": "首",
+        "upper_chest": "上半身２",
+        "left_upper_arm": "腕.L",
+        "right_lower_arm": "ひじ.R",
+    }
+    assert wanted.items() <= found.items(), found
 
 
 def test_parents_come_first():
