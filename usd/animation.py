@@ -8,7 +8,7 @@ from neuralocks_core import rotation
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 
-from .border import Border
+from .border import Border, quaternions
 
 
 def write_animation(
@@ -40,7 +40,7 @@ def write_animation(
     animation.CreateJointsAttr(list(character.skeleton.names))
     animation.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1)] * len(character.skeleton.names)))
     codes = first + clip.times * border.rate
-    _samples(animation.CreateRotationsAttr(), codes, turns, _quaternions)
+    _samples(animation.CreateRotationsAttr(), codes, turns, quaternions)
     _samples(animation.CreateTranslationsAttr(), codes, places, lambda p: Vt.Vec3fArray.FromNumpy(np.float32(p)))
     if shapes:
         animation.CreateBlendShapesAttr(list(shapes))
@@ -63,7 +63,3 @@ def _samples(attribute, codes, values, pack):
         return
     for code, value in zip(codes, values):
         attribute.Set(pack(value), float(code))
-
-
-def _quaternions(wxyz):
-    return Vt.QuatfArray([Gf.Quatf(*map(float, q)) for q in wxyz])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
@@ -185,6 +185,13 @@ def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:
 def row_matrix(matrix: np.ndarray) -> Gf.Matrix4d:
     """A (4, 4) transform for column vectors as a USD matrix."""
     return Gf.Matrix4d(np.asarray(matrix, float).T.tolist())
+
+
+def quaternions(wxyz: np.ndarray) -> Vt.QuatfArray:
+    """Quaternions (J, 4) wxyz as USD keeps them, with the imaginary part first; made one by one, those of a long shot
+    would take seconds.
+    """
+    return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(wxyz, -1, axis=1), np.float32))
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Usd, UsdGeom, UsdSkel, Vt
 
-from .border import row_matrix, write_stage
+from .border import quaternions, row_matrix, write_stage
 from .groom import Spline
 
 ROOT = "/Character"
@@ -134,8 +134,8 @@ def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
         weights = animation.CreateBlendShapeWeightsAttr()
     for row, frame in enumerate(map(float, scene.frames)):
         translations.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(scene.translation[row], np.float32)), frame)
-        rotations.Set(Vt.QuatfArray([Gf.Quatf(*map(float, q)) for q in scene.rotation[row]]), frame)
-        scales.Set(Vt.Vec3hArray([Gf.Vec3h(*map(float, s)) for s in scene.scale[row]]), frame)
+        rotations.Set(quaternions(scene.rotation[row]), frame)
+        scales.Set(Vt.Vec3hArray.FromNumpy(np.ascontiguousarray(scene.scale[row], np.float16)), frame)
         if shapes:
             weights.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(scene.shape[row], np.float32)), frame)
     return animation
