@@ -6,9 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from neuralocks_core.character import Body, Character
+from neuralocks_core.mesh import vertex_normals
 
 CELL = 0.012
 """[m] Vertices within one such cell become one; on a head's curvature that moves the surface by 0.2 mm."""
+FLAT = 0.5
+"""Cosine between a vertex's normal and its cell's mean normal; where one has less, all vertices of the cell stay."""
 
 
 def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | None:
@@ -29,8 +32,9 @@ def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | 
     # beside.
     main = body.joint_indices[np.arange(len(points)), body.joint_weights.argmax(axis=1)]
     key = np.column_stack([np.floor(points[used] / cell).astype(np.int64), main[used]])
-    _, group, size = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    group = group.ravel()
+    _, group = np.unique(key, axis=0, return_inverse=True)
+    group = _parted(group.ravel(), vertex_normals(points, faces)[used])
+    size = np.bincount(group)
     middle = np.stack([np.bincount(group, points[used, axis]) for axis in range(3)], axis=1) / size[:, None]
     order = np.lexsort([np.linalg.norm(points[used] - middle[group], axis=1), group])
     keeper = used[order[np.unique(group[order], return_index=True)[1]]]
@@ -45,6 +49,19 @@ def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | 
         body.joint_weights[keeper],
         {name: offsets[keeper] for name, offsets in body.shapes.items()},
     )
+
+
+def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Groups (V,) int in which no vertices of opposite sides are together, from groups (V,) and normals (V, 3).
+
+    An ear's two sides welded to one sheet have neither an inside nor an outside: hair 8 cm beside it was pulled in.
+    """
+    mean = np.stack([np.bincount(group, part) for part in normals.T], axis=1)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    flattest = np.full(len(mean), np.inf)
+    np.minimum.at(flattest, group, (normals * mean[group]).sum(axis=1))
+    alone = flattest[group] < FLAT
+    return np.unique(np.where(alone, len(mean) + np.arange(len(group)), group), return_inverse=True)[1].ravel()
 
 
 def posed_over_time(body: Body, skinning: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray:

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The coarse body that the solver meets: coarse where it is smooth, and outside of it is outside."""
+
+import numpy as np
+import trimesh
+
+from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.collider import Collider
+from neuralocks_core.training.hair_body import hair_body
+
+from .. import rigs
+
+CENTRE = np.array([0.0, 1.68, 0.0])
+EAR = CENTRE + [0.13, 0.0, 0.0]
+
+
+def person(mesh):
+    count = len(mesh.vertices)
+    body = Body(mesh.vertices, mesh.faces, np.full((count, 1), rigs.HEAD), np.ones((count, 1)), {})
+    return Character(Skeleton(rigs.NAMES, rigs.PARENTS, rigs.bind()), body)
+
+
+def test_a_smooth_head_becomes_coarse_and_hardly_moves():
+    head = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
+    coarse = hair_body(person(head.apply_translation(CENTRE)), reach=0.9)
+    assert len(coarse.points) < 0.2 * len(head.vertices)
+    middles = coarse.points[coarse.triangles].mean(axis=1)
+    assert np.abs(np.linalg.norm(middles - CENTRE, axis=1) - 0.1).max() < 1e-3
+
+
+def test_hair_beside_an_ear_is_outside():
+    """Both sides of an ear lie in one cell; welded to a sheet, half of what hangs beside it counted as inside."""
+    head = trimesh.creation.icosphere(subdivisions=4, radius=0.1).apply_translation(CENTRE)
+    ear = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
+    ear.apply_scale([0.002, 0.03, 0.02]).apply_translation(EAR)
+    coarse = hair_body(person(trimesh.util.concatenate([head, ear])), reach=0.9)
+    way = np.random.default_rng(0).normal(size=(400, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    beside = EAR + way * [[0.03, 0.05, 0.04]]
+    beside = beside[np.linalg.norm(beside - CENTRE, axis=1) > 0.105]
+    assert Collider(coarse.points, coarse.triangles).distance(beside, limit=0.1)[0].min() > 0
