@@ -3,6 +3,7 @@
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 from bpy.props import StringProperty
@@ -13,7 +14,7 @@ from ..live_strands import material_words, typed
 from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
-from ..scene.lookup import find
+from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
 from ..scene.sampling import hairs_of
 from ..services.names import identifier
@@ -66,42 +67,52 @@ def bake_steps(context, armature, hairs, path: str):
         raise NeuralocksError(
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
-    looks = {_look(h) for h in hairs}
+    looks: dict[_Look, list[str]] = {}
+    for hair in hairs:
+        looks.setdefault(_look(hair), []).append(hair.name_full)
+    character, subframes = armature.name_full, scene.neuralocks.subframes
     sampled = yield from sampling(context, armature, share=0.5)
     baked = {}
-    for number, look in enumerate(sorted(looks)):
-        group = [h for h in hairs if _look(h) == look]
+    for number, (look, names) in enumerate(sorted(looks.items())):
+        group = [named(name) for name in names]
         stem = Path(full)
         out = stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{number + 1}{stem.suffix}")
         others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
         if others:
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-        shot = out.with_name(f"{out.stem}_shot.usdc")
-        prims = write_shot(shot, armature, scene, sampled, group)
-        settings = group[0].neuralocks_hair
+        shot, model = out.with_name(f"{out.stem}_shot.usdc"), model_path(look.model)
+        prims = write_shot(shot, named(character), scene, sampled, group)
         job = Threaded(
-            lambda say, shot=shot, out=out, settings=settings: bake(
+            lambda say, shot=shot, out=out, look=look, model=model: bake(
                 shot,
                 out,
-                model_path(settings.model),
+                model,
                 frames=f"{first}:{last}",
-                subframes=scene.neuralocks.subframes + 1,
-                material=material_words(settings),
-                strength=typed(settings, "motion"),
-                resolve=settings.resolve,
+                subframes=subframes + 1,
+                material=list(look.material),
+                strength=look.motion,
+                resolve=look.resolve,
                 loop=sampled.clip.loop,
                 progress=say,
             )
         )
         yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
-        baked |= {h.name_full: (str(out), prims[h.name_full]) for h in group}
+        baked |= {name: (str(out), prims[name]) for name in names}
     return baked
 
 
-def _look(hair) -> tuple:
-    """What hair that is baked together has in common."""
+class _Look(NamedTuple):
+    """What hair that is baked together has in common, as it was when the bake began."""
+
+    material: tuple[str, ...]
+    motion: float
+    resolve: bool
+    model: str
+
+
+def _look(hair) -> _Look:
     settings = hair.neuralocks_hair
-    return *material_words(settings), typed(settings, "motion"), settings.resolve, settings.model
+    return _Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, settings.model)
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
@@ -136,7 +147,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
             stem, ending = os.path.splitext(path)
             path = f"{stem}_{identifier(hair.name)}{ending}"
         baked = yield from bake_steps(context, armature, [hair], path)
-        hair = find(name)
+        hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name])
         return f"{name}: now plays {baked[name][0]}"

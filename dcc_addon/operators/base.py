@@ -31,6 +31,9 @@ class Hardened:
         except NeuralocksError as error:
             self.report({"ERROR"}, for_the_panel(str(error)))
             return {"CANCELLED"}
+        except ReferenceError:
+            self.report({"ERROR"}, "Neuralocks: something that is needed was deleted or undone meanwhile; start again")
+            return {"CANCELLED"}
         except Exception as error:
             traceback.print_exc()
             self.report(
@@ -81,7 +84,7 @@ class Stepwise(Hardened):
 
     def modal(self, context, event):
         if event.type == "ESC":
-            self._steps.close()
+            self._close()
             self._finish(context)
             self.report({"WARNING"}, "Cancelled")
             return {"CANCELLED"}
@@ -100,11 +103,14 @@ class Stepwise(Hardened):
 
     def cancel(self, context):
         """Blender ends the work itself, when another file is opened or the window closes."""
+        self._close()
+        Stepwise._finish(self, context)
+
+    def _close(self):
         try:
             self._steps.close()
         except ReferenceError:  # the scene whose frame would come back is gone
             pass
-        Stepwise._finish(self, context)
 
     def _slice(self, context):
         end = time.perf_counter() + SLICE

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 
 from ..services import rig as rig_service
@@ -15,7 +14,7 @@ from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
 from .binding import bind_places, hidden
-from .lookup import find
+from .lookup import find, named
 from .placing import world
 from .rigging import rigging
 from .unkeyed import Unkeyed
@@ -133,7 +132,7 @@ class _Recording:
         whole = int(np.floor(frame + 1e-6))
         self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
         graph = self._context.evaluated_depsgraph_get()
-        armature = _found(self.name)
+        armature = named(self.name)
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
             raise hidden(armature)
@@ -147,7 +146,7 @@ class _Recording:
         self._joints[row % BLOCK] = self.reader.world(evaluated)
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in self._tracked:
-            self._places[other][row] = world(_found(other), graph)
+            self._places[other][row] = world(named(other), graph)
         values = [body_reader.shape_values(find(body)) for body in self._bodies]
         self._shapes.append(np.concatenate([np.zeros(0), *values]))
         if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
@@ -199,14 +198,6 @@ class _Recording:
             drawn=self._drawn,
             rigging=self._rigging,
         )
-
-
-def _found(name: str):
-    """The object of this full name, while frames are stepped."""
-    thing = find(name)
-    if thing is None:
-        raise NeuralocksError(f"{name}: it was deleted while the motion was sampled; start again")
-    return thing
 
 
 class stepping:
