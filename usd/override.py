@@ -119,10 +119,8 @@ def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path,
     ranged = stage.HasAuthoredTimeCodeRange()
     layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
     layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
-    default = stage.GetDefaultPrim()
-    if not default:
-        default = next(iter(stage.GetPseudoRoot().GetChildren()))
-    layer.defaultPrim = default.GetName()
+    if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
+        layer.defaultPrim = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
 
 
 LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}

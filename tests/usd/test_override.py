@@ -58,6 +58,11 @@ def test_what_usd_reads_of_the_first_layer_only_is_repeated(shot, tmp_path):
     assert not layer.owner and list(layer.subLayerPaths) == ["../show/shots/shot.usda"]
 
 
+def test_a_default_prim_below_another_is_repeated(shot, tmp_path):
+    shot.write_text('#usda 1.0\n(defaultPrim = "/World/Hero")\ndef "World" {\n  def "Hero" {\n}\n}\n')
+    assert str(Usd.Stage.Open(_header(shot, tmp_path / "hair.usda")).GetDefaultPrim().GetPath()) == "/World/Hero"
+
+
 def test_every_process_writes_the_same_bytes(shot, tmp_path):
     code = "import sys; from pathlib import Path; from tests.usd.test_override import _header; _header(*map(Path, sys.argv[1:]))"
     written = []
