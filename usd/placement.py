@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a prim stands: its local-to-world transform at any time, and at which times that is authored."""
+"""Where a prim stands: its local-to-world transform at any time, and at which times that is authored, in samples or as
+the knots of splines.
+"""
 
 import numpy as np
 from pxr import Usd, UsdGeom
@@ -20,7 +22,7 @@ class Placement:
             xformable = UsdGeom.Xformable(walk)
             if xformable:
                 if xformable.TransformMightBeTimeVarying():
-                    self.samples.extend(xformable.GetTimeSamples())
+                    self.samples += [*xformable.GetTimeSamples(), *_knots(xformable)]
                 if xformable.GetResetXformStack():
                     break
             walk = walk.GetParent()
@@ -53,3 +55,10 @@ class Placement:
                 f"{self.prim.GetPath()}: its transform{when} has zero scale; give it and its parents a scale above zero"
             )
         return matrix
+
+
+def _knots(xformable: UsdGeom.Xformable) -> list[float]:
+    """Time codes at which the transform's splines have knots: animation curves, of which USD counts no samples."""
+    curves = [op.GetAttr() for op in xformable.GetOrderedXformOps()]
+    splined = [curve for curve in curves if getattr(curve, "HasSpline", bool)()]  # older versions of USD know none
+    return [time for curve in splined for time in curve.GetSpline().GetKnots().keys()]

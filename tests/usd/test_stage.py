@@ -216,3 +216,28 @@ def test_strands_too_short_to_move_are_counted_alike_everywhere():
     assert (~resample(groom, 24)[1]).sum() == groom_facts(groom)["without two distinct points"] == 2
     (said,) = groom_notes("/Hair", groom)
     assert said == "/Hair: 2 of 4 strands have no two distinct points; they follow the head rigidly"
+
+
+def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
+    ts = pytest.importorskip("pxr.Ts")
+    rigs = []
+    for curved in (False, True):
+        path = write_shot(tmp_path, Recipe(frames=0), f"curved_{curved}")
+        stage = Usd.Stage.Open(str(path))
+        turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddRotateYOp().GetAttr()
+        spline = ts.Spline("float")
+        for code, angle in ((1, 0.0), (5, 80.0), (9, 20.0)):
+            knot = ts.Knot("float")
+            knot.SetTime(code)
+            knot.SetValue(angle)
+            knot.SetNextInterpolation(ts.InterpLinear)
+            spline.SetKnot(knot)
+            turn.Set(angle, code)
+        if curved:
+            turn.Clear()
+            turn.SetSpline(spline)
+        stage.GetRootLayer().Save()
+        rigs.append(read_rigs(path)[0])
+    assert rigs[1].source.animated
+    np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
+    assert len(rigs[1].time_codes) == 9
