@@ -159,6 +159,7 @@ class HairSettings(bpy.types.PropertyGroup):
         **SETTING,
     )
     muted: StringProperty(description="Modifiers that are off while the hair is live, as JSON", **KEPT)
+    replaced: StringProperty(description="Modifiers that are off while the hair plays a cache, as JSON", **KEPT)
 
 
 class CharacterSettings(bpy.types.PropertyGroup):

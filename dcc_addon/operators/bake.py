@@ -10,7 +10,8 @@ from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..live_strands import material_words, typed
+from ..live import refresh
+from ..live_strands import material_words, show_rest, typed
 from ..models import model_path
 from ..scene import attach
 from ..scene.export import write_shot
@@ -149,7 +150,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
         baked = yield from bake_steps(context, armature, [hair], path)
         hair = named(name)
         hair.neuralocks_hair.live = False
-        attach.attach(hair, *baked[name])
+        attach.attach(hair, *baked[name], context.scene)
         return f"{name}: now plays {baked[name][0]}"
 
 
@@ -162,7 +163,9 @@ class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
     def steps(self, context):
         hair = shown_hair(context)
         attach.check_own(hair)
+        show_rest(hair)  # live hair has modifiers off, too, and has them off again at once
         found = attach.detach(hair)
+        refresh(context.scene)
         yield 1, 1, ""
         return f"{hair.name_full}: cache removed" if found else f"{hair.name_full}: it has no cache"
 

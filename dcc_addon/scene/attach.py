@@ -7,7 +7,11 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from .placing import mute_deformers, unmute_deformers
+
 MODIFIER = "Neuralocks Cache"
+REPLACED = "replaced"
+"""The setting that keeps which modifiers are off because the cache has the surface's motion in it."""
 
 
 def check_own(thing) -> None:
@@ -41,15 +45,13 @@ def players(path: str) -> list:
     ]
 
 
-def attach(hair, path: str, prim: str) -> None:
-    """Let the hair play the groom `prim` of the USD file `path`."""
-    from .placing import mute_deformers
-
+def attach(hair, path: str, prim: str, scene) -> None:
+    """Let the hair play the groom `prim` of the USD file `path`, whose time codes are frames of this scene."""
     detach(hair)
-    mute_deformers(hair)
-    hair.neuralocks_hair.muted = ""  # off for good: the cache has the surface's motion in it
+    mute_deformers(hair, REPLACED)
     cache = _cache_file(path)
     cache.scale = 1.0
+    _follow_time(cache, scene)
     modifier = hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
     modifier.cache_file = cache
     modifier.object_path = prim
@@ -60,7 +62,7 @@ def attach(hair, path: str, prim: str) -> None:
 
 
 def detach(hair) -> bool:
-    """Take the cache off; whether there was one."""
+    """Take the cache off, and let the hair follow its surface as before; whether there was one."""
     modifier = hair.modifiers.get(MODIFIER)
     if modifier is None:
         return False
@@ -68,7 +70,19 @@ def detach(hair) -> bool:
     hair.modifiers.remove(modifier)
     if cache is not None and not cache.users:
         bpy.data.batch_remove([cache])  # cache files have no remove of their own
+    unmute_deformers(hair, REPLACED)
     return True
+
+
+def _follow_time(cache, scene) -> None:
+    """Play the frames that were baked where time is stretched, too: all that is animated, caches as well, is then at
+    another frame than the one shown.
+    """
+    shown, played = scene.render.frame_map_new, scene.render.frame_map_old
+    cache.driver_remove("frame")
+    cache.override_frame = shown != played
+    if cache.override_frame:
+        cache.driver_add("frame").driver.expression = f"frame * {shown} / {played}"
 
 
 def _cache_file(path: str):

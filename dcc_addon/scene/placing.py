@@ -40,12 +40,12 @@ def _left_out(thing, graph) -> bool:
     return not thing.hide_get() and not thing.visible_get()
 
 
-def mute_deformers(hair) -> None:
-    """Switch off, and remember, modifiers that make the hair follow the surface or simulate it: the live view has already
-    done that.
+def mute_deformers(hair, kept: str = "muted") -> None:
+    """Switch off, and remember in the setting `kept`, modifiers that make the hair follow the surface or simulate it: the
+    live view, or a cache, has already done that.
     """
     settings = hair.neuralocks_hair
-    if settings.muted:
+    if getattr(settings, kept):
         return
     found = {}
     for modifier in hair.modifiers:
@@ -53,23 +53,23 @@ def mute_deformers(hair) -> None:
         if cached or (modifier.type == "NODES" and _moves_hair(modifier.node_group)):
             found[modifier.name] = [modifier.show_viewport, modifier.show_render]
             modifier.show_viewport = modifier.show_render = False
-    settings.muted = json.dumps(found) if found else ""
+    setattr(settings, kept, json.dumps(found) if found else "")
 
 
-def unmute_deformers(hair) -> None:
+def unmute_deformers(hair, kept: str = "muted") -> None:
     """Switch them on again as they were."""
     settings = hair.neuralocks_hair
-    if not settings.muted:  # to write it would be an update of the hair, which may call here again
+    if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
         return
     try:
-        found = json.loads(settings.muted)
+        found = json.loads(getattr(settings, kept))
     except json.JSONDecodeError:
         found = {}
     for name, (viewport, render) in found.items():
         modifier = hair.modifiers.get(name)
         if modifier is not None:
             modifier.show_viewport, modifier.show_render = viewport, render
-    settings.muted = ""
+    setattr(settings, kept, "")
 
 
 def _moves_hair(tree, depth: int = 0) -> bool:

@@ -58,6 +58,33 @@ def attached_again(folder: Path) -> None:
     assert not bpy.data.objects["Hair"].modifiers and not bpy.data.cache_files
 
 
+def taken_off(folder: Path) -> None:
+    """A cache plays the frames that were baked where time is stretched, too; when it is taken off, be it while live is on,
+    the hair follows its surface as before.
+    """
+    if not getattr(bpy.app.build_options, "usd", True):
+        print("no USD in this Blender")
+        return
+    operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    deform = scenes.surface_deform(strands)
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    make_live(rig, strands)
+    live = {frame: points_at(strands, frame) for frame in (1, 9, 20)}
+    scene.neuralocks.output = str(folder / "hair.usdc")
+    for beside in (False, True):
+        assert operators.bake_attach() == {"FINISHED"}
+        assert all(apart(points_at(strands, frame), shown) < SAME for frame, shown in live.items())
+        assert not deform.show_viewport and not deform.show_render
+        strands.neuralocks_hair.live = beside
+        assert operators.detach() == {"FINISHED"}
+        assert deform.show_viewport is deform.show_render is not beside, "hair that is live is moved twice"
+        strands.neuralocks_hair.live = False
+        assert deform.show_viewport and deform.show_render, "the hair stays behind its surface"
+        assert [modifier.name for modifier in strands.modifiers] == [deform.name] and not messages(), messages()
+
+
 def drawn_alike(folder: Path) -> None:
     """What is live and what is attached have the same smooth curves, thickness and bounds; Bezier strands, whose handles
     are no points, are refused.
