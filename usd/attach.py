@@ -86,9 +86,12 @@ def attach(
             skinned=True,
         )
     else:
-        seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement)) is not None]
-        found = _on_mesh(prim, seats, placement, notes) or _by_name(prim, rigs, placement, head)
-        notes += _floats(prim, found, seats)
+        seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
+        if seats:
+            found = _on_mesh(prim, seats, placement, notes)
+        else:
+            found = _by_name(prim, rigs, placement, head)
+            notes += _floats(prim, found, placement)
     name = rig_joint(found)
     if head and name.split("/")[-1] != head.split("/")[-1]:
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
@@ -111,17 +114,15 @@ def rig_joint(found: Attachment) -> str:
     return found.rig.source.names[found.character.head]
 
 
-def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment | None:
+def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
-    seats = [seat for seat in seats if seat.distance <= NEAR]
-    if not seats:
-        return None
     nearest = min(seat.distance for seat in seats)
     alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
     # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
     seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
     rig, mesh = seat.rig, seat.mesh
-    shares = _shares(rig, mesh.indices[seat.points], mesh.weights[seat.points])
+    points = seat.points
+    shares = _shares(rig, mesh.indices[points], mesh.weights[points])
     joint, why = _carrier(rig, shares)
     notes += _spread(rig, str(prim.GetPath()), joint, shares)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
@@ -129,13 +130,13 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
 
 
-def _floats(prim: Usd.Prim, found: Attachment, seats: list[Seat]) -> list[str]:
+def _floats(prim: Usd.Prim, found: Attachment, placement: Placement) -> list[str]:
     """What to say of hair that lies off the skin of what carries it."""
-    off = min((seat.distance for seat in seats if seat.rig is found.rig), default=0.0)
-    if off <= NEAR or found.far:
+    seat = None if found.far else find_seat(prim, found.rig, placement)
+    if seat is None:
         return []
     return [
-        f"{prim.GetPath()}: its roots lie {off:.2g} m from the skin of {found.rig.path}"
+        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {found.rig.path}"
         f"{found.rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
         "check that it was made for this pose"
     ]

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from pxr import Usd, UsdSkel
+from scipy.spatial import cKDTree
 
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
@@ -14,7 +15,7 @@ from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
 from neuralocks_core.rotation import sizes
 
 from .blend_shapes import knot_weights, shares
-from .border import Border
+from .border import Border, transformed
 from .joints import JointSource
 from .surface import StageMesh, bound_meshes, merged_body
 
@@ -66,6 +67,11 @@ class StageRig:
             f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
             "a loop ends with the pose that it begins with"
         ]
+
+    @cached_property
+    def skins(self) -> list[cKDTree]:
+        """The points of each mesh in bind world [m], by nearness."""
+        return [cKDTree(transformed(mesh.points, self.to_bind @ mesh.geom_bind)) for mesh in self.meshes]
 
     @cached_property
     def _to_world(self) -> np.ndarray:
