@@ -5,11 +5,15 @@ import functools
 import inspect
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import typer
 
 from neuralocks_core.errors import NeuralocksError
+
+from .stopping import heeded, stopped
 
 INTERRUPTED = 130
 
@@ -23,14 +27,12 @@ def command_of(app: typer.Typer):
             @functools.wraps(function)
             def run(*args, **kwargs):
                 try:
-                    _check_words(kwargs)
-                    return function(*args, **kwargs)
+                    with _stoppable():
+                        _check_words(kwargs)
+                        return function(*args, **kwargs)
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
                     raise typer.Exit(1) from None
-                except KeyboardInterrupt:
-                    one_line("stopped")
-                    raise typer.Exit(INTERRUPTED) from None
                 except BrokenPipeError:
                     raise  # the reader has seen enough: typer ends without a word
                 except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
@@ -45,6 +47,19 @@ def command_of(app: typer.Typer):
         return wrap
 
     return command
+
+
+@contextmanager
+def _stoppable() -> Iterator[None]:
+    """Ctrl-C in this block, and whatever error it led to, ends the command in one word."""
+    with heeded():
+        try:
+            yield
+        except BaseException as error:
+            if not (stopped() or isinstance(error, KeyboardInterrupt)):
+                raise
+            one_line("stopped")
+            raise typer.Exit(INTERRUPTED) from None
 
 
 def _paragraphs(text: str) -> str:

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from .stopping import check
+
 QUIET_FOR = 2.0
 """[s] Work that is done by then shows no bar."""
 LOG_EVERY = 20.0
@@ -14,10 +16,18 @@ LOG_EVERY = 20.0
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[..., None]]:
-    """A callback (done, total, message) that draws on stderr, or writes lines where that is no terminal."""
+    """A callback (done, total, message) that draws on stderr, or writes lines where that is no terminal.
+
+    It raises KeyboardInterrupt where work went on after one.
+    """
     shown = _Bar(title) if sys.stderr.isatty() else _Log(title)
+
+    def say(done: int, total: int, message: str = "") -> None:
+        check()
+        shown(done, total, message)
+
     try:
-        yield shown
+        yield say
     finally:
         shown.close()
 

@@ -23,6 +23,7 @@ from .override import OverrideWriter, reload_open, to_text
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
 from .stencils import Stencils
+from .stopping import stopped
 from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
@@ -71,11 +72,11 @@ def write_samples(
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], facts))
     try:
         return _write(shot, codes, poser, spool, velocities, progress or silent)
-    except KeyboardInterrupt:
-        spool.close()
-        raise
-    except BaseException:
-        spool.discard()
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) or stopped():
+            spool.close()
+        else:
+            spool.discard()
         raise
 
 
