@@ -46,12 +46,13 @@ class Spool:
             if fcntl is not None:
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._forget_others(fingerprint.encode())
-        except OSError as error:
+        except BlockingIOError:
             self._lock.close()
-            if isinstance(error, BlockingIOError):
-                raise NeuralocksError(
-                    f"{out}: another bake is writing it; wait for that one or choose another name"
-                ) from None
+            raise NeuralocksError(
+                f"{out}: another bake is writing it; wait for that one or choose another name"
+            ) from None
+        except OSError as error:
+            self.close()
             raise cannot_write(out, error) from None
         # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finished frames beside the output: whatever lies there already, one line or a clean start."""
 
+import errno
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,16 @@ def test_a_folder_that_cannot_be_cleared_is_one_line(tmp_path):
     (tmp_path / ".bake.usdc.baking" / "0_0x1p+0.frame").mkdir(parents=True)
     with pytest.raises(NeuralocksError, match="cannot be written"):
         Spool(tmp_path / "bake.usdc", "a")
+
+
+def test_a_disk_without_room_for_a_mark_is_left_as_it_was(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(NeuralocksError, match="no space left"):
+        Spool(tmp_path / "bake.usdc", "a")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_folder_is_locked_until_it_is_gone(tmp_path, monkeypatch):
