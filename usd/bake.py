@@ -14,7 +14,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel
 
 from .border import check_layer_name
-from .notes import out_of_range
+from .notes import out_of_place, out_of_range
 from .posing import GroomPoser
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
@@ -106,7 +106,7 @@ def bake(
 
     resumed = write_samples(shot, out, codes, poser, inputs | options, velocities=velocities, progress=progress)
     notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
-    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notes: what a user should know about a shot though the bake goes on. One line each: prim or file, fact, remedy."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -36,10 +37,42 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
 def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
     """The error for a stage without BasisCurves."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
-    remedy = "add one, or import a hair file with 'neuralocks import'"
+    remedy = _in_a_variant(stage) or "add one, or import a hair file with 'neuralocks import'"
     if other:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
     return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
+
+
+def _in_a_variant(stage: Usd.Stage, most: int = 64) -> str:
+    """Which variant that is not chosen has curves, and what to do then; '' if none of `most` has."""
+    tried = 0
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for path in [prim.GetPath() for prim in stage.Traverse() if prim.HasVariantSets()]:
+            for name in stage.GetPrimAtPath(path).GetVariantSets().GetNames():
+                variants = stage.GetPrimAtPath(path).GetVariantSet(name)
+                for variant in variants.GetVariantNames()[: most - tried]:
+                    tried += 1
+                    variants.SetVariantSelection(variant)
+                    curves = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)), None)
+                    if curves:
+                        found = f"choose variant '{variant}' of '{name}' on {path}, which has {curves.GetPath()}"
+                        variants.ClearVariantSelection()
+                        return found
+                variants.ClearVariantSelection()
+    return ""
+
+
+def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
+    """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
+    if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
+        return []
+    found = {str(error) for error in stage.GetCompositionErrors()}
+    lost = [str(error) for error in Usd.Stage.Open(str(out)).GetCompositionErrors() if str(error) not in found]
+    return [
+        f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "
+        "have USD search that folder (PXR_AR_DEFAULT_SEARCH_PATH)"
+        for text in lost[:1]
+    ]
 
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:

@@ -185,6 +185,19 @@ def test_a_groom_inside_an_instance_is_baked(tmp_path, model):
     assert np.array_equal(world_points(result.path, 3.0, "/A/Hair"), world_points(result.path, 3.0, "/B/Hair"))
 
 
+def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path, still_model):
+    """USD looks for names without ./ in the folder of the stage's first layer, too."""
+    for name in ("show", "layout", "cache"):
+        (tmp_path / name).mkdir()
+    write_shot(tmp_path / "show", name="hero")
+    (tmp_path / "layout" / "set.usda").write_text('#usda 1.0\ndef "Hero" (references = @hero.usda@</Hero>)\n{\n}\n')
+    shot = tmp_path / "show" / "shot.usda"
+    shot.write_text("#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@../layout/set.usda@]\n)\n")
+    notes = {name: bake(shot, tmp_path / name / "b.usdc", still_model, frames=[2]).notes for name in ("show", "cache")}
+    assert not any("hero.usda" in note for note in notes["show"])
+    assert any("hero.usda" in note and "SEARCH_PATH" in note for note in notes["cache"])
+
+
 def test_other_values_than_a_cores_own_are_refused(tmp_path, model):
     shot = write_shot(tmp_path)
     with pytest.raises(NeuralocksError, match="part of the shot"):

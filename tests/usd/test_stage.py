@@ -209,6 +209,21 @@ def test_curves_of_another_kind_are_told_to_become_basis_curves(tmp_path):
     assert any("/Hero/Locks" in line for line in inspect(path)["stops"])
 
 
+def test_a_groom_in_a_variant_that_is_not_chosen_is_named(tmp_path):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    style = stage.GetPrimAtPath("/Hero").GetVariantSets().AddVariantSet("hair")
+    for name in ("long", "none"):
+        style.AddVariant(name)
+        style.SetVariantSelection(name)
+        with style.GetVariantEditContext():
+            stage.OverridePrim("/Hero/Hair").SetActive(name == "long")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="choose variant 'long' of 'hair' on /Hero, which has /Hero/Hair"):
+        read_shot(path)
+    assert any("variant 'long'" in line for line in inspect(path)["stops"])
+
+
 def test_strands_too_short_to_move_are_counted_alike_everywhere():
     step = np.array([0.05, 0.05, 5e-6, 0.0])[:, None] * [0, -1, 0]
     points = np.array([0, 1.7, 0.1]) + np.arange(3)[None, :, None] * step[:, None]
