@@ -12,6 +12,7 @@ from neuralocks_core.motion import LOOP_GAP
 from .operators.training import job
 from .scene.actions import has_keys
 from .scene.attach import MODIFIER
+from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .session import session
 
@@ -85,8 +86,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(settings, "hair")
         hair = settings.hair
-        if hair is None:
+        if hair is None or (context.active_object is not None and waiting(context.active_object)):
             layout.operator("neuralocks.from_particles", icon="PARTICLES")
+        if hair is None:
             return
         own = hair.neuralocks_hair
         if own.armature is None or own.armature != settings.armature:

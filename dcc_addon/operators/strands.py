@@ -2,9 +2,7 @@
 """Strands: hair Curves from a particle system, settings, report card."""
 
 import bpy
-from bpy.props import StringProperty
-
-from neuralocks_core.errors import NeuralocksError
+from bpy.props import BoolProperty, StringProperty
 
 from ..scene import particles
 from ..scene.attach import check_own
@@ -12,27 +10,31 @@ from .base import Hardened, shown_armature, shown_hair
 
 
 class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
-    """Make a hair Curves object from the hair particle system of the active object, with all its key points"""
+    """Make a hair Curves object from particle hair of the active object, with all its key points and its children"""
 
     bl_idname = "neuralocks.from_particles"
     bl_label = "Convert Particle Hair"
 
-    system: StringProperty(name="System", description="Name of the particle system; the active one when empty")
+    system: StringProperty(
+        name="System",
+        description="Name of the particle system; when empty the active one, or the next that is not converted yet",
+    )
+    children: BoolProperty(
+        name="Children",
+        description="Make strands of its children, too, as many as are rendered",
+        default=True,
+    )
 
     def work(self, context):
-        source = context.active_object
-        if source is None or not source.particle_systems:
-            source = next((o for o in context.scene.objects if o.particle_systems), None)
-        if source is None:
-            raise NeuralocksError(
-                "Particle hair: no object of this scene has a particle system; select the one with the hair"
-            )
-        hair = particles.convert(context, source, self.system)
+        source, system = particles.choose(context, self.system)
+        hair = particles.convert(context, source, system, self.children)
         settings = context.scene.neuralocks
         settings.hair = hair
         if settings.armature is not None:
             hair.neuralocks_hair.armature = settings.armature
-        return f"{hair.name_full}: {len(hair.data.curves)} strands from the particle hair of {source.name}"
+        left = [f"'{other.name}'" for other in particles.waiting(source)]
+        more = f"; {', '.join(left)} not converted yet" if left else ""
+        return f"{hair.name_full}: {len(hair.data.curves)} strands from the particle hair of {source.name}{more}"
 
 
 class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):

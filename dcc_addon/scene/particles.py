@@ -1,31 +1,76 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair Curves from a hair particle system, key by key."""
+"""Hair Curves from a hair particle system, key by key and child by child."""
+
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..services.axes import transformed
 from . import curves
+from .armature import matrix
 from .binding import at_rest
 
+CHILD_STEPS = 4
+"""Two to this power are the segments that a child gets at least."""
 
-def convert(context, source, name: str = ""):
-    """A new hair Curves object with the keys of the particle hair of `source`, parented to it, as they are where the
-    rig is at rest.
+
+def choose(context, name: str = "") -> tuple:
+    """The object and its particle system to convert: of this name, else hair that is not converted yet, of the active
+    object before all others and its active system before its others.
+
+    Raises:
+        NeuralocksError: there is none.
+    """
+    objects = [thing for thing in (context.active_object, *context.scene.objects) if thing is not None]
+    if name:
+        for thing in objects:
+            if name in thing.particle_systems:
+                return thing, thing.particle_systems[name]
+        raise NeuralocksError(f"Particle hair: no object of this scene has a particle system '{name}'; choose another")
+    for thing in objects:
+        if left := waiting(thing):
+            active = thing.particle_systems.active
+            return thing, active if active in left else left[0]
+    raise NeuralocksError(
+        "Particle hair: no object of this scene has a particle system of type Hair that is shown; select the one with the "
+        "hair, and show its particle system"
+    )
+
+
+def waiting(thing) -> list:
+    """Hair systems of an object that are not converted yet: those that are, are hidden."""
+    modifiers = [m for m in thing.modifiers if m.type == "PARTICLE_SYSTEM" and (m.show_viewport or m.show_render)]
+    return [m.particle_system for m in modifiers if m.particle_system.settings.type == "HAIR"]
+
+
+def convert(context, source, system, children: bool = True):
+    """A new hair Curves object with the keys of the particle hair of `source`, and its children as they are rendered,
+    parented to it, as they are where the rig is at rest.
 
     Blender's own conversion gives the points that are drawn (9 by default), not the keys that were groomed.
 
     Raises:
-        NeuralocksError: there is no such system, or no hair in it.
+        NeuralocksError: the system has no hair.
     """
-    system = source.particle_systems.get(name) if name else source.particle_systems.active
-    if system is None:
-        raise NeuralocksError(f"{source.name}: it has no particle system '{name}'; choose one of its own")
-    if system.settings.type != "HAIR":
+    settings = system.settings
+    if settings.type != "HAIR":
         raise NeuralocksError(f"{source.name}: '{system.name}' emits particles; choose a system of type Hair")
-    with at_rest(context, source):
-        counts, points = _keys(source.evaluated_get(context.evaluated_depsgraph_get()), system.name)
+    shown = next(m for m in source.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
+    children = children and settings.child_type != "NONE"
+    with (
+        at_rest(context, source),
+        _changed(shown, show_viewport=True),
+        _changed(settings, **_rendered(settings, children)),
+    ):
+        evaluated = source.evaluated_get(context.evaluated_depsgraph_get())
+        counts, points = _keys(evaluated, system.name)
+        if children:
+            more = _children(evaluated, system.name)
+            counts = np.concatenate([counts, np.full(len(more), more.shape[1], int)])
+            points = np.concatenate([points, more.reshape(-1, 3)])
     data = curves.create(f"{system.name} Hair", counts, points)
     hair = bpy.data.objects.new(data.name, data)
     (source.users_collection[0] if source.users_collection else context.scene.collection).objects.link(hair)
@@ -34,9 +79,33 @@ def convert(context, source, name: str = ""):
         data.surface = source
         if source.data.uv_layers.active:
             data.surface_uv_map = source.data.uv_layers.active.name
-    shown = next(m for m in source.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system.name == system.name)
     shown.show_viewport = shown.show_render = False
     return hair
+
+
+def _rendered(settings, children: bool) -> dict[str, int]:
+    """Settings with which the viewport has all children that a render has."""
+    if not children:
+        return {}
+    number = "child_percent" if hasattr(settings, "child_percent") else "child_nbr"
+    return {
+        number: settings.rendered_child_count,
+        "display_percentage": 100,
+        "display_step": max(settings.display_step, CHILD_STEPS),
+    }
+
+
+@contextmanager
+def _changed(thing, **values):
+    """Meanwhile a thing has these values."""
+    kept = {name: getattr(thing, name) for name in values}
+    try:
+        for name, value in values.items():
+            setattr(thing, name, value)
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(thing, name, value)
 
 
 def _keys(evaluated, system: str) -> tuple[np.ndarray, np.ndarray]:
@@ -44,7 +113,23 @@ def _keys(evaluated, system: str) -> tuple[np.ndarray, np.ndarray]:
     modifier = next(m for m in evaluated.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system.name == system)
     particles = modifier.particle_system.particles
     if not len(particles):
-        raise NeuralocksError(f"{evaluated.name}: '{system}' has no hair; give it hair or choose another system")
+        raise NeuralocksError(
+            f"{evaluated.name}: '{system}' shows no hair; give it hair, or show the object and leave Edit Mode"
+        )
     counts = np.array([len(p.hair_keys) for p in particles])
     points = np.array([key.co_object(evaluated, modifier, p) for p in particles for key in p.hair_keys], np.float32)
     return counts, points
+
+
+def _children(evaluated, system: str) -> np.ndarray:
+    """Points (C, N, 3) of the children in the object's space, without those that Blender leaves out."""
+    drawn = evaluated.particle_systems[system]
+    first, steps = len(drawn.particles), 2**drawn.settings.display_step + 1
+    points = [
+        drawn.co_hair(evaluated, particle_no=child, step=step)
+        for child in range(first, first + len(drawn.child_particles))
+        for step in range(steps)
+    ]
+    own = transformed(np.array(points).reshape(-1, 3), np.linalg.inv(matrix(evaluated.matrix_world)))
+    found = own.reshape(-1, steps, 3)
+    return found[np.ptp(found, axis=1).max(axis=1, initial=0.0) > 0]

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
 
 
 def particles(_folder: Path) -> None:
@@ -41,6 +41,38 @@ def particles(_folder: Path) -> None:
     assert found.parent == skinned and rig.data.pose_position == "POSE"
     own, same = (np.array([p.position for p in hair.data.points]) for hair in (found, strands))
     assert apart(own, same) < SAME
+
+
+def particle_systems(_folder: Path) -> None:
+    """Of several particle systems one after the other is converted, with its children as they are rendered; what emits no
+    hair is passed over.
+    """
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
+    ball, scene, convert = bpy.context.active_object, bpy.context.scene, bpy.ops.neuralocks.from_particles
+    ball.modifiers.new("Subdivision", "SUBSURF")
+    for name in ("Dust", "Long", "Fringe"):
+        ball.modifiers.new(name, "PARTICLE_SYSTEM")
+        ball.particle_systems[-1].name = name
+        settings = ball.particle_systems[-1].settings
+        settings.count, settings.hair_length = 10, 0.2
+        settings.type = "EMITTER" if name == "Dust" else "HAIR"
+    settings.child_type, settings.rendered_child_count, settings.display_percentage = "SIMPLE", 3, 50
+    ball.modifiers["Long"].show_viewport = False  # to work faster; it is rendered
+    ball.particle_systems.active_index = 0
+    bpy.context.view_layer.update()
+    assert convert() == {"FINISHED"}
+    assert scene.neuralocks.hair.name == "Long Hair" and len(scene.neuralocks.hair.data.curves) == 10
+    assert convert() == {"FINISHED"}
+    found = scene.neuralocks.hair
+    points = scenes.points(found)
+    assert found.name == "Fringe Hair" and len(found.data.curves) == 10 + 30
+    roots = points[[curve.points[0].index for curve in found.data.curves]]
+    tips = points[[curve.points[len(curve.points) - 1].index for curve in found.data.curves]]
+    assert 0.1 < np.linalg.norm(tips - roots, axis=1).min() and np.abs(points - [0, 0, 1.6]).max() < 0.35
+    assert settings.display_percentage == 50 and [m.show_render for m in ball.modifiers] == [True, True, False, False]
+    refused(convert, "no object of this scene", "type Hair")
+    refused(lambda: convert(system="Dust"), "emits particles")
+    assert convert(system="Fringe", children=False) == {"FINISHED"} and len(scene.neuralocks.hair.data.curves) == 10
 
 
 def control_rig(folder: Path) -> None:
