@@ -52,7 +52,7 @@ def main() -> None:
         print(json.dumps({"held": held, "motion": motion}, indent=1))
         return
     print(
-        "| held poses | energy | over direct, % of what that saves | of it collision | inside % | deeper than 5 mm, % of poses | worst mm |"
+        "| held poses | energy | of it collision | tips off direct, mm | inside % | deeper than 5 mm, % of poses | worst mm |"
     )
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     first = next(iter(held))
@@ -100,8 +100,8 @@ def floor_of_forgetting(rig, material: RigMaterial, moments: int = 8) -> float:
 
 def _held_row(name: str, report: dict, key: str) -> None:
     depth = report[f"penetration_{key}"]
-    values = [f"{report['energy'][key]:.3f}", f"{report['energy_excess_of_saved_percent'][key]:.2f}"]
-    values += [f"{report['energy_collision'][key]:.3f}", f"{depth['percent']:.3f}"]
+    values = [f"{report['energy'][key]:.3f}", f"{report['energy_collision'][key]:.3f}"]
+    values += [f"{report['tip_error_mm'][key]:.0f}", f"{depth['percent']:.3f}"]
     values += [f"{depth['percent_of_poses_deeper_than_5_mm']:.1f}", f"{depth['worst_mm']:.1f}"]
     print(f"| {name} ({depth['poses']} poses) | " + " | ".join(values) + " |")
 

@@ -212,6 +212,12 @@ def report_lines(report: dict) -> list[str]:
             f"held poses: energy {e['network']:.3f} m^2/s^2, direct optimisation {e['optimised']:.3f}, carried rigidly "
             f"{e['rigid']:.3f}"
         )
+    if "tip_error_mm" in report:
+        off = report["tip_error_mm"]
+        lines.append(
+            f"held poses: tips {off['network']:.0f} mm from where direct optimisation has them (carried rigidly "
+            f"{off['rigid']:.0f} mm)"
+        )
     for name, words in (("network", "network"), ("optimised", "direct optimisation"), ("rigid", "carried rigidly")):
         if f"penetration_{name}" in report:
             p = report[f"penetration_{name}"]

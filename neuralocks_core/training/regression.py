@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.strands import K
-from neuralocks_core.training.descent import Descended, Schedule, descend
+from neuralocks_core.training.descent import Descended, Schedule, descend, muon
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
@@ -78,14 +78,9 @@ class RegressionOptions:
 
     def optimisers(self, net: nn.Module) -> list[torch.optim.Optimizer]:
         """What trains `net`."""
-        decay = {"lr": self.rate, "weight_decay": 1e-4}
         if self.optimiser == "adamw":
-            return [torch.optim.AdamW(net.parameters(), **decay)]
-        matrices = [p for p in net.parameters() if p.ndim == 2]
-        rest = [p for p in net.parameters() if p.ndim != 2]
-        # Steps as large as AdamW's, so that one rate does for both.
-        muon = torch.optim.Muon(matrices, adjust_lr_fn="match_rms_adamw", **decay)
-        return [muon, torch.optim.AdamW(rest, **decay)]
+            return [torch.optim.AdamW(net.parameters(), lr=self.rate, weight_decay=1e-4)]
+        return muon(net, self.rate, 1e-4)
 
 
 class RolloutBank:

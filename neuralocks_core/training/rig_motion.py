@@ -13,12 +13,12 @@ from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.kinematics import pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig_energy import RigMaterial, RodTree
 from neuralocks_core.training.rig_poses import body_around, posed_distances, rest_distances
-from neuralocks_core.training.rig_report import depths
+from neuralocks_core.training.rig_report import depths, hair_points, no_turns
 
 RATE = 30.0
 """Samples of the simulations [Hz]."""
@@ -56,7 +56,7 @@ def motion_report(
         progress: called with (done, total, message).
 
     Returns:
-        `motion_error`: rms error of the bones' ends, relative to hair carried rigidly (= 1);
+        `motion_error`: rms error of `rig_report.hair_points`, relative to hair carried rigidly (= 1);
         `motion_error_by_kind`: the same for each kind of motion;
         `motion_ratio`: mean speed in the head's frame over the simulation's;
         `motion_depth`: what lies in the body at every eighth sample, as `rig_report.depths`; of the simulation too. The
@@ -68,14 +68,14 @@ def motion_report(
     say(0, 4, "simulating held-out motion")
     motions = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in kinds]
     _, truth = simulate_motions(rig, material, rig_spec(), motions)
-    true = _ends(rig, truth)
+    true = hair_points(rig, truth)
     times = motions[0].start + np.arange(true.shape[1]) / RATE
     joints = np.stack([m.at(times) for m in motions])
     heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
     say(1, 4, "moving spring bones, for comparison")
     fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
     springs = [spring_bones(rig.chains, heads, 1 / RATE, fit) for fit in fits]
-    best = int(np.argmin([np.square(_ends(rig, s) - true).sum(-1).mean() for s in springs]))
+    best = int(np.argmin([np.square(hair_points(rig, s) - true).sum(-1).mean() for s in springs]))
     candidates = {SPRINGS: springs[best], DEFAULTS: springs[fits.index(SpringSettings())]}
     for name, model in models.items():
         candidates[name] = np.stack([_model_turns(rig, model, m, times) for m in motions])
@@ -92,18 +92,18 @@ def motion_report(
 
 
 def _errors(rig: HairRig, candidates: dict[str, np.ndarray], true: np.ndarray, kinds) -> dict[str, dict]:
-    """Errors and motion ratios of turns (C, T, N, 4) by name, one clip a kind, against true bone ends (C, T, M, 3) [m]."""
-    rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
+    """Errors and motion ratios of turns (C, T, N, 4) by name, one clip a kind, against true hair points (C, T, P, 3) [m]."""
+    rest = hair_points(rig, no_turns(rig))
     carried = np.square(rest - true).sum(-1).mean(axis=(1, 2))
     speed = np.linalg.norm(np.diff(true, axis=1), axis=-1).mean()
     result = {"motion_error": {}, "motion_error_by_kind": {}, "motion_ratio": {}}
     for name, turns in candidates.items():
-        ends = _ends(rig, turns)
-        values = np.square(ends - true).sum(-1).mean(axis=(1, 2))
+        points = hair_points(rig, turns)
+        values = np.square(points - true).sum(-1).mean(axis=(1, 2))
         result["motion_error"][name] = round(float(np.sqrt(values.mean() / carried.mean())), 4)
         by_kind = np.sqrt(values / np.maximum(carried, 1e-12))
         result["motion_error_by_kind"][name] = {k: round(float(v), 3) for k, v in zip(kinds, by_kind)}
-        ratio = np.linalg.norm(np.diff(ends, axis=1), axis=-1).mean() / speed
+        ratio = np.linalg.norm(np.diff(points, axis=1), axis=-1).mean() / speed
         result["motion_ratio"][name] = round(float(ratio), 3)
     return result
 
@@ -130,9 +130,9 @@ def _rates(rig, models, fit) -> dict:
             at = fine.start + np.arange(4 * rate + 1) / rate
             clip = Clip(at, fine.at(at))
             if name in models:
-                runs[rate] = _model_ends(rig, models[name], clip, fine.start + shared)
+                runs[rate] = _model_points(rig, models[name], clip, fine.start + shared)
             else:
-                runs[rate] = _spring_ends(rig, clip, 1 / rate, fit)[(shared * rate).round().astype(int)]
+                runs[rate] = _spring_points(rig, clip, 1 / rate, fit)[(shared * rate).round().astype(int)]
         gaps = {rate: np.sqrt(np.square(runs[rate] - runs[60]).sum(-1).mean()) for rate in (24, 30)}
         result[name] = {f"{rate} fps": round(1e3 * float(gap), 2) for rate, gap in gaps.items()}
     return result
@@ -140,8 +140,8 @@ def _rates(rig, models, fit) -> dict:
 
 def _teleports(rig, models, fit) -> dict:
     """A character that stands still is put 2 m aside and a quarter turned within one frame of 1/60 s, and nobody resets
-    its hair. How far the bones' ends are flung from where they hung [mm], and after how many seconds they are, and
-    stay, within 5 mm of it. Who resets a network's history at the cut sees neither.
+    its hair. How far the hair is flung from where it hung [mm], and after how many seconds it is, and
+    stays, within 5 mm of it. Who resets a network's history at the cut sees neither.
     """
     rate, before, frames = 60, 60, 240
     bind = rig.character.skeleton.bind
@@ -152,10 +152,10 @@ def _teleports(rig, models, fit) -> dict:
     result = {}
     for name in [SPRINGS, *models]:
         if name in models:
-            ends = _model_ends(rig, models[name], clip, clip.times, cuts=())
+            points = _model_points(rig, models[name], clip, clip.times, cuts=())
         else:
-            ends = _spring_ends(rig, clip, 1 / rate, fit)
-        away = np.linalg.norm(ends - ends[before - 10], axis=-1).max(axis=-1)[before:]
+            points = _spring_points(rig, clip, 1 / rate, fit)
+        away = np.linalg.norm(points - points[before - 10], axis=-1).max(axis=-1)[before:]
         restless = np.flatnonzero(away > 5e-3)
         settled = (restless[-1] + 1) / rate if len(restless) else 0.0
         result[name] = {"flung_mm": round(1e3 * float(away.max()), 1), "seconds": round(float(settled), 2)}
@@ -177,20 +177,13 @@ def _spring_cost(rig) -> dict:
     return {"multiply_adds": 110 * joints, "square_roots": 3 * joints, "bytes_carried_on": 24 * joints}
 
 
-def _spring_ends(rig, clip: Clip, step: float, fit) -> np.ndarray:
-    return _ends(rig, spring_bones(rig.chains, rig.character.canonical_to_world(clip.joints)[None], step, fit))[0]
+def _spring_points(rig, clip: Clip, step: float, fit) -> np.ndarray:
+    return hair_points(rig, spring_bones(rig.chains, rig.character.canonical_to_world(clip.joints)[None], step, fit))[0]
 
 
-def _model_ends(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
-    return _ends(rig, _model_turns(rig, model, motion, times, cuts)[None])[0]
+def _model_points(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
+    return hair_points(rig, _model_turns(rig, model, motion, times, cuts)[None])[0]
 
 
 def _model_turns(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
     return model.canonical_turns(RigSampler(model.spec, rig.character, motion, cuts).features(times))
-
-
-def _ends(rig, turns: np.ndarray) -> np.ndarray:
-    """Bone ends (C, T, M, 3) of turns (C, T, N, 4)."""
-    shape = turns.shape
-    flat = quaternion_matrices(turns.reshape(-1, *shape[2:]).astype(float))
-    return bone_ends(rig.chains, *pose_chains(rig.chains, flat)).reshape(*shape[:2], -1, 3)

@@ -13,12 +13,14 @@ from neuralocks_core.character import Body
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
-from neuralocks_core.rig.kinematics import pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import feature_columns
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
+from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig_contact import HairOnBodies, Moments
-from neuralocks_core.training.rig_energy import RigMaterial, RodTree
+from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree
+from neuralocks_core.training.rig_report import hair_points, no_turns
 from tests.core.rig.builders import character, tail
 
 RADIUS = 0.12
@@ -126,3 +128,20 @@ def with_chest(rig: HairRig) -> HairRig:
     triangles = np.concatenate([body.triangles, body.triangles + len(chest)])
     both = Body(np.concatenate([body.points, chest]), triangles, joints, np.ones_like(joints, float))
     return replace(rig, character=replace(who, body=both))
+
+
+def test_twist_of_a_lock_is_seen_and_learned_from():
+    """Turned about their own bones, locks keep the bones' ends; their mesh, and what training compares, tell."""
+    rig = on_a_ball()
+    turns = np.broadcast_to(no_turns(rig), (2, len(rig.chains), 4)).copy()
+    angle, joint = 1.0, rig.chains.bone_joint[-1]
+    axis = rig.chains.bones[-1] / np.linalg.norm(rig.chains.bones[-1])
+    turns[1, joint] = [np.cos(angle / 2), *(np.sin(angle / 2) * axis)]
+    ends = bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)))
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
+    still, twisted = hair_points(rig, turns)
+    assert np.linalg.norm(twisted - still, axis=1).max() > 0.01
+    marks = rig_dynamic._marks(RigEnergy(rig, RigMaterial(), dtype=torch.float64), torch.as_tensor(turns))
+    # Of a turn R by an angle a, |R - 1|^2 = 4 (1 - cos a).
+    expected = rig_dynamic._BESIDE**2 * 4 * (1 - np.cos(angle))
+    assert (marks[1] - marks[0]).square().sum().item() == pytest.approx(expected, rel=1e-9)
