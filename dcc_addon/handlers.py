@@ -12,6 +12,7 @@ from . import background, live
 from .live_strands import EDITING, known, live_hairs, show_all_rest
 from .scene import blur
 from .scene.sampling import bodies_of, ensure
+from .scene.together import drawn_with
 from .session import session
 
 
@@ -54,6 +55,8 @@ def on_load(*_):
     """Another file: nothing that is known belongs to it."""
     background.cancel()
     session.clear()
+    if bpy.data.filepath:
+        session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     for scene in bpy.data.scenes:
         if live.needs_sampling(scene):
             background.request()
@@ -85,17 +88,28 @@ def after_save(*_):
 
 @persistent
 def before_render(scene, *_):
-    """A render must be right: sample now what is out of date, be it that only the pose drawn tells so."""
-    with _in_view(scene):
-        live.refresh(scene, wait=True, moved=True)
-        for armature in live.carriers(scene):
-            try:
-                ensure(bpy.context, armature)
-            except NeuralocksError as error:
-                session.messages[armature.name_full] = str(error)
-        live.refresh(scene, wait=True)
-    for hair in live_hairs(scene):
-        blur.begin(hair, scene)
+    """A render must be right: sample now what is out of date, be it that only the pose drawn tells so, and say on the
+    console, which is all that a render farm keeps, which hair will not move.
+    """
+    for drawn in drawn_with(scene):
+        with _in_view(drawn):
+            _make_ready(drawn)
+        for thing in [*live_hairs(drawn), *live.carriers(drawn)]:
+            if thing.name_full in session.messages:
+                print(f"Neuralocks: {session.messages[thing.name_full]}")
+        for hair in live_hairs(drawn):
+            blur.begin(hair, drawn)
+
+
+def _make_ready(scene) -> None:
+    """Sample what is out of date in this scene, and show its hair."""
+    live.refresh(scene, wait=True, moved=True)
+    for armature in live.carriers(scene):
+        try:
+            ensure(bpy.context, armature)
+        except NeuralocksError as error:
+            session.messages[armature.name_full] = str(error)
+    live.refresh(scene, wait=True)
 
 
 @persistent

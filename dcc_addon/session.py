@@ -70,6 +70,8 @@ class Session:
     failed: set[str] = field(default_factory=set)
     """Armatures that could not be sampled in the background; tried again when they, a rest pose or an action change."""
 
+    opened: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """First and last frame of each scene when its file was opened."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since somebody last saw to it."""
     doubtful: set[str] = field(default_factory=set)

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 
+import bpy
 import numpy as np
 
 from neuralocks_core.motion import Clip
@@ -45,12 +46,15 @@ def shown_frame(scene) -> float:
 
 def frames_of(scene) -> tuple[int, int]:
     """First and last frame to sample: those of the scene, and where the panel names others to bake, these too. What is
-    shown and what is baked then remember the same past.
+    shown and what is baked then remember the same past. Without a window those that the opened file had, too: a render
+    farm gives each machine a part of them (-s 100 -e 120), and all parts must remember what the whole would.
     """
-    settings, first, last = scene.neuralocks, scene.frame_start, scene.frame_end
-    if settings.use_scene_range:
-        return first, last
-    return min(first, settings.frame_start), max(last, settings.frame_end)
+    settings, ranges = scene.neuralocks, [(scene.frame_start, scene.frame_end)]
+    if not settings.use_scene_range:
+        ranges.append((settings.frame_start, settings.frame_end))
+    if bpy.app.background and scene.name_full in session.opened:
+        ranges.append(session.opened[scene.name_full])
+    return min(first for first, _ in ranges), max(last for _, last in ranges)
 
 
 def timing_of(scene) -> tuple:

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a renderer is given, seen by an engine of our own."""
 
+import io
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import apart, make_live, messages, points_at
+from tests.blender.checks import MODEL, apart, make_live, messages, points_at
 
 
 def rendered(folder: Path) -> None:
@@ -103,3 +105,65 @@ def motion_blur(folder: Path) -> None:
     assert not strands.modifiers and not bpy.data.node_groups and not messages(), messages()
     with bpy.data.libraries.load(str(folder / "meanwhile.blend")) as (saved, _):
         assert not saved.node_groups
+
+
+def by_parts(folder: Path) -> None:
+    """A file is rendered in parts, as render farms do, and through the compositor of another scene, by a Blender that has
+    just opened it: the hair is that of the whole in all of them; of hair that cannot move the console says so.
+    """
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = {frame: points_at(strands, frame) for frame in (20, 21)}
+    main = bpy.data.scenes.new("Main")
+    for each in (scene, main):
+        each.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        each.collection.objects.link(each.camera)
+        each.render.resolution_x = each.render.resolution_y = 8
+    _compose(main, scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    got = {}
+
+    class Witness(bpy.types.RenderEngine):
+        bl_idname, bl_label = "WITNESS", "Witness"
+
+        def render(self, graph):
+            if graph.scene.name == scene_name:
+                got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
+
+    bpy.utils.register_class(Witness)
+    scene_name = scene.name
+    for name, model in ((scene_name, MODEL), ("Main", MODEL), (scene_name, "missing.neuralocks")):
+        bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+        bpy.data.objects["Hair"].neuralocks_hair.model = model
+        for each in bpy.data.scenes:
+            each.render.engine = "WITNESS"
+        rendered = bpy.data.scenes[name]
+        rendered.frame_start, rendered.frame_end, rendered.render.filepath = 20, 21, str(folder / "r_")
+        said = io.StringIO()
+        with redirect_stdout(said):
+            bpy.ops.render.render(animation=True, scene=name)
+        assert sorted(got) == sorted(shown), name
+        if model == MODEL:
+            assert not messages() and "Neuralocks" not in said.getvalue(), said.getvalue()
+            assert all(apart(got.pop(frame), points) < 1e-6 for frame, points in shown.items()), name
+        else:
+            assert "Neuralocks: " in said.getvalue() and "missing.neuralocks" in said.getvalue(), said.getvalue()
+    bpy.utils.unregister_class(Witness)
+
+
+def _compose(scene, other) -> None:
+    """Take another scene's layer into the compositor of a scene."""
+    if hasattr(scene, "compositing_node_group"):
+        tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        target = tree.nodes.new("NodeGroupOutput")
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        tree.nodes.clear()
+        target = tree.nodes.new("CompositorNodeComposite")
+    layer = tree.nodes.new("CompositorNodeRLayers")
+    layer.scene = other
+    tree.links.new(layer.outputs[0], target.inputs[0])

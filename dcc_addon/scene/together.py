@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes that one render draws together."""
+
+
+def drawn_with(scene) -> list:
+    """The scene and those whose layers its compositor takes in. Blender tells before it renders the scene strips of the
+    sequencer, of these it does not.
+    """
+    found = [scene]
+    if scene.render.use_compositing:
+        tree = getattr(scene, "compositing_node_group", None) or getattr(scene, "node_tree", None)
+        found += [other for other in _layers(tree, set()) if other != scene]
+    return list(dict.fromkeys(found))
+
+
+def _layers(tree, seen: set) -> list:
+    """Scenes of the Render Layers nodes of a tree and of the groups in it."""
+    if tree is None or tree.name_full in seen:
+        return []
+    seen.add(tree.name_full)
+    found = []
+    for node in tree.nodes:
+        if node.bl_idname == "CompositorNodeRLayers" and node.scene is not None:
+            found.append(node.scene)
+        found += _layers(getattr(node, "node_tree", None), seen)
+    return found
