@@ -52,7 +52,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     armature = hair.neuralocks_hair.armature
     if armature is None or armature.name not in scene.objects:
         raise NeuralocksError(
-            f"{hair.name_full}: it has no armature in this scene; choose the armature of the character"
+            f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
         )
     if hair.mode in EDITING:
         curves.restore_rest(hair.data)
