@@ -31,7 +31,9 @@ def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times
     error = metrics.motion_error(answer, reference, length)
     return {
         "position_percent": metrics.position_error(answer, reference, length),
+        "tip_percent": metrics.position_error(answer[:, :, -1:], reference[:, :, -1:], length),
         "motion_error_median": error["median"],
+        "motion_error_p95": error["p95"],
         "motion_error_rms": error["rms"],
         "velocity_error": metrics.velocity_error(answer, reference, times),
         "motion_ratio": metrics.motion_ratio(answer, reference, times),

@@ -12,6 +12,8 @@ DYNAMIC_SHARE = 0.35
 """A frame counts as dynamic where hair moves with at least this share of the reference's speed (Neuroll, table 1)."""
 STILL = 0.01
 """Mean speed [m/s] under which the reference itself counts as standing still."""
+MOTIONLESS = 1e-4
+"""Mean speed [m/s] of the reference over a clip below which nothing can be measured relative to its motion."""
 DEEP = 0.003
 """Depth [m] at which a vertex inside the body begins to show."""
 
@@ -76,25 +78,29 @@ def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
-    """Mean length of the velocity's error over the mean length of the reference's velocity; rigid hair has 1."""
-    return speed(np.asarray(points, float) - reference, times).mean() / max(speed(reference, times).mean(), 1e-12)
+    """Mean length of the velocity's error over the mean length of the reference's velocity; rigid hair has 1. NaN where
+    the reference is MOTIONLESS.
+    """
+    return _relative(speed(np.asarray(points, float) - reference, times), speed(reference, times))
 
 
 def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
-    """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference."""
-    return speed(points, times).mean() / max(speed(reference, times).mean(), 1e-12)
+    """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference, whether or
+    not it is the same motion. NaN where the reference is MOTIONLESS.
+    """
+    return _relative(speed(points, times), speed(reference, times))
 
 
 def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> int:
     """Longest run of consecutive frames in which hair moves at 35 % of the reference's mean speed or more.
 
-    Frames in which the reference stands still do not break a run.
+    Frames in which the reference stands still neither count nor break a run.
     """
     own, true = speed(points, times).mean(axis=(1, 2)), speed(reference, times).mean(axis=(1, 2))
-    alive = (own >= DYNAMIC_SHARE * true) | (true < STILL)
+    moving = true >= STILL
     best = run = 0
-    for frame in alive:
-        run = run + 1 if frame else 0
+    for alive in own[moving] >= DYNAMIC_SHARE * true[moving]:
+        run = run + 1 if alive else 0
         best = max(best, run)
     return best
 
@@ -113,16 +119,18 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
     move less than 0.5 % of their length (rms) have no motion to be wrong about and are left out.
 
     Returns:
-        `median` over strands; `rms`: the same ratio over all strands together, where a few that came to rest
-        elsewhere weigh most. NaN if nothing moves.
+        `median` over strands, and `p95`, which one strand in twenty exceeds; `rms`: the same ratio over all strands
+        together, where a few that came to rest elsewhere weigh most. NaN if nothing moves.
     """
     error = _swing(np.asarray(points, float) - reference)
     true = _swing(np.asarray(reference, float))
     lively = true > 0.005 * np.asarray(length)
     if not lively.any():
-        return {"median": float("nan"), "rms": float("nan")}
+        return dict.fromkeys(("median", "p95", "rms"), float("nan"))
+    each = error[lively] / true[lively]
     return {
-        "median": float(np.median(error[lively] / true[lively])),
+        "median": float(np.median(each)),
+        "p95": float(np.percentile(each, 95)),
         "rms": float(np.sqrt(np.square(error[lively]).sum() / np.square(true[lively]).sum())),
     }
 
@@ -143,7 +151,8 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float, share: flo
 
 def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: float) -> float:
     """Mean speed of the tips between half a second and two seconds after `stop`, in percent of the largest that the
-    reference's have after it: what comes back when hair should come to rest.
+    reference's have after it: what comes back when hair should come to rest. Of `points - reference` it is the share of
+    that motion that is wrong.
     """
     tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in (points, reference))
     since = (times[1:] + times[:-1]) / 2 - stop
@@ -181,6 +190,11 @@ def held(joints_relative: np.ndarray, tolerance: float = 1e-5) -> np.ndarray:
 def _swing(points: np.ndarray) -> np.ndarray:
     """(S,) rms over time and vertices of points (T, S, K, 3) about their mean in time [m]."""
     return np.sqrt(np.square(points - points.mean(axis=0)).sum(axis=-1).mean(axis=(0, 2)))
+
+
+def _relative(own: np.ndarray, true: np.ndarray) -> float:
+    """Mean over mean of speeds [m/s]; NaN where the second are too small to divide by."""
+    return float(own.mean() / true.mean()) if true.mean() >= MOTIONLESS else float("nan")
 
 
 def _mean(values) -> float:

@@ -30,12 +30,14 @@ LABELS = {
     "energy_gravity": ("gravity energy", "J/kg", "against the rigid groom; below 0 it hangs lower"),
     "energy_bend": ("bend energy", "J/kg", ""),
     "energy_stretch": ("stretch energy", "J/kg", ""),
-    "position_percent": ("position error", "% L", ""),
+    "position_percent": ("position error", "% L", "mean over vertices"),
+    "tip_percent": ("position error of the tips", "% L", "mean"),
     "motion_error_median": ("motion error, median strand", "", "rigid = 1"),
+    "motion_error_p95": ("motion error, 95th percentile", "", "one strand in 20 has more"),
     "motion_error_rms": ("motion error, rms", "", "rigid = 1"),
     "velocity_error": ("velocity error", "", "rigid = 1"),
     "motion_ratio": ("motion ratio", "", "1 = as lively as the reference"),
-    "dynamic_frames": ("consecutive dynamic frames", "", "at 35 % of the reference's motion"),
+    "dynamic_frames": ("consecutive dynamic frames", "", "at 35 % of the reference's motion or more"),
     "tip_correlation": ("tip curve correlation", "", ""),
 }
 """Name of a measure -> what a person reads, unit, remark."""

@@ -29,6 +29,8 @@ COLLISION_FRAMES = 32
 """Frames in which distances to the body are measured, evenly over the bake."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
+BEFORE = 10.0
+"""Most time [s] that the reference is simulated before the bake's first frame: what was earlier has died away."""
 
 
 @names_damage
@@ -67,6 +69,9 @@ def evaluate(
     for item in baked.shot.grooms:
         subject = _Subject(baked, item, say)
         measured[item.path] = subject.measures(material)
+        if not len(subject.chosen):
+            notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
+            continue
         curves[item.path] = {"times": baked.times, "bake": metrics.tip_curves(subject.moved)}
         curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
         if reference and len(baked.codes) >= 3:
@@ -137,22 +142,18 @@ class _Subject:
         return np.linalg.norm(points[self._edges + 1] - points[self._edges], axis=1)
 
     def measures(self, material: Material) -> dict:
-        """Everything that needs no reference."""
+        """Everything that needs no reference; of a groom without hair only that."""
         baked, times = self.baked, self.baked.times
+        result = {"strands": self.item.groom.strand_count, "measured": len(self.chosen), "frames": len(baked.codes)}
+        if not len(self.chosen):
+            return result
         strands, length = self.strands, np.maximum(self.strands.length, 1e-6)
         rig = self.item.attachment.rig
         joints = np.stack([rig.joints_at(code) for code in baked.codes])
         turn = self.character.canonical_to_world(joints)[:, :3, :3]
         down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / G)
-        result = {
-            "strands": self.item.groom.strand_count,
-            "measured": len(self.chosen),
-            "frames": len(baked.codes),
-            **self.stretch,
-            **self._penetration(),
-            "droop_cm": metrics.droop(self.moved, down),
-        }
-        if len(times) >= 3 and len(self.chosen):
+        result |= {**self.stretch, **self._penetration(), "droop_cm": metrics.droop(self.moved, down)}
+        if len(times) >= 3:
             tips = self.moved[:, :, -1] - self.moved[:, :, -1].mean(axis=0)
             swing = np.sqrt(np.square(tips).sum(axis=2).mean(axis=0)) / length
             result["speed_cm_s"] = 100 * float(metrics.speed(self.moved, times).mean())
@@ -199,7 +200,10 @@ class _Subject:
         few = comparison.whole_locks(strands, REFERENCE_STRANDS)
         some = strands.subset(few)
         rig = self.item.attachment.rig
-        true = comparison.simulated(self.character, some, rig.clip, times, material, progress=self.say)
+        # The network knows what came before the first frame baked, so the reference must, too.
+        begun = max(min(times[0], rig.clip.start), times[0] - BEFORE)
+        known = np.concatenate([[begun], times])
+        true = comparison.simulated(self.character, some, rig.clip, known, material, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}

@@ -3,8 +3,9 @@
 
 import json
 
+import numpy as np
 import pytest
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
@@ -13,7 +14,7 @@ from usd.cli import main
 from usd.demo import demo, shipped_shot
 from usd.evaluate import evaluate
 
-from .shots import write_shot
+from .shots import Recipe, write_shot
 
 FRAMES = "1:60:4"
 
@@ -58,6 +59,30 @@ def test_the_command_draws_the_curves_of_the_card(rigid, tmp_path, capsys):
         main(["evaluate", str(rigid), "--json", "--groom", "/Body", "--plot", str(tmp_path / "tips.png")])
     assert ended.value.code == 0 and json.loads(capsys.readouterr().out)["grooms"]
     assert (tmp_path / "tips.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_part_of_a_shot_is_compared_with_hair_that_knows_what_came_before(tmp_path, model):
+    """The network reads the motion before the first frame baked; a reference at rest there would be another shot's."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    shot, tips = write_shot(tmp_path, Recipe(frames=24, strands=8)), []
+    for frames in ("1:24", "13:24"):
+        bake(shot, tmp_path / "hair.usdc", model, frames=frames, velocities=False)
+        tips.append(evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"])
+    assert np.linalg.norm(tips[1][0]) > 0.005
+    np.testing.assert_allclose(tips[1], tips[0][12:], atol=1e-5)
+
+
+def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
+    shot = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    roots = np.array(points.Get()).reshape(40, 12, 3)[:, :1]
+    points.Set(Vt.Vec3fArray.FromNumpy(np.repeat(roots, 12, axis=1).reshape(-1, 3)))
+    stage.Save()
+    bake(shot, tmp_path / "hair.usdc", model)
+    card = evaluate(tmp_path / "hair.usdc", reference=True)
+    assert card.grooms["/Hero/Hair"] == {"strands": 40, "measured": 0, "frames": 9}
+    assert any("nothing is measured" in note for note in card.notes)
 
 
 def test_a_stage_without_samples_is_no_bake():
