@@ -17,7 +17,7 @@ from neuralocks_core.rotation import sizes
 from .blend_shapes import knot_weights, shares
 from .border import Border, transformed
 from .joints import JointSource
-from .surface import StageMesh, bound_meshes, merged_body
+from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
 
 CLOSE = 1.5 / 24
 """Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
@@ -98,7 +98,14 @@ def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:
 
 
 def read_rig(
-    stage: Usd.Stage, prim: Usd.Prim, border: Border, head: str | None = None, *, all_shapes: bool = False, joints=None
+    stage: Usd.Stage,
+    prim: Usd.Prim,
+    border: Border,
+    head: str | None = None,
+    *,
+    all_shapes: bool = False,
+    joints=None,
+    skins: Skins | None = None,
 ) -> StageRig:
     """Read a skeleton, its meshes and its motion.
 
@@ -109,6 +116,7 @@ def read_rig(
         head: joint that is the head; found by name and hierarchy if left out.
         all_shapes: keep blend shapes that the animation does not use.
         joints: semantic joint -> joint path or its last part, where names do not tell.
+        skins: of the stage, if they were looked for already.
 
     Raises:
         NeuralocksError: something in it cannot be used; the message names the prim.
@@ -117,7 +125,7 @@ def read_rig(
     notes = source.notes
     time_codes = _time_codes(source, border)
     posed = source.posed(time_codes)
-    meshes = bound_meshes(stage, source, notes)
+    meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
     humanoid = _humanoid(source, by_hand)
     to_bind = _to_bind(source, border, posed, humanoid)
@@ -157,10 +165,10 @@ def read_each_rig(
     stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, **options
 ) -> tuple[list[StageRig], list[NeuralocksError]]:
     """`read_rig` of several skeletons: those that can be used, and what is wrong with the others."""
-    rigs, errors = [], []
+    rigs, errors, skins = [], [], find_skins(stage)
     for prim in prims:
         try:
-            rigs.append(read_rig(stage, prim, border, head, **options))
+            rigs.append(read_rig(stage, prim, border, head, skins=skins, **options))
         except NeuralocksError as error:
             errors.append(error)
     return rigs, errors

@@ -17,7 +17,7 @@ from .border import Border, open_stage
 from .damage import names_damage
 from .notes import nothing_found
 from .rig_source import StageRig, find_skeletons, read_rig
-from .surface import rest_primvar
+from .surface import find_skins, rest_primvar
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ def read_rigged_hair(
             )
     if not prims:
         raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
-    found, errors = [], []
+    found, errors, skins = [], [], find_skins(stage)
     for prim in prims:
         try:
             _check_authored(prim)
-            source = read_rig(stage, prim, border, head, all_shapes=all_shapes)
+            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, skins=skins)
             rig = assemble_rig(source.character, core_meshes(source), chains)
         except NeuralocksError as error:
             errors.append(type(error)(_with_path(prim, error)))

@@ -46,19 +46,27 @@ class StageMesh:
         return transformed(self.points, matrix), self.triangles[:, ::-1] if mirrored else self.triangles
 
 
-def bound_meshes(stage: Usd.Stage, source: JointSource, notes: list[str]) -> list[StageMesh]:
+Skins = dict[str, list[Usd.Prim]]
+"""Path of a skeleton -> the Mesh prims that it skins, in stage order."""
+
+
+def find_skins(stage: Usd.Stage) -> Skins:
+    """The skinned meshes of a stage: looked for once, a set may have many more meshes than its characters."""
+    found: Skins = {}
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.Mesh) and (skeleton := bound_skeleton(prim)) is not None:
+            found.setdefault(skeleton, []).append(prim)
+    return found
+
+
+def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[StageMesh]:
     """Visible meshes that the skeleton skins, in stage order.
 
     Raises:
         NeuralocksError: a mesh's arrays do not fit each other or are not finite.
     """
-    found = []
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
-        if prim.IsA(UsdGeom.Mesh) and bound_skeleton(prim) == source.path and _drawn(prim):
-            mesh = _read(prim, source, notes)
-            if mesh is not None:
-                found.append(mesh)
-    return found
+    read = (_read(prim, source, notes) for prim in skins.get(source.path, ()) if _drawn(prim))
+    return [mesh for mesh in read if mesh is not None]
 
 
 def bound_skeleton(prim: Usd.Prim) -> str | None:
