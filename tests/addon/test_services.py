@@ -1,17 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's services, without Blender."""
 
-import json
-import sys
-import time
-import zipfile
-
 import numpy as np
 import pytest
 from pxr import Sdf
 
-from dcc_addon import build
-from dcc_addon.services import axes, bones, card, names, panel_errors, rig, training_job
+from dcc_addon.services import axes, bones, card, names, panel_errors, rig
 from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.motion import Motion, frame_numbers, similar
@@ -250,99 +244,3 @@ def test_card_fits_a_sidebar():
         Card("t", {"/Hair": {"droop_cm": 1.234, "settling_s": float("nan"), "strands": 7}}, notes=("n",))
     )
     assert lines == ["droop: 1.23 cm", "n"]
-
-
-CHILD = """
-import json, sys, time
-settings = json.load(sys.stdin)
-print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
-if settings["out"] == "wait": time.sleep(60)
-if settings["out"] == "fail":
-    print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
-if settings["out"] == "crash": raise RuntimeError("boom")
-"""
-
-
-@pytest.fixture
-def job(tmp_path, monkeypatch):
-    child = tmp_path / "child.py"
-    child.write_text(CHILD)
-    monkeypatch.setattr(training_job, "CHILD", child)
-    started = []
-
-    def start(out):
-        started.append(training_job.TrainingJob(sys.executable, {"out": out}))
-        return started[-1]
-
-    yield start
-    for one in started:
-        one.cancel()
-
-
-def _wait(condition):
-    end = time.monotonic() + 30
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    assert condition()
-
-
-def test_training_runs_beside_and_says_how_far_it_is(job):
-    running = job("well")
-    _wait(lambda: not running.running)
-    assert running.succeeded and running.message == "half" and running.done == 0.5
-
-
-def test_training_is_cancelled_at_once(job):
-    running = job("wait")
-    _wait(lambda: running.done == 0.5)
-    assert running.running and running.seconds_left is not None
-    running.cancel()
-    _wait(lambda: not running.running)
-    assert not running.succeeded
-
-
-@pytest.mark.parametrize(("out", "words"), [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom")])
-def test_training_says_why_it_failed(job, out, words):
-    running = job(out)
-    _wait(lambda: not running.running)
-    assert not running.succeeded and running.failure() == words
-
-
-@pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
-def test_missing_trainer_comes_with_a_remedy(python, words):
-    problem = training_job.problem(python)
-    assert words in problem and "pip install 'neuralocks[train]'" in problem
-
-
-def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
-    """Built as `make addon` builds it, with what the tests' environment holds."""
-    with zipfile.ZipFile(build.own_wheel(tmp_path / "own")) as made:
-        listed = set(made.namelist())
-    shipped = {"strands.neuralocks", "rig.neuralocks", "shot/shot.usda"}
-    assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
-    assert {"usd/cli.py", "neuralocks_core/rig/hair.h.in"} <= listed
-    assert {name.split("/licenses/")[1] for name in listed if "/licenses/" in name} == {"LICENSE", "CREDITS.md"}
-    assert {name.split("/")[0].split("-")[0] for name in listed} == {"neuralocks_core", "usd", "neuralocks"}
-    assert not any("__pycache__" in name for name in listed)
-
-
-def test_zips_hold_what_blender_expects(tmp_path):
-    """The manifest lists the wheels that are in the zip, and the legacy zip has one folder with the packages in it."""
-    import tomllib
-
-    wheel = tmp_path / "thing-1.0-py3-none-any.whl"
-    with zipfile.ZipFile(wheel, "w") as made:
-        made.writestr("thing/__init__.py", "")
-    with zipfile.ZipFile(build.extension(tmp_path, "linux-x64", [wheel])) as made:
-        manifest = tomllib.loads(made.read("blender_manifest.toml").decode())
-        listed = set(made.namelist())
-    assert manifest["platforms"] == ["linux-x64"] and manifest["permissions"]
-    assert all(w.removeprefix("./") in listed for w in manifest["wheels"])
-    assert {"__init__.py", "LICENSE", "services/live.py"} <= listed
-    assert not any("build.py" in n or "__pycache__" in n for n in listed)
-    with zipfile.ZipFile(build.legacy(tmp_path, [wheel])) as made:
-        listed = made.namelist()
-    assert all(n.startswith("neuralocks/") for n in listed) and "neuralocks/packages/thing/__init__.py" in listed
-    assert json.dumps(manifest["version"]) == json.dumps(
-        build.version((build.HERE / "blender_manifest.toml").read_text())
-    )

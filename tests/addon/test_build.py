@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is in the zips and the wheel that Blender installs."""
+
+import json
+import zipfile
+
+from dcc_addon import build
+
+
+def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
+    """Built as `make addon` builds it, with what the tests' environment holds."""
+    with zipfile.ZipFile(build.own_wheel(tmp_path / "own")) as made:
+        listed = set(made.namelist())
+    shipped = {"strands.neuralocks", "rig.neuralocks", "shot/shot.usda"}
+    assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
+    assert {"usd/cli.py", "neuralocks_core/rig/hair.h.in"} <= listed
+    assert {name.split("/licenses/")[1] for name in listed if "/licenses/" in name} == {"LICENSE", "CREDITS.md"}
+    assert {name.split("/")[0].split("-")[0] for name in listed} == {"neuralocks_core", "usd", "neuralocks"}
+    assert not any("__pycache__" in name for name in listed)
+
+
+def test_zips_hold_what_blender_expects(tmp_path):
+    """The manifest lists the wheels that are in the zip, and the legacy zip has one folder with the packages in it."""
+    import tomllib
+
+    wheel = tmp_path / "thing-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as made:
+        made.writestr("thing/__init__.py", "")
+    with zipfile.ZipFile(build.extension(tmp_path, "linux-x64", [wheel])) as made:
+        manifest = tomllib.loads(made.read("blender_manifest.toml").decode())
+        listed = set(made.namelist())
+    assert manifest["platforms"] == ["linux-x64"] and manifest["permissions"]
+    assert all(w.removeprefix("./") in listed for w in manifest["wheels"])
+    assert {"__init__.py", "LICENSE", "services/live.py"} <= listed
+    assert not any("build.py" in n or "__pycache__" in n for n in listed)
+    with zipfile.ZipFile(build.legacy(tmp_path, [wheel])) as made:
+        listed = made.namelist()
+    assert all(n.startswith("neuralocks/") for n in listed) and "neuralocks/packages/thing/__init__.py" in listed
+    assert json.dumps(manifest["version"]) == json.dumps(
+        build.version((build.HERE / "blender_manifest.toml").read_text())
+    )

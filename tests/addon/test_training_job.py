@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Training in a process of its own, as the panel starts and watches it."""
+
+import sys
+import time
+
+import pytest
+
+from dcc_addon.services import training_job
+
+CHILD = """
+import json, sys, time
+settings = json.load(sys.stdin)
+print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
+if settings["out"] == "wait": time.sleep(60)
+if settings["out"] == "fail":
+    print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
+if settings["out"] == "crash": raise RuntimeError("boom")
+"""
+
+
+@pytest.fixture
+def job(tmp_path, monkeypatch):
+    child = tmp_path / "child.py"
+    child.write_text(CHILD)
+    monkeypatch.setattr(training_job, "CHILD", child)
+    started = []
+
+    def start(out):
+        started.append(training_job.TrainingJob(sys.executable, {"out": out}))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.cancel()
+
+
+def _wait(condition):
+    end = time.monotonic() + 30
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert condition()
+
+
+def test_training_runs_beside_and_says_how_far_it_is(job):
+    running = job("well")
+    _wait(lambda: not running.running)
+    assert running.succeeded and running.message == "half" and running.done == 0.5
+
+
+def test_training_is_cancelled_at_once(job):
+    running = job("wait")
+    _wait(lambda: running.done == 0.5)
+    assert running.running and running.seconds_left is not None
+    running.cancel()
+    _wait(lambda: not running.running)
+    assert not running.succeeded
+
+
+@pytest.mark.parametrize(("out", "words"), [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom")])
+def test_training_says_why_it_failed(job, out, words):
+    running = job(out)
+    _wait(lambda: not running.running)
+    assert not running.succeeded and running.failure() == words
+
+
+@pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
+def test_missing_trainer_comes_with_a_remedy(python, words):
+    problem = training_job.problem(python)
+    assert words in problem and "pip install 'neuralocks[train]'" in problem
