@@ -20,10 +20,9 @@ from neuralocks_core import model as model_file  # noqa: E402
 from neuralocks_core.motion import Clip  # noqa: E402
 from neuralocks_core.random_motion import KINDS, scripted_clip  # noqa: E402
 from neuralocks_core.rig import RigModel, rig_spec  # noqa: E402
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices  # noqa: E402
 from neuralocks_core.training.rig_energy import RigMaterial  # noqa: E402
 from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions  # noqa: E402
-from neuralocks_core.training.rig_report import static_report  # noqa: E402
+from neuralocks_core.training.rig_report import hair_points, no_turns, static_report  # noqa: E402
 from usd.rig_stage import read_rigged_hair  # noqa: E402
 
 EXAMPLE = ROOT / "examples" / "mesh_hair"
@@ -90,12 +89,9 @@ def floor_of_forgetting(rig, material: RigMaterial, moments: int = 8) -> float:
         for end in at
     ]
     again = simulate_motions(rig, material, rig_spec(), short)[1][:, -1]
-    ends, true = (
-        bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns.astype(float))))
-        for turns in (again, truth[:, at].reshape(again.shape))
-    )
-    rest = rig.chains.origins[rig.chains.bone_joint] + rig.chains.bones
-    return float(np.sqrt(np.square(ends - true).sum() / np.square(rest - true).sum()))
+    points, true = hair_points(rig, again), hair_points(rig, truth[:, at].reshape(again.shape))
+    rest = hair_points(rig, no_turns(rig))
+    return float(np.sqrt(np.square(points - true).sum() / np.square(rest - true).sum()))
 
 
 def _held_row(name: str, report: dict, key: str) -> None:

@@ -62,7 +62,8 @@ class HairOnBodies:
         self._hard = (np.zeros(0, int), np.zeros((0, len(feature_columns(spec))), np.float32), np.zeros(0, np.float32))
 
     def parts(self, net: torch.nn.Module, batch: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Elastic and collision energy (batch,) of a network's answers, up to half of them where hair lay deepest before.
+        """Elastic energy (batch - batch // 2,) of a network's answers in random situations, and collision energy (batch,) in
+        these and, up to half of all, where hair lay deepest before: that says how to keep out of bodies, but is no sample.
 
         Args:
             net: features (B, F) -> turns (B, N, 4).
@@ -85,7 +86,7 @@ class HairOnBodies:
         every = tuple(np.concatenate([old[left], new]) for old, new in zip(self._hard, met))
         hardest = np.argsort(-every[2], kind="stable")[:HARD]
         self._hard = tuple(part[hardest] for part in every)
-        return parts
+        return parts[0][batch // 2 :], parts[1]
 
     def _features(self, bodies: np.ndarray) -> np.ndarray:
         if self._moments is not None:

@@ -96,7 +96,7 @@ def train_dynamic(
         if held.pool.collides:
             # Near the body a small error is a deep one, which squared errors do not tell.
             elastic, collision = held.parts(net, _HELD)
-            result["held"] = _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic[_HELD // 2 :].mean()
+            result["held"] = _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic.mean()
             result["moving"] = _COLLISION * moving.parts(net, _MOVING)[1].mean()
         return result
 
