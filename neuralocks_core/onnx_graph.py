@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writing ONNX graphs node by node; needs the extra `train`."""
+"""Writing ONNX graphs node by node, and reading their weights; needs the extra `train`."""
 
 import numpy as np
 
@@ -55,3 +55,40 @@ class OnnxGraph:
         )
         onnx.checker.check_model(model)
         return model.SerializeToString(deterministic=True)
+
+
+class OnnxWeights:
+    """What a graph holds.
+
+    Attributes:
+        constants: arrays by name, those stored in float16 under the name that is computed with, all in float32.
+        layers: (in, out) weight and (out,) bias of the linear layers, by the name of what they give, in the order in which
+            they are computed.
+
+    Args:
+        graph: the ONNX file.
+        name: what messages call it.
+
+    Raises:
+        NeuralocksError: it is damaged, or its numbers lie in other files.
+    """
+
+    def __init__(self, graph: bytes, name: str):
+        import onnx
+        from google.protobuf.message import DecodeError
+
+        try:
+            graph = onnx.load_model_from_string(graph).graph
+            if any(tensor.data_location == onnx.TensorProto.EXTERNAL for tensor in graph.initializer):
+                raise ValueError("its numbers lie in another file")
+            arrays = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in graph.initializer}
+            self.constants = {k.removesuffix(".half"): np.array(v, np.float32) for k, v in arrays.items()}
+            gemms = [
+                node for node in graph.node if node.op_type == "Gemm" and f"{node.output[0]}.weight" in self.constants
+            ]
+            self.layers = {
+                node.output[0]: (self.constants[f"{node.output[0]}.weight"], self.constants[f"{node.output[0]}.bias"])
+                for node in gemms
+            }
+        except (DecodeError, ValueError, TypeError, KeyError, IndexError) as error:
+            raise NeuralocksError(f"{name}: damaged ({str(error).splitlines()[0]}); get an undamaged copy") from None

@@ -4,7 +4,7 @@
 import hashlib
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from neuralocks_core import model as model_file
@@ -104,7 +104,8 @@ def bake(
     def poser(item: StageGroom) -> GroomPoser:
         return GroomPoser(item, strand_model, look, **options)
 
-    resumed = write_samples(shot, out, codes, poser, inputs | options, velocities=velocities, progress=progress)
+    facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
+    resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)

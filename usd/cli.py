@@ -110,7 +110,7 @@ def evaluate_command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a bake's report card. Give the options again that the bake was made with."""
+    """Print a bake's report card. It has the material that the bake tells; give other options again, as for the bake."""
     from neuralocks_core.report import check_plot
 
     from .bake import as_material
@@ -122,7 +122,7 @@ def evaluate_command(
     with progress_bar("evaluating") as progress:
         card = evaluate(
             baked, reference, grooms=groom or None, skeleton=skeleton, head=head,
-            model=model, material=as_material(material), progress=progress,
+            model=model, material=as_material(material) if material else None, progress=progress,
         )  # fmt: skip
     if as_json:
         typer.echo(card.to_json())

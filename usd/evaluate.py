@@ -20,6 +20,7 @@ from neuralocks_core.strands import K, StrandSet, strands_on
 
 from .baked import Baked, read_baked
 from .damage import names_damage
+from .recorded import recorded_material
 from .stage import StageGroom
 
 STRANDS = 600
@@ -52,7 +53,7 @@ def evaluate(
         reference: simulate the same strands and compare.
         grooms, skeleton, head: as for `bake`.
         model: with `reference`, the model whose held-pose answer is shown beside; the shipped one if left out.
-        material: what the hair is made of, for energies and reference.
+        material: what the hair is made of, for energies and reference; what each groom's bake tells if left out.
         progress: called with (done, total, message).
 
     Raises:
@@ -60,7 +61,6 @@ def evaluate(
     """
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head)
-    material = material or Material()
     say = progress or silent
     measured, compared, curves = {}, {}, {}
     notes = list(baked.shot.notes)
@@ -68,14 +68,15 @@ def evaluate(
         notes.append("fewer than three frames: nothing is said about motion")
     for item in baked.shot.grooms:
         subject = _Subject(baked, item, say)
-        measured[item.path] = subject.measures(material)
+        look = material or recorded_material(item.prim) or Material()
+        measured[item.path] = subject.measures(look)
         if not len(subject.chosen):
             notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
             continue
         curves[item.path] = {"times": baked.times, "bake": metrics.tip_curves(subject.moved)}
         curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
         if reference and len(baked.codes) >= 3:
-            rows, tips = subject.compared(material, model)
+            rows, tips = subject.compared(look, model)
             compared[item.path] = rows
             curves[item.path] |= tips
     return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))

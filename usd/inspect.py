@@ -30,6 +30,7 @@ from .notes import (
     rig_notes,
 )
 from .placement import Placement
+from .recorded import recorded
 from .rig_source import StageRig, find_skeletons, read_each_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
 from .stage import frame_range
@@ -176,7 +177,8 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     groom = read_groom(prim, to_bind, spoils)
     if joint:
         spoils += groom_notes(facts["path"], groom)
-    return facts | joint | groom_facts(groom)
+    made = recorded(prim)
+    return facts | joint | groom_facts(groom) | ({"baked with": made} if made else {})
 
 
 def groom_facts(groom: Groom) -> dict:

@@ -13,6 +13,7 @@ from neuralocks_core.rotation import sizes
 
 from .border import Border, first_line, transformed
 from .curves import rest_points
+from .recorded import record
 from .stage import Shot, StageGroom
 
 SAVE_EVERY = 32 << 20
@@ -39,14 +40,15 @@ class OverrideWriter:
             write_header(self._layer, shot.stage, shot.border, shot.path, out, codes)
         self._held = 0
 
-    def groom(self, item: StageGroom, velocities: bool) -> None:
-        """Open a groom: the overs, and what keeps it from being skinned a second time."""
+    def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
+        """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
         layer, path = self._layer, item.prim.GetPath()
         for above in path.GetPrefixes():
             if item.prim.GetStage().GetPrimAtPath(above).IsInstance():
                 # What lies inside an instance cannot be overridden.
                 _over(layer, above).instanceable = False
         over = _over(layer, path)
+        record(over, facts)
         if item.attachment.skinned:
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             if not item.prim.HasAPI("SkelBindingAPI"):

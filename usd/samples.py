@@ -44,6 +44,7 @@ def write_samples(
     codes: list[float],
     poser: Callable[[StageGroom], Poser],
     inputs: dict,
+    facts: dict,
     *,
     velocities: bool = True,
     progress: Progress | None = None,
@@ -56,6 +57,7 @@ def write_samples(
         codes: ascending time codes.
         poser: makes the poser of a groom; called only if something is left to compute.
         inputs: plain values that, with the shot's files and this program's, determine every sample.
+        facts: what the file tells of how it was made, see `recorded`.
         velocities: write velocities.
         progress: called with (done, total, message).
 
@@ -68,10 +70,10 @@ def write_samples(
     """
     check_not_input(out, shot.stage)
     _check_space(out, shot, len(codes), velocities)
-    facts = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
-    spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], facts))
+    inputs = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
+    spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
-        return _write(shot, codes, poser, spool, velocities, progress or silent)
+        return _write(shot, codes, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) or stopped():
             spool.close()
@@ -80,14 +82,14 @@ def write_samples(
         raise
 
 
-def _write(shot: Shot, codes, poser, spool: Spool, velocities: bool, say) -> int:
+def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
     plans = [Stencils(item, codes, velocities) for item in shot.grooms]
     total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
     say(0, total, "reading")
     with WriteBehind() as behind:
         for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
-            behind.put(writer.groom, item, velocities)
+            behind.put(writer.groom, item, velocities, facts)
             store, made = _Store(spool, writer, item, number, plan), None
             for code in plan.codes:
                 held = []

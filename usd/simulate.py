@@ -2,6 +2,7 @@
 """A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
 
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,8 @@ def simulate(
     def poser(item: StageGroom) -> _SimulatedPoser:
         return _SimulatedPoser(item, codes, look, count, volume, progress)
 
-    resumed = write_samples(shot, out, codes, poser, inputs, progress=progress)
+    facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
+    resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
     return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)
 
 

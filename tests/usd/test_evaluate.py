@@ -8,11 +8,13 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import Material
 from usd.bake import bake
 from usd.baked import read_baked
 from usd.cli import main
 from usd.demo import demo, shipped_shot
 from usd.evaluate import evaluate
+from usd.inspect import inspect
 
 from .shots import Recipe, write_shot
 
@@ -109,3 +111,26 @@ def test_only_what_was_baked_is_measured(tmp_path, model):
     card = evaluate(tmp_path / "hair.usdc")
     assert list(card.grooms) == ["/Hero/Hair"]
     assert any("/Hero/Beard" in note for note in card.notes)
+
+
+def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
+    """Through a layer on top, too; a given one wins, and one that is none is told."""
+    shot, out, above = write_shot(tmp_path), tmp_path / "hair.usdc", tmp_path / "above.usda"
+    soft = Material(bend=4e-4, weight=1.5)
+    bake(shot, out, model, material=soft, strength=0.5)
+    layer = Sdf.Layer.CreateNew(str(above))
+    layer.subLayerPaths.append("hair.usdc")
+    layer.Save()
+    told, given, other = (evaluate(above, material=material).to_json() for material in (None, soft, Material()))
+    assert told == given != other
+    with_it = next(groom["baked with"] for groom in inspect(above)["grooms"])
+    assert with_it["material"]["bend"] == 4e-4 and with_it["strength"] == 0.5
+    stage = Usd.Stage.Open(str(above))
+    prim = stage.OverridePrim("/Hero/Hair")
+    for wrong in ({"bend": 1.0}, {"bend": "stiff"}, {"colour": 1.0}, "soft"):
+        prim.SetCustomDataByKey("neuralocks:material", wrong)
+        stage.Save()
+        with pytest.raises(NeuralocksError, match="/Hero/Hair: customData 'neuralocks' has no material .*--material"):
+            evaluate(above)
+        assert evaluate(above, material=soft).to_json() == given
+        prim.ClearCustomDataByKey("neuralocks:material")
