@@ -18,6 +18,12 @@ def train_command(
     motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
     steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL", help="Begin with what this model has learned; 'shipped': the one that comes with it."
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")
     ] = False,
@@ -51,7 +57,7 @@ def train_command(
     with progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
-            skeleton=skeleton, head=head, resume=resume, rollouts=rollouts, processes=processes,
+            skeleton=skeleton, head=head, begin=begin, resume=resume, rollouts=rollouts, processes=processes,
             credits=credit or [], keep_work=keep_work, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))

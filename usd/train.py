@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 
@@ -29,6 +30,7 @@ def train(
     paper: bool = False,
     skeleton: str | None = None,
     head: str | None = None,
+    begin: str | Path | None = None,
     resume: bool = False,
     rollouts: int = 1200,
     processes: int = 1,
@@ -48,6 +50,7 @@ def train(
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
         skeleton, head: as for `bake`.
+        begin: a model to begin with, "shipped" for the one that comes with it.
         resume: go on with an interrupted training.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
@@ -70,7 +73,8 @@ def train(
     from neuralocks_core.training.networks import MOTIONS, OUTPUTS
     from neuralocks_core.training.regression import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
-    from neuralocks_core.training.train import train_strands, work_folder
+    from neuralocks_core.training.train import train_strands
+    from neuralocks_core.training.work import work_folder
 
     from .training import training_scene
 
@@ -89,6 +93,7 @@ def train(
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, resume=resume,
+        begin=model.shipped() if begin == "shipped" else begin,
         credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
     )  # fmt: skip
 

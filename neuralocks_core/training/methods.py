@@ -43,10 +43,10 @@ class RolloutMethod:
     name = "regression on rollouts of the reference solver"
 
     def __init__(self, scene, codes, options: RegressionOptions, farm, report):
-        self.options, self.farm, self.anchored = options, farm, True
+        self.options, self.farm = options, farm
         self.bank = RolloutBank(scene, codes)
         self.inputs = self.bank.inputs
-        wait(farm, min(FIRST, farm.count), report)
+        wait(farm, min(FIRST, farm.count), lambda count: report(0.0, f"first simulations: {count}"))
         self.bank.add(farm.files())
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +73,7 @@ class MomentMethod:
     name = "self-supervised on the potentials of random moments"
 
     def __init__(self, scene, codes, options: SelfSupervisedOptions, farm, report):
-        self.options, self.anchored = options, options.supported
+        self.options = options
         self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
         self.pool = MomentPool(
             replace(scene, strands=options.strands),
@@ -123,8 +123,8 @@ def normalise(net: StrandNet, strands: np.ndarray, frames: np.ndarray, history: 
     net.set_normalisation(torch.from_numpy(strands), torch.from_numpy(frames), history, static=static)
 
 
-def wait(farm: RolloutFarm, count: int, report: Callable[[float, str], None]) -> None:
-    """Until a farm has made `count` rollouts; `report` is told how many there are.
+def wait(farm: RolloutFarm, count: int, say: Callable[[str], None]) -> None:
+    """Until a farm has made `count` rollouts; `say` is told how many there are.
 
     Raises:
         NeuralocksError: a process of it failed.
@@ -132,5 +132,5 @@ def wait(farm: RolloutFarm, count: int, report: Callable[[float, str], None]) ->
     while len(farm.files()) < count:
         if farm.failed() or not farm.alive:
             raise NeuralocksError("training: the solver's process ended early; free some memory and try again")
-        report(0.0, f"first simulations: {len(farm.files())} of {count}")
+        say(f"{len(farm.files())} of {count}")
         time.sleep(0.2)

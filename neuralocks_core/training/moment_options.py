@@ -63,6 +63,11 @@ class SelfSupervisedOptions:
         """What trains `net`."""
         return [torch.optim.Adam(net.parameters(), lr=self.rate)]
 
+    @property
+    def anchored(self) -> bool:
+        """Whether the network's answer for the bind pose is taken off."""
+        return self.supported
+
     @classmethod
     def paper(cls, **changes) -> SelfSupervisedOptions:
         """The paper's choices wherever it states them, `changes` on top."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -75,6 +76,9 @@ class RegressionOptions:
     static: bool = False
     seed: int = 0
     device: str = "cpu"
+
+    anchored: ClassVar[bool] = True
+    """The network's answer for the bind pose is taken off."""
 
     def optimisers(self, net: nn.Module) -> list[torch.optim.Optimizer]:
         """What trains `net`."""

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
+from neuralocks_core.training.beginning import Beginning
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import Gauge, measure
@@ -28,6 +28,7 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.work import BEGINNING, discard, keep_beginning, work_folder
 
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
@@ -43,6 +44,7 @@ def train_strands(
     rollouts: int = 1200,
     processes: int = 1,
     work: str | Path | None = None,
+    begin: str | Path | None = None,
     resume: bool = False,
     keep_work: bool = False,
     credits: tuple[str, ...] = (),
@@ -62,6 +64,7 @@ def train_strands(
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
         processes: that make rollouts; the network's training uses what is left.
         work: folder for checkpoint and rollouts; `OUT.training` beside the model where left out.
+        begin: a model whose network and strand codes are begun with, in place of random weights and codes of one's own.
         resume: go on with what is in `work`: simulations, strand codes, the checkpoint if it came to one; with a larger
             budget than before, a finished run trains longer.
         keep_work: leave `work` behind after success.
@@ -70,13 +73,17 @@ def train_strands(
         progress: called with done, total (thousandths of the budget) and a message with the gauge.
 
     Raises:
-        NeuralocksError: nothing to train on, a checkpoint that does not fit, or a failed solver process.
+        NeuralocksError: nothing to train on, a model or a checkpoint that does not fit, or a failed solver process.
     """
     options = options or RegressionOptions()
     out, work = Path(out), work_folder(out, work, resume)
     saved = work / "checkpoint.npz"
     if not resume:
-        _discard(work)
+        discard(work)
+        if begin:
+            Beginning(begin).check(scene.spec, options)
+            keep_beginning(Path(begin), work)
+    beginning = Beginning(work / BEGINNING) if (work / BEGINNING).exists() else None
     if not any(groom.valid.any() for groom in scene.grooms):
         raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
     report = _Reporter(progress)
@@ -88,46 +95,31 @@ def train_strands(
         RolloutFarm(scene, work / "rollouts", count, processes) as farm,
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
-        coder = _coder(scene, work, options, report)
+        coder = beginning.coder() if beginning else _coder(scene, work, options, report)
         codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
         method = method_of(scene, codes, options, farm, report)
-        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, resume and saved.exists())
+        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, beginning, resume and saved.exists())
         gauge = run.train(farm, held_farm, report)
     card = {
         "command": command,
         **run.card(),
-        **_inputs_of(scene, coder),
+        **_inputs_of(scene, coder, beginning),
         "options": asdict(options, dict_factory=_plain),
     }
     description = {
         "kind": "strands",
         "boundary": scene.spec.to_json(),
         "output": options.output,
-        "anchored": method.anchored,
+        "anchored": options.anchored,
         "static": options.static,
         "training": {**card, "curve": run.meta["curve"]},
         "report": {"held out": gauge.to_json()},
-        "credits": list(credits),
+        "credits": list(dict.fromkeys([*(beginning.credits if beginning else ()), *credits])),
     }
     path = model.write(out, description, strand_graphs(coder, run.net, options.output))
     if not keep_work:
-        _discard(work)
+        discard(work)
     return path
-
-
-def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
-    """Where a training keeps what it goes on from: asked for before anything is read.
-
-    Raises:
-        NeuralocksError: `out` is no name for a model, or there is nothing to resume.
-    """
-    out = Path(out)
-    if out.suffix != ".neuralocks":
-        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
-    work = Path(work) if work else out.with_name(out.name + ".training")
-    if resume and not any((work / name).exists() for name in ("checkpoint.npz", "codes.npz")):
-        raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
-    return work
 
 
 class _Run:
@@ -138,16 +130,27 @@ class _Run:
         method: how.
         held: held-out rollouts, which the gauge measures on as they come.
         saved: the checkpoint's file.
+        beginning: the model whose weights come in place of random ones.
         resume: begin with what that file holds.
     """
 
-    def __init__(self, scene: TrainingScene, method, held: RolloutBank, saved: Path, resume: bool):
+    def __init__(
+        self,
+        scene: TrainingScene,
+        method,
+        held: RolloutBank,
+        saved: Path,
+        beginning: Beginning | None,
+        resume: bool,
+    ):
         self.scene, self.method, self.held, self.saved = scene, method, held, saved
         self._options, self._history = method.options, scene.spec.slices["history"]
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self._options.seed)
             self.net = StrandNet(scene.spec.size, method.inputs[0].shape[1], motion=self._options.motion)
         normalise(self.net, *method.samples(), self._history, self._options.static)
+        if beginning:
+            beginning.fill(self.net)
         self.net.to(self._options.device)
         self._optimisers = self._options.optimisers(self.net)
         self.meta = {"step": 0, "seconds": 0.0, "curve": []}
@@ -173,12 +176,14 @@ class _Run:
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
+                if state.done >= 1.0:  # short runs must not be judged by the few that there are
+                    self._wait(held_farm, report)
                 last, gauge = now, self._measured(held_farm)
                 self._save(state.step, now - began, gauge)
             losses = " ".join(f"{name} {value:.4f}" for name, value in state.losses.items())
             report(state.done, f"{state.step} steps, {self.method.material()}; {gauge or losses}")
         if gauge is None:
-            wait(held_farm, HELD_OUT, report)
+            self._wait(held_farm, report)
             gauge = self._measured(held_farm)
         return gauge
 
@@ -192,12 +197,16 @@ class _Run:
             **self.method.card(),
         }
 
+    @staticmethod
+    def _wait(held_farm: RolloutFarm, report) -> None:
+        wait(held_farm, HELD_OUT, lambda count: report(1.0, f"held-out simulations: {count}"))
+
     def _measured(self, held_farm: RolloutFarm) -> Gauge | None:
         """The gauge on the held-out rollouts that there are by now, None before the first."""
         self.held.add(held_farm.files())
         if not self.held.rollouts:
             return None
-        return measure(self.net, self.held, self._options.output, self._history, self.method.anchored)
+        return measure(self.net, self.held, self._options.output, self._history, self._options.anchored)
 
     def _save(self, step: int, seconds: float, gauge: Gauge | None) -> None:
         curve = [*self.meta["curve"], *_told(seconds, gauge)]
@@ -216,17 +225,6 @@ class _Reporter:
             self._progress(int(1000 * done), 1000, message)
 
 
-def _discard(work: Path) -> None:
-    """Remove what trainings leave in a folder, and the folder where nothing else is in it."""
-    for name in ("rollouts", "held_out"):
-        shutil.rmtree(work / name, ignore_errors=True)
-    for name in ("checkpoint", "codes"):
-        for suffix in (".npz", ".tmp"):
-            (work / name).with_suffix(suffix).unlink(missing_ok=True)
-    if work.is_dir() and not any(work.iterdir()):
-        work.rmdir()
-
-
 @contextmanager
 def _threads_beside(processes: int) -> Iterator[None]:
     """Leave a core to each process that makes rollouts."""
@@ -238,13 +236,13 @@ def _threads_beside(processes: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder) -> dict:
-    """For the card: strands of each groom, and how well their codes tell them."""
+def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:
+    """For the card: strands of each groom, and where their codes come from, or how well they tell them."""
+    strands = {"strands": [int(groom.valid.sum()) for groom in scene.grooms]}
+    if beginning:
+        return strands | {"began with": beginning.card()}
     errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]
-    return {
-        "strands": [int(groom.valid.sum()) for groom in scene.grooms],
-        "strand code error [mm]": round(float(np.mean(errors)), 2),
-    }
+    return strands | {"strand code error [mm]": round(float(np.mean(errors)), 2)}
 
 
 def _coder(scene, work: Path, options, report) -> StrandAutoencoder:

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A training that begins with what another has learned: from a model file back to torch modules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.onnx_graph import OnnxWeights
+from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.networks import StrandNet
+
+
+class Beginning:
+    """The weights of a strand model; the inverse of `export.strand_graphs`.
+
+    Args:
+        path: the model file.
+
+    Raises:
+        NeuralocksError: it is damaged, or no model for strands.
+    """
+
+    def __init__(self, path: str | Path):
+        file = model.read(path, "strands")
+        self.path, self._meta = file.path, file.meta
+        self._graphs = {name: OnnxWeights(graph, f"{path}: {name}") for name, graph in file.graphs.items()}
+
+    @property
+    def credits(self) -> list[str]:
+        """Whose data it has learned from."""
+        return list(self._meta.get("credits", []))
+
+    def card(self) -> dict:
+        """How the model came about, for the card of what begins with it."""
+        training = self._meta.get("training", {})
+        return {
+            name: training[name] for name in ("command", "minutes", "steps", "began", "began with") if name in training
+        }
+
+    def check(self, spec: BoundarySpec, options) -> None:
+        """Refuse a training whose network is of another kind than the model's.
+
+        Args:
+            spec: what the training's network reads.
+            options: of the training, with `output`, `motion`, `static` and `anchored`.
+
+        Raises:
+            NeuralocksError: the model reads or answers something else.
+        """
+        deep = self._graphs["frame.onnx"].layers
+        has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
+        has["boundary"] = BoundarySpec.from_json(self._meta.get("boundary"))
+        has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
+        wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}
+        other = [name for name, value in wanted.items() if has[name] != value]
+        if other:
+            raise NeuralocksError(
+                f"{self.path}: differs from this training in {', '.join(other)}; begin with another model, or with none"
+            )
+
+    def coder(self) -> StrandAutoencoder:
+        """The strand encoder, frozen. Its decoder, which no model file has, is of no use."""
+        layers = dict(self._graphs["encoder.onnx"].layers)
+        flat = layers.pop("flat", None)
+        coder = StrandAutoencoder(principal=flat is not None)
+        with self._fits():
+            for layer, (weight, bias) in zip(coder.encoder[::2], layers.values(), strict=True):
+                _fill(layer, weight, bias)
+            if flat is not None:  # whose bias, the mean's share, has no place of its own without a mean
+                _fill(coder.into, flat[0])
+                coder.encoder[-1].bias += torch.from_numpy(flat[1])
+        return coder.eval().requires_grad_(False)
+
+    def fill(self, net: StrandNet) -> None:
+        """Make `net`, normalised already, give the model's answers. What its normalisation left out, since it did not vary, is
+        read again: the model has learned from motion in which it did.
+        """
+        frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
+        layers = dict(frame.layers)
+        with self._fits():
+            for scale in (net.strand_scale, net.frame_scale):
+                scale[scale == 0] = 1.0
+            constant = _unfold(
+                net.strand, *self._graphs["strand.onnx"].layers["strand_part"], net.strand_mean, net.strand_scale
+            )
+            linear = layers.pop("frame_part" if net.encoder is None else "flat")
+            net.frame.bias.copy_(constant + _unfold(net.frame, *linear, net.frame_mean, net.frame_scale))
+            if net.encoder is not None:
+                first, *others = zip(net.encoder[::2], layers.values(), strict=True)
+                first[0].bias.copy_(_unfold(first[0], *first[1], net.frame_mean, net.frame_scale))
+                for layer, (weight, bias) in others:
+                    _fill(layer, weight, bias)
+            for name, layer in (("middle", net.middle), ("out", net.out)):
+                if net.motion != "modulated":
+                    _fill(layer, tail[name], tail[f"{name}.bias"])
+                    continue
+                _fill(layer, frame.constants[f"{name}.plain"], tail[f"{name}.bias"])
+                change = getattr(net, f"{name}_change")
+                _fill(change.to_terms, frame.constants[f"{name}.to_terms"])
+                _fill(change.back, frame.constants[f"{name}.back"])
+
+    @contextmanager
+    def _fits(self) -> Iterator[None]:
+        try:
+            with torch.no_grad():
+                yield
+        except (KeyError, ValueError, RuntimeError) as error:
+            fact = str(error).splitlines()[0]
+            raise NeuralocksError(
+                f"{self.path}: its network is not built as ours ({fact}); begin with another"
+            ) from None
+
+
+def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) -> None:
+    """From the (in, out) weight and the (out,) bias of a graph."""
+    layer.weight.copy_(_tensor(weight, layer.weight.T.shape).T)
+    if bias is not None:
+        layer.bias.copy_(_tensor(bias, layer.bias.shape))
+
+
+def _unfold(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray, mean: Tensor, scale: Tensor) -> Tensor:
+    """Give a layer that reads (x - mean) * scale the weight of one that reads x; returns the bias that makes both the same."""
+    weight, bias = _tensor(weight, layer.weight.T.shape).double(), _tensor(bias, layer.weight.shape[:1]).double()
+    layer.weight.copy_((weight / scale.double()[:, None]).T)
+    return (bias + mean.double() @ weight).float()
+
+
+def _tensor(array: np.ndarray, shape) -> Tensor:
+    if array.shape != tuple(shape) or not np.isfinite(array).all():
+        raise ValueError(f"{array.shape} numbers where {tuple(shape)} belong")
+    return torch.from_numpy(array)

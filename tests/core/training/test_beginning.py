@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A training that begins with a model: the same answers as the model at first, and better ones of it."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core import model
+from neuralocks_core.errors import NeuralocksError
+from tests.core.rigs import person, straight_hair
+
+torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
+onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.beginning import Beginning
+from neuralocks_core.training.export import strand_graphs
+from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.regression import RegressionOptions
+from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.train import train_strands
+
+SPEC = BoundarySpec()
+
+
+def _normalised(motion, seed):
+    """A network of random weights and inputs of any mean and size, one of which never varies."""
+    torch.manual_seed(seed)
+    net = StrandNet(SPEC.size, motion=motion)
+    strands = torch.randn(50, 70) * torch.linspace(0.1, 3, 70) + torch.randn(70)
+    frames = torch.randn(50, SPEC.size) * torch.linspace(0.01, 5, SPEC.size) + torch.randn(SPEC.size)
+    strands[:, 69], frames[:, 0] = 0.3, 0.7
+    net.set_normalisation(strands, frames, SPEC.slices["history"])
+    return net, strands, frames
+
+
+def _written(path, motion="modulated", output="direction", principal=True):
+    net, _, _ = _normalised(motion, 0)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.add_(0.05 * torch.randn_like(parameter))
+    coder = StrandAutoencoder(principal=principal)
+    coder.set_normalisation(torch.randn(100, 72))
+    meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "static": False, "output": output}
+    return model.write(path, {**meta, "credits": ["Hair: Rapunzel."]}, strand_graphs(coder, net, output))
+
+
+@pytest.mark.parametrize(("motion", "principal"), [("linear", False), ("encoder", True), ("modulated", True)])
+def test_the_network_answers_as_the_model_does(tmp_path, motion, principal):
+    """Whatever its inputs are normalised by, and to what never varied there, too."""
+    path = _written(tmp_path / "a.neuralocks", motion, principal=principal)
+    net, strands, frames = _normalised(motion, 1)
+    beginning = Beginning(path)
+    beginning.fill(net)
+    strands[:, 69], frames[:, 0] = torch.linspace(0, 1, 50), -2
+    graphs = model.read(path).graphs
+    again = strand_graphs(beginning.coder(), net, "direction")
+    shapes = 0.1 * torch.randn(9, 72).numpy()
+    codes = [_run(g["encoder.onnx"], {"shape": shapes})["code"] for g in (graphs, again)]
+    assert np.abs(codes[0] - codes[1]).max() < 1e-5 * np.abs(codes[0]).max()
+    wanted, answer = (_offsets(g, strands.numpy(), frames[:1].numpy()) for g in (graphs, again))
+    assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
+def _offsets(graphs, strands, frame):
+    edges = np.tile(np.float32([0, -0.01, 0]), (len(strands), 24))
+    inputs = {"anchor": 0 * edges, "edges": edges, **_run(graphs["strand.onnx"], {"strand": strands})}
+    return _run(graphs["tail.onnx"], inputs | _run(graphs["frame.onnx"], {"frame": frame}))["offsets"]
+
+
+def _run(graph, inputs):
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    return dict(zip([o.name for o in session.get_outputs()], session.run(None, inputs)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "spec", "differs"),
+    [
+        ({"output": "displacement"}, SPEC, "output"),
+        ({"motion": "linear", "static": True}, SPEC, "static, motion"),
+        ({}, BoundarySpec(bins=(1,) * 30), "boundary"),
+    ],
+)
+def test_a_model_of_another_kind_is_refused_before_anything_is_simulated(tmp_path, changes, spec, differs):
+    path = _written(tmp_path / "a.neuralocks")
+    scene = TrainingScene(person(), (straight_hair(),), spec=spec)
+    with pytest.raises(NeuralocksError, match=f"a.neuralocks: differs from this training in {differs};"):
+        train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1, **changes), begin=path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.neuralocks"]
+
+
+def test_damaged_and_hostile_models_are_refused(tmp_path):
+    """Graphs that are none, that lack a layer, whose numbers lie in another file or are of other sizes."""
+    path = _written(tmp_path / "a.neuralocks")
+    whole = model.read(path)
+
+    def with_frame(data):
+        return model.write(tmp_path / "b.neuralocks", whole.meta, whole.graphs | {"frame.onnx": data})
+
+    graph = onnx.load_model_from_string(whole.graphs["frame.onnx"])
+    outside, lacking, small = onnx.ModelProto(), onnx.ModelProto(), onnx.ModelProto()
+    for copy in (outside, lacking, small):
+        copy.CopyFrom(graph)
+    tensor = outside.graph.initializer[0]
+    tensor.ClearField("raw_data")
+    tensor.data_location = onnx.TensorProto.EXTERNAL
+    tensor.external_data.add(key="location", value="a.neuralocks")
+    next(node for node in lacking.graph.node if node.output[0] == "flat").output[0] = "level"
+    small.graph.initializer[0].dims[:] = [2, 2]
+    for data in (
+        b"",
+        b"no graph",
+        whole.graphs["frame.onnx"][:-5],
+        *(m.SerializeToString() for m in (outside, lacking, small)),
+    ):
+        with pytest.raises(NeuralocksError, match="b.neuralocks"):
+            Beginning(with_frame(data)).fill(StrandNet(SPEC.size, motion="modulated"))
+
+
+def test_a_training_goes_on_where_the_model_was(tmp_path):
+    """Without a step it is as good as the model; killed, it does not need the model's file; its card tells both."""
+    scene = TrainingScene(person(), (straight_hair(),), frames=40, strands=8)
+    first = RegressionOptions(steps=60, clips=16, strands=6, rate=4e-3)
+    path = train_strands(scene, tmp_path / "a.neuralocks", first, rollouts=24, credits=("Hair: Rapunzel.",))
+    still = RegressionOptions(steps=1, clips=2, strands=2, rate=0.0)
+    begun = train_strands(scene, tmp_path / "b.neuralocks", still, rollouts=4, begin=path, credits=("Motion: none.",))
+    before, after = (model.read(p).meta for p in (path, begun))
+    for name, value in before["report"]["held out"].items():
+        assert after["report"]["held out"][name] == pytest.approx(value, abs=2e-3, rel=2e-3), name
+    assert after["credits"] == ["Hair: Rapunzel.", "Motion: none."]
+    assert after["training"]["began with"]["steps"] == 60
+
+    def kill(done, total, message):
+        if "first simulations: 2" in message:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_strands(scene, tmp_path / "c.neuralocks", still, rollouts=4, begin=path, progress=kill)
+    path.unlink()
+    resumed = train_strands(scene, tmp_path / "c.neuralocks", still, rollouts=4, resume=True)
+    assert model.read(resumed).meta["report"]["held out"] == after["report"]["held out"]
+    assert not (tmp_path / "c.neuralocks.training").exists()
