@@ -32,7 +32,7 @@ app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export."
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point of `neuralocks`."""
+    """The command line, on these words or those of the process."""
     # Redirected output may be in a code page that lacks a character of a file's name: better shown as its number.
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")

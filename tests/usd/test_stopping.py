@@ -3,6 +3,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import pytest
 import typer
@@ -44,3 +46,16 @@ def test_ctrl_c_ends_a_command_whatever_it_meets(work, capsys):
     assert caught.value.code == INTERRUPTED
     assert capsys.readouterr().err == "stopped\n"
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_while_the_command_line_is_read_is_one_word():
+    code = """import sys
+class Pressed:
+    def find_spec(self, name, *_):
+        if name == "usd.cli":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Pressed())
+from usd.__main__ import main
+main()"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")
