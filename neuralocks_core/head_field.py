@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Signed distance to what stands still against the hair, the head: a grid, made once."""
 
+import hashlib
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 import numpy as np
 
 from neuralocks_core.collider import Collider
@@ -12,6 +16,27 @@ ROOM = 0.03
 EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
 MOST_NODES = 3_000_000
+
+
+def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> "HeadField":
+    """The HeadField of these, made once for all grooms of a head and for the bakes that follow."""
+    digest = hashlib.sha256()
+    for array in (points, triangles, still):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return _made(_Mesh(digest.digest(), (points, triangles, still)))
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """Arrays that are known by their digest."""
+
+    digest: bytes
+    arrays: tuple = field(compare=False, repr=False)
+
+
+@lru_cache(maxsize=4)
+def _made(mesh: _Mesh) -> "HeadField":
+    return HeadField(*mesh.arrays)
 
 
 class HeadField:

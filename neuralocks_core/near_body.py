@@ -5,7 +5,7 @@ import numpy as np
 import scipy.sparse
 
 from neuralocks_core.character import Body
-from neuralocks_core.head_field import HeadField
+from neuralocks_core.head_field import head_field
 from neuralocks_core.moving_skin import Box, PosedSkin, Skin
 
 HEAD, SKIN = 1, 2
@@ -25,7 +25,7 @@ class NearBody:
 
     def __init__(self, body: Body, to_canonical: np.ndarray, still: np.ndarray, low: np.ndarray, high: np.ndarray):
         points = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
-        self.head = HeadField(points, body.triangles, still)
+        self.head = head_field(points, body.triangles, still)
         self.box = Box(low, high)
         self.marks = np.zeros(self.box.count, np.uint8)
         # A point is never farther than 1.8 node distances from the nearest node of its own cell.

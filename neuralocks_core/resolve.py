@@ -24,6 +24,8 @@ CLAMPED = 2
 """Vertices at the root that never move."""
 STILL = 1e-3
 """Skin that moves by less than this against the head [m] stands still."""
+STEP, ROOM = 0.1, 0.1
+"""The part of the body that hair can reach, a ball, is that much larger [m]: to the next multiple of STEP, and ROOM."""
 BATCH = 2048
 """Strands looked at together."""
 PUSHED = 1024
@@ -249,15 +251,15 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
 
 
 def _within_reach(character: Character, strands: StrandSet) -> Body | None:
-    """The part of the body that the hair could touch in some pose, with room for the neck to bend."""
-    body = character.body
-    length = float(np.max(strands.length[strands.valid], initial=0.0))
-    roots = strands.rest[strands.valid, 0]
-    if not len(roots):
+    """The part of the body that the hair could touch in some pose, with room for the neck to bend: a ball about the head, in
+    steps, so that the grooms of a head share it, and what is made of it.
+    """
+    body, centre = character.body, character.head_centre
+    if not strands.valid.any():
         return None
-    points = character.canonical(body.points)
-    low, high = roots.min(axis=0), roots.max(axis=0)
-    near = np.linalg.norm(points - np.clip(points, low, high), axis=1) < length + 0.15
+    reach = np.linalg.norm(strands.rest[strands.valid, 0] - centre, axis=1) + strands.length[strands.valid]
+    radius = STEP * np.ceil(float(reach.max()) / STEP) + ROOM
+    near = np.linalg.norm(character.canonical(body.points) - centre, axis=1) < radius
     faces = body.triangles[near[body.triangles].any(axis=1)]
     if not len(faces):
         return None

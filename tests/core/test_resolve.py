@@ -155,3 +155,16 @@ def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
         one.apply(moved, run.joints[3], run.shape[3])
         results.append(moved)
     assert np.array_equal(*results) and np.abs(results[0] - 0.01).max() > 0.02, "nothing was pushed"
+
+
+def test_the_grooms_of_a_head_share_its_grid():
+    """Locks of other places and lengths; another head has its own."""
+    person, hair = rigs.person(), rigs.straight_hair()
+    joint, weight = np.full((len(HEAD.vertices), 1), person.head), np.ones((len(HEAD.vertices), 1))
+    clip = Clip(np.array([0.0, 1.0]), np.tile(person.skeleton.bind, (2, 1, 1, 1)))
+
+    def grid(size, strands):
+        body = Body(person.skeleton.bind[person.head, :3, 3] + size * HEAD.vertices, HEAD.faces, joint, weight)
+        return Resolver(Character(person.skeleton, body), hair.subset(strands), clip)._near.head
+
+    assert grid(1.0, [0, 1]) is grid(1.0, [5, 7]) is not grid(1.1, [5, 7])
