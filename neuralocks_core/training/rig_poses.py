@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random neck poses and body shapes for rigged mesh hair, with the body around the head of each (paper section 4.4)."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.collider import Collider
 from neuralocks_core.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
@@ -117,16 +121,21 @@ class PosePool:
             offsets[row][self._patch.rim[nearest]] = -1e3
         return normals, offsets
 
-    def distances(self, poses: np.ndarray, points: np.ndarray) -> np.ndarray:
+    def distances(self, poses: np.ndarray, points: np.ndarray, progress: Progress = silent) -> np.ndarray:
         """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be in it, 1 elsewhere; needs `whole`."""
         normals, offsets = self.planes(poses, points)
         near = np.einsum("nvi,nvi->nv", normals, points) - offsets < _SIEVE
         result = np.ones(near.shape)
-        for row, pose in enumerate(poses):
-            if near[row].any():
-                result[row, near[row]] = proven_distances(
-                    self.bodies[pose], self._patch.triangles, points[row][near[row]]
-                )
+
+        def measure(row: int) -> None:
+            result[row, near[row]] = proven_distances(
+                self.bodies[poses[row]], self._patch.triangles, points[row][near[row]]
+            )
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            rows = np.flatnonzero(near.any(axis=1))
+            for done, _ in enumerate(pool.map(measure, rows), 1):
+                progress(done, len(rows), "measuring what lies in the body")
         return result
 
 

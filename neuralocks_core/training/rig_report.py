@@ -42,8 +42,8 @@ def static_report(
     rigid = np.broadcast_to(no_turns(rig), turns.shape)
     few = poses[: min(optimised, count)]
     energy = RigEnergy(rig, material)
-    say(0, 3, "optimising directly, for comparison")
-    states = {"network": turns, "optimised": _optimise(energy, pool, few, gravity[few], model.max_angle, turns[few])}
+    directly = _optimise(energy, pool, few, gravity[few], model.max_angle, turns[few], within(say, 0, 300, 1000))
+    states = {"network": turns, "optimised": directly}
     states["rigid"] = rigid[: max(len(few), count // 4)]
     report = {"poses": count, "energy": {}, "energy_collision": {}}
     for name, state in states.items():
@@ -58,17 +58,18 @@ def static_report(
     off = {name: np.linalg.norm(points - tips["optimised"], axis=-1) for name, points in tips.items()}
     report["tip_error_mm"] = {name: 1e3 * float(distance.mean()) for name, distance in off.items()}
     if pool.collides:
-        say(1, 3, "measuring what lies in the body")
         rest = rest_distances(rig, rig.points)
-        outside = rest > 0
+        outside, done, whole = rest > 0, 0, sum(map(len, states.values()))
         for name, state in states.items():
+            begin, done = done, done + len(state)
+            tell = within(say, 300 + 700 * begin // whole, 300 + 700 * done // whole, 1000)
             points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(state)), rig.points, rig.weights)
-            distance = pool.distances(poses[: len(state)], points)[:, outside]
+            distance = pool.distances(poses[: len(state)], points, tell)[:, outside]
             report[f"penetration_{name}"] = depths(distance)
         report["hair_vertices"] = int(outside.sum())
         report["hair_vertices_inside_at_rest"] = int((~outside).sum())
         report["depth_at_rest_mm"] = 1e3 * float(max(0.0, -rest.min()))
-    say(3, 3, "report done")
+    say(1000, 1000, "report done")
     return report
 
 
@@ -112,15 +113,16 @@ def _ends(rig, turns: np.ndarray) -> np.ndarray:
     return bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)))
 
 
-def _optimise(energy, pool, poses, gravity, max_angle, start, steps: int = 250) -> np.ndarray:
+def _optimise(energy, pool, poses, gravity, max_angle, start, say, steps: int = 250) -> np.ndarray:
     """Turns (B, N, 4) of the lowest energy that Adam finds from the network's own answer and from rest."""
     vector = start[..., 1:] / np.sin(max_angle / 2)
     near = vector / np.sqrt(np.maximum(1 - np.sum(vector**2, axis=-1, keepdims=True), 1e-3))
     lowest, state = np.full(len(poses), np.inf), start
-    for first in (near, np.zeros_like(near)):
+    for turn, first in enumerate((near, np.zeros_like(near))):
         raw = torch.tensor(first, dtype=torch.float32, requires_grad=True)
         optimiser = torch.optim.Adam([raw], lr=0.03, betas=(0.8, 0.98))
         for step in range(steps):
+            say(turn * steps + step, 2 * steps, "optimising directly, for comparison")
             optimiser.param_groups[0]["lr"] = 0.03 * (1 - step / steps) ** 1.5 + 1e-4
             optimiser.zero_grad()
             sum(energy.parts(pool, poses, bounded_turns(raw, max_angle), gravity)).sum().backward()
