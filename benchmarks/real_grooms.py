@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real grooms on the shipped shot, from hair file to report card: how much of each the model gets right.
 
-    python benchmarks/real_grooms.py FILE... [--model MODEL] [--frames A:B]
+    python benchmarks/real_grooms.py FILE... [--model MODEL] [--frames A:B] [--train MINUTES [--begin MODEL]]
 
 Files of one folder are parts of one head of hair: they are put on the shot's head together, by the sphere through their
 roots and the one through the roots of the shot's own hair. Then come the commands that a user has: `neuralocks bake`, and
-`neuralocks evaluate --reference`, which simulates 200 strands of each file.
+`neuralocks evaluate --reference`, which simulates 200 strands of each file. With `--train`, a model is trained for each
+first, by `neuralocks train` on made-up motion, and its bake is measured.
 """
 
 from __future__ import annotations
@@ -41,20 +42,24 @@ def main() -> None:
     parser.add_argument("files", nargs="+")
     parser.add_argument("--model", help="the shipped one if left out")
     parser.add_argument("--frames", help="A:B of the shot; all if left out")
+    parser.add_argument("--train", type=float, metavar="MINUTES", help="train a model of its own for each file")
+    parser.add_argument("--begin", help="with --train: as for `neuralocks train`")
     arguments = parser.parse_args()
     print(
         "| groom | strands | length, cm | rigid: position | " + " | ".join([*COLUMNS.values(), *INSIDE.values()]) + " |"
     )
     print("| --- |" + " ---: |" * (3 + len(COLUMNS) + len(INSIDE)))
-    for row in rows(arguments.files, arguments.model, arguments.frames):
+    training = {"minutes": arguments.train, "begin": arguments.begin} if arguments.train else None
+    for row in rows(arguments.files, arguments.model, arguments.frames, training):
         print("| " + " | ".join(v if isinstance(v, str) else f"{v:.3g}" for v in row.values()) + " |", flush=True)
 
 
-def rows(paths, model=None, frames=None):
-    """Yield the numbers of each file, by column."""
+def rows(paths, model=None, frames=None, training: dict | None = None):
+    """Yield the numbers of each file, by column; with `training`, those of a model of its own."""
     from usd.bake import bake
     from usd.evaluate import evaluate
     from usd.stage import read_shot
+    from usd.train import train
 
     shot = read_shot(SHOT)
     character = shot.grooms[0].attachment.character
@@ -63,6 +68,9 @@ def rows(paths, model=None, frames=None):
         for path, groom in fitted.items():
             scene = write_scene(Path(folder) / f"{path.stem}.usda", groom, character)
             baked = Path(folder) / f"{path.stem}_hair.usdc"
+            if training:
+                own = Path(folder) / f"{path.stem}.neuralocks"
+                model = train(scene, [], [], own, {"minutes": training["minutes"]}, begin=training["begin"])
             bake(scene, baked, model, frames=frames, velocities=False)
             card = evaluate(baked, reference=True, model=model)
             measured, compared = (next(iter(part.values())) for part in (card.grooms, card.compared))

@@ -21,7 +21,8 @@ def train_command(
     begin: Annotated[
         str | None,
         typer.Option(
-            metavar="MODEL", help="Begin with what this model has learned; 'shipped': the one that comes with it."
+            metavar="MODEL",
+            help="Begin with what this model has learned, with the 'shipped' one or with 'nothing'.  [default: shipped, where it fits]",
         ),
     ] = None,
     resume: Annotated[

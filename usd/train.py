@@ -11,10 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 
 METHODS = ("rollouts", "selfsupervised")
+SHIPPED, NOTHING = "shipped", "nothing"
+"""Words for what a training begins with."""
 MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
 """Beyond these it is a slip of the finger: a hundred thousand processes take a machine down."""
 
@@ -50,7 +53,8 @@ def train(
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
         skeleton, head: as for `bake`.
-        begin: a model to begin with, "shipped" for the one that comes with it.
+        begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
+            it reads are the shipped model's.
         resume: go on with an interrupted training.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
@@ -89,13 +93,27 @@ def train(
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     history = {"spec": paper_boundary()} if paper else {}
     work_folder(out, resume=resume)
+    begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=options.seed, **history)
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
-        scene, out, options, rollouts=rollouts, processes=processes, resume=resume,
-        begin=model.shipped() if begin == "shipped" else begin,
+        scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
         credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
     )  # fmt: skip
+
+
+def _beginning(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:
+    """The model to begin with, checked before anything large is read."""
+    from neuralocks_core.training.beginning import Beginning
+    from neuralocks_core.training.regression import RegressionOptions
+
+    if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
+        return None
+    beginning = Beginning(model.shipped() if begin in (None, SHIPPED) else begin)
+    if begin is None and beginning.differences(spec, options):
+        return None
+    beginning.check(spec, options)
+    return beginning.path
 
 
 def _check_amounts(given: dict) -> None:

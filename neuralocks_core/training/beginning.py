@@ -47,25 +47,29 @@ class Beginning:
         }
 
     def check(self, spec: BoundarySpec, options) -> None:
-        """Refuse a training whose network is of another kind than the model's.
+        """Refuse a training whose network is of another kind than the model's; arguments as of `differences`.
+
+        Raises:
+            NeuralocksError: the model reads or answers something else.
+        """
+        if other := self.differences(spec, options):
+            raise NeuralocksError(
+                f"{self.path}: differs from this training in {', '.join(other)}; begin with another model, or with nothing"
+            )
+
+    def differences(self, spec: BoundarySpec, options) -> list[str]:
+        """In what the model's network is of another kind than a training's.
 
         Args:
             spec: what the training's network reads.
             options: of the training, with `output`, `motion`, `static` and `anchored`.
-
-        Raises:
-            NeuralocksError: the model reads or answers something else.
         """
         deep = self._graphs["frame.onnx"].layers
         has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
         has["boundary"] = BoundarySpec.from_json(self._meta.get("boundary"))
         has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
         wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}
-        other = [name for name, value in wanted.items() if has[name] != value]
-        if other:
-            raise NeuralocksError(
-                f"{self.path}: differs from this training in {', '.join(other)}; begin with another model, or with none"
-            )
+        return [name for name, value in wanted.items() if has[name] != value]
 
     def coder(self) -> StrandAutoencoder:
         """The strand encoder, frozen. Its decoder, which no model file has, is of no use."""
@@ -87,12 +91,11 @@ class Beginning:
         frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
         layers = dict(frame.layers)
         with self._fits():
-            for scale in (net.strand_scale, net.frame_scale):
-                scale[scale == 0] = 1.0
-            constant = _unfold(
-                net.strand, *self._graphs["strand.onnx"].layers["strand_part"], net.strand_mean, net.strand_scale
-            )
+            strand = self._graphs["strand.onnx"].layers["strand_part"]
             linear = layers.pop("frame_part" if net.encoder is None else "flat")
+            _read_again(net.strand_scale, strand)
+            _read_again(net.frame_scale, linear, *list(layers.values())[:1])
+            constant = _unfold(net.strand, *strand, net.strand_mean, net.strand_scale)
             net.frame.bias.copy_(constant + _unfold(net.frame, *linear, net.frame_mean, net.frame_scale))
             if net.encoder is not None:
                 first, *others = zip(net.encoder[::2], layers.values(), strict=True)
@@ -127,10 +130,16 @@ def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) 
         layer.bias.copy_(_tensor(bias, layer.bias.shape))
 
 
+def _read_again(scale: Tensor, *layers: tuple[np.ndarray, np.ndarray]) -> None:
+    """Inputs that the layers of the model weigh, and that a normalisation left out."""
+    weighed = np.any([(weight != 0).any(axis=1) for weight, _ in layers], axis=0)
+    scale[(scale == 0) & _tensor(weighed, scale.shape)] = 1.0
+
+
 def _unfold(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray, mean: Tensor, scale: Tensor) -> Tensor:
     """Give a layer that reads (x - mean) * scale the weight of one that reads x; returns the bias that makes both the same."""
     weight, bias = _tensor(weight, layer.weight.T.shape).double(), _tensor(bias, layer.weight.shape[:1]).double()
-    layer.weight.copy_((weight / scale.double()[:, None]).T)
+    layer.weight.copy_((weight / torch.where(scale > 0, scale, 1.0).double()[:, None]).T)
     return (bias + mean.double() @ weight).float()
 
 

@@ -43,8 +43,17 @@ def save(
     os.replace(temporary, path)
 
 
-def load(path: Path, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()) -> dict:
+def load(
+    path: Path,
+    modules: dict[str, torch.nn.Module],
+    optimisers: Sequence[torch.optim.Optimizer] = (),
+    settings: dict | None = None,
+) -> dict:
     """Fill modules (and optimisers) from a checkpoint; returns its JSON values.
+
+    Args:
+        path, modules, optimisers: as for `save`.
+        settings: must be what was saved as the JSON value of this name.
 
     Raises:
         NeuralocksError: it is damaged, or belongs to other settings.
@@ -53,12 +62,15 @@ def load(path: Path, modules: dict[str, torch.nn.Module], optimisers: Sequence[t
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(arrays["meta"].tobytes())
+        had = meta.get("settings", {})
+        if other := [name for name, value in (settings or {}).items() if had.get(name) != value]:
+            raise ValueError(f"it has other settings in {', '.join(other)}")
         for name, module in modules.items():
             prefix = f"module/{name}/"
             values = {k.removeprefix(prefix): torch.from_numpy(v) for k, v in arrays.items() if k.startswith(prefix)}
             module.load_state_dict(values)
     except (OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile) as error:
-        fact = str(error).splitlines()[0]
+        fact = "damaged" if "allow_pickle" in str(error) else str(error).splitlines()[0]
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None

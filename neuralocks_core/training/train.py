@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,7 +29,7 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.work import BEGINNING, discard, keep_beginning, work_folder
+from neuralocks_core.training.work import beginning_of, discard, keep_beginning, work_folder
 
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
@@ -78,14 +79,16 @@ def train_strands(
     options = options or RegressionOptions()
     out, work = Path(out), work_folder(out, work, resume)
     saved = work / "checkpoint.npz"
-    if not resume:
-        discard(work)
-        if begin:
-            Beginning(begin).check(scene.spec, options)
-            keep_beginning(Path(begin), work)
-    beginning = Beginning(work / BEGINNING) if (work / BEGINNING).exists() else None
+    start = beginning_of(work, begin, resume)
+    beginning = Beginning(start) if start else None
+    if beginning:
+        beginning.check(scene.spec, options)
     if not any(groom.valid.any() for groom in scene.grooms):
         raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
+    if not resume:
+        discard(work)
+        if start:
+            keep_beginning(start, work)
     report = _Reporter(progress)
     scene_out = replace(scene, held_out=True)
     count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
@@ -153,9 +156,12 @@ class _Run:
             beginning.fill(self.net)
         self.net.to(self._options.device)
         self._optimisers = self._options.optimisers(self.net)
-        self.meta = {"step": 0, "seconds": 0.0, "curve": []}
+        settings = {"method": method.name, "boundary": scene.spec.to_json(), "anchored": self._options.anchored}
+        settings |= {name: getattr(self._options, name, None) for name in ("output", "motion", "static", "optimiser")}
+        settings = json.loads(json.dumps(settings))  # tuples become lists, as in a checkpoint
+        self.meta = {"settings": settings, "step": 0, "seconds": 0.0, "curve": []}
         if resume:
-            self.meta = checkpoint.load(saved, {"net": self.net}, self._optimisers)
+            self.meta = checkpoint.load(saved, {"net": self.net}, self._optimisers, settings)
 
     def train(self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]) -> Gauge:
         """Until the budget is used; what the gauge says in the end.
@@ -210,7 +216,7 @@ class _Run:
 
     def _save(self, step: int, seconds: float, gauge: Gauge | None) -> None:
         curve = [*self.meta["curve"], *_told(seconds, gauge)]
-        self.meta = {"step": step, "seconds": seconds, "curve": curve}
+        self.meta = {**self.meta, "step": step, "seconds": seconds, "curve": curve}
         checkpoint.save(self.saved, self.meta, {"net": self.net}, self._optimisers)
 
 

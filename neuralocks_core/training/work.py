@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder beside a model in which its training keeps what it goes on from after a kill."""
 
+import filecmp
 import shutil
 from pathlib import Path
 
@@ -24,6 +25,20 @@ def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = 
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", "codes.npz", BEGINNING)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work
+
+
+def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | None:
+    """The model that a training begins with, or that a resumed one began with.
+
+    Raises:
+        NeuralocksError: the resumed one did not begin with `begin`.
+    """
+    if not resume:
+        return Path(begin) if begin else None
+    kept = work / BEGINNING if (work / BEGINNING).exists() else None
+    if begin and not (kept and Path(begin).is_file() and filecmp.cmp(kept, begin, shallow=False)):
+        raise NeuralocksError(f"{begin}: the training in {work} did not begin with it; resume without --begin")
+    return kept
 
 
 def keep_beginning(model_file: Path, work: Path) -> None:

@@ -119,6 +119,34 @@ def test_damaged_and_hostile_models_are_refused(tmp_path):
             Beginning(with_frame(data)).fill(StrandNet(SPEC.size, motion="modulated"))
 
 
+def test_a_static_network_stays_static(tmp_path):
+    net, _, _ = _normalised("modulated", 0)
+    net.frame_scale[SPEC.slices["history"]] = 0
+    coder = StrandAutoencoder()
+    meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "static": True, "output": "direction"}
+    path = model.write(tmp_path / "still.neuralocks", meta, strand_graphs(coder, net, "direction"))
+    again, _, _ = _normalised("modulated", 1)
+    again.frame_scale[SPEC.slices["history"]] = 0
+    Beginning(path).fill(again)
+    assert not again.frame_scale[SPEC.slices["history"]].any()
+
+
+def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
+    """A model that is none or does not fit is refused before an earlier training's folder is touched, and a resumed training
+    goes on with what it began with only."""
+    scene = TrainingScene(person(), (straight_hair(),))
+    work = tmp_path / "b.neuralocks.training"
+    work.mkdir()
+    (work / "checkpoint.npz").write_bytes(b"hours")
+    path = _written(tmp_path / "a.neuralocks")
+    for begin, options in ((tmp_path / "none.neuralocks", {}), (path, {"output": "displacement"})):
+        with pytest.raises(NeuralocksError, match=begin.name):
+            train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1, **options), begin=begin)
+    with pytest.raises(NeuralocksError, match="a.neuralocks: the training in .* did not begin with it"):
+        train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1), begin=path, resume=True)
+    assert (work / "checkpoint.npz").read_bytes() == b"hours"
+
+
 def test_a_training_goes_on_where_the_model_was(tmp_path):
     """Without a step it is as good as the model; killed, it does not need the model's file; its card tells both."""
     scene = TrainingScene(person(), (straight_hair(),), frames=40, strands=8)

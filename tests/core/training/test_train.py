@@ -114,3 +114,16 @@ def test_what_cannot_be_resumed_says_why(scene, tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(NeuralocksError, match="does not fit"):
         checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
+
+
+def test_a_training_is_not_resumed_with_other_settings(scene, tmp_path):
+    """Weights of another output or method fit in shape: hair would be answered wrongly, or the optimiser would break."""
+    out, tiny = tmp_path / "hair.neuralocks", {"clips": 2, "strands": 2}
+    train_strands(scene, out, RegressionOptions(steps=2, **tiny), rollouts=4, keep_work=True)
+    before = out.read_bytes()
+    for name, value in {"output": "displacement", "static": True, "optimiser": "adamw", "motion": "linear"}.items():
+        with pytest.raises(NeuralocksError, match=f"other settings in {name}"):
+            train_strands(scene, out, RegressionOptions(steps=4, **tiny, **{name: value}), rollouts=4, resume=True)
+    assert out.read_bytes() == before
+    train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True)
+    assert model.read(out).meta["training"]["steps"] == 4
