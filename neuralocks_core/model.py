@@ -94,7 +94,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
             graphs = {name: _entry(archive, entries[name], path) for name in KINDS[meta["kind"]]}
     except FileNotFoundError:
         raise NeuralocksError(
-            f"{path}: no such model file; check the path or leave --model out for the shipped one"
+            f"{path}: no such model file; check the path, or name none where the shipped one will do"
         ) from None
     except IsADirectoryError:
         raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it") from None

@@ -37,7 +37,7 @@ class StrandModel:
         self.meta = file.meta
         self.spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
         self.anchored = bool(file.meta.get("anchored", False))
-        self.threads = threads or min(os.cpu_count() or 1, 8)
+        self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")
         self._sessions = {name: graph_session(file, name) for name in model_file.KINDS["strands"]}
         read = [values.shape[-1] if values.shape else 1 for values in self._sessions["frame.onnx"].get_inputs()]
@@ -88,6 +88,11 @@ class StrandModel:
     def map(self, function: Callable, items) -> Iterable:
         """Results of calls on this model's threads, in order; a single one is made where it stands."""
         return map(function, items) if len(items) < 2 else self._pool.map(function, items)
+
+
+def cores() -> int:
+    """Threads that are worth starting: one a core, and at most eight, since each has arrays of its own."""
+    return min(os.cpu_count() or 1, 8)
 
 
 def chunks(count: int, start: int = 0) -> list[slice]:

@@ -2,7 +2,6 @@
 """Bake: a shot with a groom in, an override layer with moving hair out."""
 
 import hashlib
-import os
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.runtime import StrandModel, cores
 
 from .border import check_layer_name
 from .notes import out_of_place, out_of_range
@@ -78,7 +77,7 @@ def bake(
         resolve: push hair out of the body after the network.
         loop: the clip repeats, its last sample shows the pose of its first: hair there remembers the end of the clip.
         velocities: write velocities.
-        jobs: threads; all cores if left out.
+        jobs: threads; a core each, eight at most, if left out.
         progress: called with (done, total, message); raising from it stops the bake.
 
     Raises:
@@ -141,7 +140,7 @@ def described(shot: Shot) -> list[dict]:
 
 def _jobs(jobs: int | None) -> int:
     if jobs is None:
-        return min(os.cpu_count() or 1, 8)
+        return cores()
     if isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= 1024:
         raise NeuralocksError(f"--jobs {jobs}: must be a whole number from 1 to 1024")
     return jobs

@@ -83,15 +83,15 @@ class Baked:
         )
 
 
-def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None) -> Baked:
+def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
 
-    Grooms that have no samples beside some that do are left out, with a note.
+    Arguments are as for `bake`. Grooms that have no samples beside some that do are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
     """
-    shot = read_shot(path, grooms, skeleton, head)
+    shot = read_shot(path, grooms, skeleton, head, joints)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):
         raise NeuralocksError(

@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
 
-from .border import write_stage
+from .border import check_layer_name, write_stage
 
 ROOT = "/Body"
 SKELETON = f"{ROOT}/Rig"
@@ -26,6 +26,7 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
     Raises:
         NeuralocksError: the path has another ending or cannot be written, anny is missing or a phenotype is wrong.
     """
+    check_layer_name(Path(path))
     body = statistical_body(phenotype) if body is None else body
     return write_stage(Path(path), lambda stage: _author(stage, body))
 

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from neuralocks_core.errors import NeuralocksError
+
 from .cli_bake import bake_command, simulate_command
 from .cli_rig import app as rig_app
 from .cli_train import train_command
@@ -103,25 +105,31 @@ def evaluate_command(
     groom: Grooms = None,
     skeleton: Skeleton = None,
     head: Head = None,
-    model: Model = None,
+    joint: Joints = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="With --reference: whose answer to each pose as if held is shown, too."),
+    ] = None,
     material: Materials = None,
     plot: Annotated[
         Path | None, typer.Option(help="Also draw how the tips move, as curves (.png, .svg, .pdf).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a bake's report card. It has the material that the bake tells; give other options again, as for the bake."""
+    """Print a bake's report card. Its material is known from the bake; give --groom, --skeleton, --head and --joint again."""
     from neuralocks_core.report import check_plot
 
     from .bake import as_material
     from .evaluate import evaluate
     from .progress import progress_bar
 
+    if model is not None and not reference:
+        raise NeuralocksError("--model: its held-pose answer is shown beside the reference; add --reference")
     if plot is not None:
         check_plot(plot)
     with progress_bar("evaluating") as progress:
         card = evaluate(
-            baked, reference, grooms=groom or None, skeleton=skeleton, head=head,
+            baked, reference, grooms=groom or None, skeleton=skeleton, head=head, joints=pairs(joint, "--joint"),
             model=model, material=as_material(material) if material else None, progress=progress,
         )  # fmt: skip
     if as_json:
@@ -164,6 +172,7 @@ def export_command(
     groom: Grooms = None,
     skeleton: Skeleton = None,
     head: Head = None,
+    joint: Joints = None,
 ) -> None:
     """Unpack a model into plain ONNX files and a description of their inputs."""
     from neuralocks_core.model import shipped
@@ -171,7 +180,9 @@ def export_command(
     from .export import export_model
 
     model = model or shipped("strands")
-    for path in export_model(model, out, shot, grooms=groom, skeleton=skeleton, head=head):
+    for path in export_model(
+        model, out, shot, grooms=groom, skeleton=skeleton, head=head, joints=pairs(joint, "--joint")
+    ):
         typer.echo(str(path))
 
 

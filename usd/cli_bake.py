@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .command import note, print_json
-from .options import AsJson, Frames, Grooms, Head, Jobs, Joints, Materials, Model, Out, Skeleton, pairs
+from .options import AsJson, Frames, Grooms, Head, Jobs, Joints, Materials, Model, Out, Skeleton, Subframes, pairs
 
 
 def bake_command(
@@ -19,9 +19,11 @@ def bake_command(
     head: Head = None,
     joint: Joints = None,
     frames: Frames = None,
-    subframes: Annotated[int, typer.Option(help="Samples per frame, for motion blur.")] = 1,
+    subframes: Subframes = 1,
     material: Materials = None,
-    strength: Annotated[float, typer.Option(help="Motion strength: 0 is each pose as if held, 1 as trained.")] = 1.0,
+    strength: Annotated[
+        float, typer.Option(help="Motion strength from 0 (each pose as if held) to 4; 1 is as trained.")
+    ] = 1.0,
     resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
     loop: Annotated[
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
@@ -55,6 +57,7 @@ def simulate_command(
     skeleton: Skeleton = None,
     head: Head = None,
     frames: Frames = None,
+    subframes: Subframes = 1,
     material: Materials = None,
     strands: Annotated[
         int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
@@ -71,7 +74,7 @@ def simulate_command(
     with progress_bar("simulating") as progress:
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
-            material=material, strands=strands, volume=volume, progress=progress,
+            subframes=subframes, material=material, strands=strands, volume=volume, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
 

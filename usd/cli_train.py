@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Head, Out, Seed, Skeleton, pairs
+from .options import Head, Joints, Out, Seed, Skeleton, pairs
 
 
 def train_command(
@@ -30,6 +30,7 @@ def train_command(
     ] = False,
     skeleton: Skeleton = None,
     head: Head = None,
+    joint: Joints = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
     rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
@@ -58,7 +59,7 @@ def train_command(
     with progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
-            skeleton=skeleton, head=head, begin=begin, resume=resume, rollouts=rollouts, processes=processes,
+            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, rollouts=rollouts, processes=processes,
             credits=credit or [], keep_work=keep_work, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))

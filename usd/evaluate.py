@@ -42,6 +42,7 @@ def evaluate(
     grooms=None,
     skeleton: str | None = None,
     head: str | None = None,
+    joints: dict[str, str] | None = None,
     model=None,
     material: Material | None = None,
     progress: Progress | None = None,
@@ -51,7 +52,7 @@ def evaluate(
     Args:
         baked: path of the bake, or a `Baked` already read.
         reference: simulate the same strands and compare.
-        grooms, skeleton, head: as for `bake`.
+        grooms, skeleton, head, joints: as for `bake`.
         model: with `reference`, the model whose held-pose answer is shown beside; the shipped one if left out.
         material: what the hair is made of, for energies and reference; what each groom's bake tells if left out.
         progress: called with (done, total, message).
@@ -60,12 +61,12 @@ def evaluate(
         NeuralocksError: the file is no bake, or the reference is not installed.
     """
     if not isinstance(baked, Baked):
-        baked = read_baked(baked, grooms, skeleton, head)
+        baked = read_baked(baked, grooms, skeleton, head, joints)
     say = progress or silent
     measured, compared, curves = {}, {}, {}
     notes = list(baked.shot.notes)
     if len(baked.codes) < 3:
-        notes.append("fewer than three frames: nothing is said about motion")
+        notes.append("fewer than three frames: nothing is said about motion, and nothing is compared")
     for item in baked.shot.grooms:
         subject = _Subject(baked, item, say)
         look = material or recorded_material(item.prim) or Material()

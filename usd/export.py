@@ -59,14 +59,14 @@ SLIDERS = {
 """What an artist or a game changes, and what it does to what is above."""
 
 
-def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None) -> list[Path]:
+def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None, joints=None) -> list[Path]:
     """Write the graphs and `description.json` of a model file into a folder.
 
     Args:
         model: path of a `.neuralocks` file.
         folder: made if it does not exist; files of the same names are replaced.
         shot: a USD file; of each of its grooms, what no frame changes (`groom_tables`) is written, too.
-        grooms, skeleton, head: as for `bake`.
+        grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
         The files written, `description.json` among them.
@@ -76,9 +76,9 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     """
     file = model_file.read(model)
     folder = Path(folder)
-    if shot is None and (grooms or skeleton or head):
+    if shot is None and (grooms or skeleton or head or joints):
         raise NeuralocksError(
-            "--groom, --skeleton, --head: choose within a shot; give it with --shot, or leave them out"
+            "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
     training = {name: value for name, value in (file.meta.get("training") or {}).items() if name != "curve"}
     description = {"units": UNITS, "graphs": _graphs(file)}
@@ -99,7 +99,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     if shot is not None:
         from .groom_tables import ARRAYS, export_grooms
 
-        tables = export_grooms(shot, model, folder, grooms=grooms, skeleton=skeleton, head=head)
+        tables = export_grooms(shot, model, folder, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
         description["grooms"] = {"arrays": ARRAYS, "files": tables}
     files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
     with ExitStack() as all_or_none:

@@ -44,14 +44,14 @@ ARRAYS = {
 """Arrays of a groom's file -> what they are."""
 
 
-def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None) -> dict[str, dict]:
+def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None, joints=None) -> dict[str, dict]:
     """Write `NAME.npz` with ARRAYS of each groom of a shot.
 
     Args:
         shot: the USD file.
         model: path of the strand model.
         folder: made if it does not exist.
-        grooms, skeleton, head: as for `bake`.
+        grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
         File name -> {"prim", "strands", "joints": joint paths of head, upper chest and the pose joints}.
@@ -60,7 +60,7 @@ def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None)
         NeuralocksError: what stops a bake of the shot, or the folder cannot be written.
     """
     runner = StrandModel(model_file.read(model, "strands"))
-    read, written = read_shot(shot, grooms, skeleton, head), {}
+    read, written = read_shot(shot, grooms, skeleton, head, joints), {}
     for item in read.grooms:
         stem = re.sub(r"\W+", "_", item.path.strip("/"))
         name = f"{stem}.npz" if f"{stem}.npz" not in written else f"{stem}_{len(written)}.npz"

@@ -25,6 +25,7 @@ Frames = Annotated[
     str | None,
     typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out."),
 ]
+Subframes = Annotated[int, typer.Option("--subframes", help="Samples per frame, at most 64, for motion blur.")]
 Materials = Annotated[
     list[str] | None,
     typer.Option(
@@ -35,7 +36,9 @@ Materials = Annotated[
 ]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of everything random.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", help="Threads; all cores if left out. The result is the same.")]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", help="Threads; a core each, eight at most, if left out. The result is the same.")
+]
 
 
 def pairs(words: list[str] | None, option: str) -> dict[str, str]:

@@ -17,8 +17,10 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 def recorded(prim: Usd.Prim) -> dict:
     """What `record` wrote, empty where nothing did."""
-    facts = prim.GetCustomDataByKey(KEY)
-    return facts if isinstance(facts, dict) else {}
+    # The strongest layer's alone: composed, a bake over another one would tell a mixture of both.
+    told = (spec.customData[KEY] for spec in prim.GetPrimStack() if KEY in spec.customData)
+    facts = next(told, None)
+    return dict(facts) if isinstance(facts, dict) else {}
 
 
 def recorded_material(prim: Usd.Prim) -> Material | None:

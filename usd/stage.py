@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A shot: any stage with animated skeletons and BasisCurves grooms, read into core types."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +117,9 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
     for rig in used:
         _check_animated([rig])
-        notes += rig.notes + rig_notes(rig)
+        notes += rig.notes
+    for item in found:
+        notes += rig_notes(replace(item.attachment.rig, character=item.attachment.character))
     first, last = frame_range(stage, used)
     return Shot(
         path=path,
@@ -133,7 +135,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
 
 @names_damage
 def read_rigs(
-    path, skeleton: str | None = None, head: str | None = None, *, all_shapes: bool = True
+    path, skeleton: str | None = None, head: str | None = None, joints: dict[str, str] | None = None
 ) -> tuple[StageRig, ...]:
     """The characters and motion of a file, without grooms and whether animated or not.
 
@@ -141,10 +143,10 @@ def read_rigs(
         path: a USD file.
         skeleton: prim path of the one wanted; all if left out.
         head: joint that is the head, where its name does not tell.
-        all_shapes: keep blend shapes that no animation uses.
+        joints: semantic joint -> joint, where names do not tell.
     """
     stage = open_stage(path)
-    return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=all_shapes))
+    return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints))
 
 
 def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:

@@ -33,6 +33,7 @@ def train(
     paper: bool = False,
     skeleton: str | None = None,
     head: str | None = None,
+    joints: dict[str, str] | None = None,
     begin: str | Path | None = None,
     resume: bool = False,
     rollouts: int = 1200,
@@ -52,7 +53,7 @@ def train(
             `training.selfsupervised.SelfSupervisedOptions`; values may be words.
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
-        skeleton, head: as for `bake`.
+        skeleton, head, joints: as for `bake`.
         begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
             it reads are the shipped model's.
         resume: go on with an interrupted training.
@@ -94,7 +95,9 @@ def train(
     history = {"spec": paper_boundary()} if paper else {}
     work_folder(out, resume=resume)
     begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)
-    scene = training_scene(character, grooms, motion, skeleton=skeleton, head=head, seed=options.seed, **history)
+    scene = training_scene(
+        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, **history
+    )
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,

@@ -34,6 +34,7 @@ def training_scene(
     *,
     skeleton: str | None = None,
     head: str | None = None,
+    joints: dict[str, str] | None = None,
     seed: int = 0,
     **settings,
 ) -> TrainingScene:
@@ -46,13 +47,14 @@ def training_scene(
         motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
         skeleton: prim path of the skeleton wanted, where there are several.
         head: joint that is the head, where its name does not tell.
+        joints: semantic joint -> joint, where names do not tell.
         seed: of everything random.
         **settings: further fields of TrainingScene.
 
     Raises:
         NeuralocksError: a file cannot be used, or there is no hair.
     """
-    rig = read_rigs(character, skeleton, head)[0]
+    rig = read_rigs(character, skeleton, head, joints)[0]
     if "head" not in rig.character.humanoid:
         raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
     found: list[StrandSet] = []

@@ -8,7 +8,7 @@ WORDS = (
     ),
     (" (neuralocks rig train)", " (Train for This Character)"),
     ("see neuralocks inspect for their names", "look at the armature for their names"),
-    ("leave --model out for the shipped one", "leave Model empty for the shipped one"),
+    ("name none where the shipped one will do", "leave Model empty for the shipped one"),
     ("or give --model", "or choose another model"),
     ("name it with --head JOINT", "choose it as Head bone"),
     ("use a narrower pattern or another --head", "use a narrower pattern or another Head bone"),

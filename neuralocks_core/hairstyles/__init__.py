@@ -99,7 +99,6 @@ def _site(style: loose.Loose | tied.Tied, scalp: Scalp, count: int, random: np.r
     return Site(
         roots=roots,
         seen=seen,
-        clump=nearest,
         guide=guides[nearest],
         of_clump=random.random((clumps, 4))[nearest],
         own=random.random((count, 4)),

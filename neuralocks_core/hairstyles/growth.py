@@ -22,8 +22,6 @@ class Site:
     """Places and normals."""
     seen: np.ndarray
     """(S, 3) place from the head's centre, in head radii: +X the left, +Y up, +Z the face."""
-    clump: np.ndarray
-    """(S,) int, number of the clump."""
     guide: np.ndarray
     """(S,) int, the strand that leads the clump."""
     of_clump: np.ndarray
@@ -34,7 +32,7 @@ class Site:
     def rows(self, part: slice) -> Site:
         """Some of the strands; `guide` still counts all of them."""
         roots = Roots(self.roots.place[part], self.roots.normal[part], self.roots.border[part])
-        rest = (getattr(self, field)[part] for field in ("seen", "clump", "guide", "of_clump", "own"))
+        rest = (getattr(self, field)[part] for field in ("seen", "guide", "of_clump", "own"))
         return Site(roots, *rest)
 
     def along_scalp(self, direction: np.ndarray) -> np.ndarray:

@@ -27,8 +27,6 @@ class Floor:
     """The same over all strands together: those that came to rest elsewhere weigh most."""
     position_percent: float
     """Mean distance in percent of strand length."""
-    position_median_percent: float
-    """Median over strands and frames of the same."""
 
 
 def stateless_floor(
@@ -82,6 +80,5 @@ def stateless_floor(
             progress(i + 1, len(frames), "restarting")
     length = np.linalg.norm(np.diff(rest, axis=1), axis=-1).sum(1)
     error = motion_error(forgetful - rest, truth[frames] - rest, length)
-    gap = np.linalg.norm(forgetful - truth[frames], axis=-1).mean(-1) / length
     position = position_error(forgetful - rest, truth[frames] - rest, length)
-    return Floor(history, frames, error["median"], error["rms"], position, float(100 * np.median(gap)))
+    return Floor(history, frames, error["median"], error["rms"], position)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random neck poses and body shapes for rigged mesh hair, with the body around the head of each (paper section 4.4)."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,6 +13,7 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
+from neuralocks_core.runtime import cores
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Most nod, turn and tilt of the head against the chest that people have [rad]."""
@@ -132,7 +132,7 @@ class PosePool:
                 self.bodies[poses[row]], self._patch.triangles, points[row][near[row]]
             )
 
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
             rows = np.flatnonzero(near.any(axis=1))
             for done, _ in enumerate(pool.map(measure, rows), 1):
                 progress(done, len(rows), "measuring what lies in the body")

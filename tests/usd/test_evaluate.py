@@ -15,6 +15,7 @@ from usd.cli import main
 from usd.demo import demo, shipped_shot
 from usd.evaluate import evaluate
 from usd.inspect import inspect
+from usd.recorded import record, recorded
 
 from .shots import Recipe, write_shot
 
@@ -134,3 +135,21 @@ def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
             evaluate(above)
         assert evaluate(above, material=soft).to_json() == given
         prim.ClearCustomDataByKey("neuralocks:material")
+
+
+def test_a_bake_over_a_bake_tells_of_itself_alone(tmp_path, model):
+    """USD composes dictionaries of all layers into one: what the lower bake was made with would shine through."""
+    bake(write_shot(tmp_path), tmp_path / "hair.usdc", model, material=Material(bend=4e-4))
+    below = Sdf.Layer.FindOrOpen(str(tmp_path / "hair.usdc"))
+    record(below.GetPrimAtPath("/Hero/Hair"), {"solver": "rods"})
+    below.Save()
+    bake(tmp_path / "hair.usdc", tmp_path / "over.usdc", model)
+    stage = Usd.Stage.Open(str(tmp_path / "over.usdc"))
+    told = recorded(stage.GetPrimAtPath("/Hero/Hair"))
+    assert "solver" not in told and told["material"]["bend"] == Material().bend
+
+
+def test_a_model_without_a_reference_is_refused(rigid, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["evaluate", str(rigid), "--model", "strands.neuralocks"])
+    assert ended.value.code == 1 and "--reference" in capsys.readouterr().err

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mean of a model and of one that began with it: often better than both, where a longer training with larger steps has
+left the valley of the first.
+
+    python benchmarks/mean_model.py MODEL BEGUN SHARE -o OUT
+
+SHARE is BEGUN's, from 0 to 1. Strand codes are those of both, the card is BEGUN's and says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import torch
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("begun", type=Path)
+    parser.add_argument("share", type=float)
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    print(mean(**vars(parser.parse_args())))
+
+
+def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
+    """Write the model whose weights are (1 - share) of `model`'s and `share` of `begun`'s."""
+    from neuralocks_core import model as model_file
+    from neuralocks_core.boundary import BoundarySpec
+    from neuralocks_core.training.beginning import Beginning
+    from neuralocks_core.training.export import strand_graphs
+    from neuralocks_core.training.networks import StrandNet
+
+    meta = model_file.read(begun, "strands").meta
+    spec = BoundarySpec.from_json(meta["boundary"])
+    first, second = (StrandNet(spec.size, motion=meta["training"]["options"]["motion"]) for _ in range(2))
+    Beginning(model).fill(first)
+    Beginning(begun).fill(second)
+    with torch.no_grad():
+        for ours, theirs in zip(first.parameters(), second.parameters(), strict=True):
+            ours.lerp_(theirs, share)
+    training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of those that it began with"}
+    graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
+    return model_file.write(out, {**meta, "training": training}, graphs)
+
+
+if __name__ == "__main__":
+    main()
