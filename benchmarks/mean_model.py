@@ -4,7 +4,8 @@ left the valley of the first.
 
     python benchmarks/mean_model.py MODEL BEGUN SHARE -o OUT
 
-SHARE is BEGUN's, from 0 to 1. Strand codes are those of both, the card is BEGUN's and says so.
+SHARE is BEGUN's, from 0 to 1. Strand codes are those of both. The card is BEGUN's and says so, without what was measured of
+BEGUN.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
             ours.lerp_(theirs, share)
     training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of those that it began with"}
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
-    return model_file.write(out, {**meta, "training": training}, graphs)
+    return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
 
 
 if __name__ == "__main__":

@@ -33,15 +33,15 @@ def main() -> None:
     print("| minutes | of | motion error | position | droop |\n| ---: | ---: | ---: | ---: | ---: |")
     for path in arguments.models:
         training = model.read(path, "strands").meta["training"]
-        rows, budget = training["curve"], training["minutes"]
+        rows = training["curve"]
         minutes = np.array([row["minutes"] for row in rows])
         for axis, (name, label) in zip(axes, SHOWN.items()):
-            axis.plot(minutes, [row[name] for row in rows], label=f"{budget:.0f} minutes, {training['steps']} steps")
+            axis.plot(minutes, [row[name] for row in rows], label=f"{minutes[-1]:.0f} minutes")
             axis.set(xlabel="minutes", ylabel=label)
             axis.grid(alpha=0.3)
         for share in (0.1, 0.25, 0.5, 0.75, 1.0):
             row = rows[int(np.abs(minutes - share * minutes[-1]).argmin())]
-            cells = f"{row['minutes']:.1f} | {budget:.0f} | {row['motion']:.2f} | {row['position']:.1f} | {row['droop']:.2f}"
+            cells = f"{row['minutes']:.1f} | {minutes[-1]:.0f} | {row['motion']:.2f} | {row['position']:.1f} | {row['droop']:.2f}"
             print(f"| {cells} |")
     axes[0].legend(frameon=False)
     figure.savefig(arguments.out, dpi=110)
