@@ -6,7 +6,7 @@
 Files of one folder are parts of one head of hair: they are put on the shot's head together, by the sphere through their
 roots and the one through the roots of the shot's own hair. Then come the commands that a user has: `neuralocks bake`, and
 `neuralocks evaluate --reference`, which simulates 200 strands of each file. With `--train`, a model is trained for each
-first, by `neuralocks train` on made-up motion, and its bake is measured.
+first, by `neuralocks train` on made-up motion, and its bake is measured; `--begin nothing` leaves out the shipped model.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ def main() -> None:
     parser.add_argument("--train", type=float, metavar="MINUTES", help="train a model of its own for each file")
     parser.add_argument("--begin", help="with --train: as for `neuralocks train`")
     arguments = parser.parse_args()
+    if arguments.begin and not arguments.train:
+        parser.error("--begin goes with --train")
     print(
         "| groom | strands | length, cm | rigid: position | " + " | ".join([*COLUMNS.values(), *INSIDE.values()]) + " |"
     )

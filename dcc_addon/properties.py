@@ -250,7 +250,11 @@ class SceneSettings(bpy.types.PropertyGroup):
         **FILE,
     )
     train_minutes: FloatProperty(
-        name="Minutes", description="How long a training may take", default=15.0, min=0.05, max=720.0
+        name="Minutes",
+        description="How long a training may take; hair begins with what the shipped model has learned, so that five are worth it",
+        default=15.0,
+        min=0.05,
+        max=720.0,
     )
 
 
