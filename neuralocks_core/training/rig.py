@@ -24,6 +24,8 @@ _ROOM = 0.01
 """Kept from the body over the material's margin while learning [m]: the network sees neither the body's shape nor its arms,
 nor can it hit the mark to the millimetre, and so goes less deep into the body."""
 _RATE = 3e-3
+_LEARNING = 600
+"""Thousandths of the work that are learning, as by default; the rest is the report."""
 
 
 def train_static(
@@ -68,7 +70,7 @@ def train_static(
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
     for state in descend(muon(net, _RATE, 0.0), losses, schedule):
-        say(int(850 * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
+        say(int(_LEARNING * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
     training = {
         "method": "quasi-static, self-supervised",
         "steps": state.step,
@@ -80,5 +82,7 @@ def train_static(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, 850, 1000, 1000)))
+        model.report.update(
+            static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000, 1000))
+        )
     return model
