@@ -70,6 +70,7 @@ def train(
     if paper and method != "selfsupervised":
         raise NeuralocksError("--paper: goes with --method selfsupervised only; add it, or leave --paper out")
     try:
+        import onnx  # noqa: F401  (reads and writes models)
         import torch
         import warp  # noqa: F401  (the solver's)
     except ImportError as error:

@@ -13,7 +13,7 @@ def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
     if "--check" in sys.argv:
         try:
-            for needed in ("torch", "warp", "usd.train"):
+            for needed in ("torch", "warp", "onnx", "usd.train"):
                 importlib.import_module(needed)
         except ImportError as error:
             print(f"it lacks '{error.name}'", file=sys.stderr)
