@@ -161,7 +161,7 @@ def test_a_training_goes_on_where_the_model_was(tmp_path):
     assert after["training"]["began with"]["steps"] == 60
 
     def kill(done, total, message):
-        if "first simulations: 2" in message:
+        if "first simulations" in message:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

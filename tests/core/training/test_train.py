@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training on rollouts: repeatable material, hair that learns to move, runs that survive a kill."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -84,10 +86,11 @@ def test_a_killed_run_goes_on(scene, tmp_path):
     work = tmp_path / "hair.neuralocks.training"
     short = RegressionOptions(steps=40, clips=8, strands=4)
     made = {}
-    for resume, moment in ((False, "first simulations: 2"), (True, "motion error")):
+    # How many simulations came since the last look is the machine's business.
+    for resume, moment in ((False, r"first simulations: ([2-9]|1\d|2\d)"), (True, "motion error")):
 
         def kill(done, total, message, moment=moment):
-            if moment in message:
+            if re.search(moment, message):
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
