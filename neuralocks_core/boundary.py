@@ -19,6 +19,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import SEMANTIC
 from neuralocks_core.measures import MEASURES, body_measures
 from neuralocks_core.motion import GRAVITY, Clip, G
+from neuralocks_core.track import Track
 
 POSE_JOINTS = ("neck", "upper_chest", "left_shoulder", "right_shoulder", "left_upper_arm", "right_upper_arm")
 MATERIALS = 4
@@ -124,9 +125,8 @@ class BoundarySpec:
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
-    Joint motion between samples comes from a C2 spline through the clip, so that a 24 fps shot has the accelerations of
-    the motion and not those of its polyline. Before the clip the head goes on with its first velocity and does not
-    turn; a loop is continued on both sides.
+    Motion between samples, before and after the clip is that of `Track`; after a cut, that of the part of the clip by
+    itself.
 
     Attributes:
         joints: joint indices of the head, the upper chest and the pose joints (n + 2,).
@@ -141,9 +141,6 @@ class BoundarySampler:
     """Largest angular velocity that is passed on [rad/s]."""
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
-        # Here, because it takes as long to import as all else that a runtime needs.
-        from scipy.interpolate import CubicSpline
-
         self.spec, self.character, self.clip = spec, character, clip
         humanoid = character.humanoid
         self.joints = [
@@ -152,19 +149,9 @@ class BoundarySampler:
             *(humanoid.nearest(n) for n in spec.pose_joints),
         ]
         self.stance = np.stack([_stance(character, name) for name in spec.pose_joints])
-        times, joints = _extended(clip)
-        rotations = character.relative_rotations(joints, self.joints)
-        quaternions = rotation.to_quaternion(rotations)
-        flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
-        quaternions[1:] *= flips[..., None]
-        values = np.concatenate([joints[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
-        self._start, self._end = times[0], times[-1]
-        if len(times) == 1:
-            self._spline = lambda t: np.broadcast_to(values[0], (len(t), values.shape[1])).copy()
-            self._speeds = np.zeros((2, 3))
-        else:
-            self._spline = CubicSpline(times, values, bc_type="natural")
-            self._speeds = self._spline(times[[0, -1]], 1)[:, :3]
+        parts = clip.parts if spec.bins else [clip]
+        self._cuts = np.array([part.start for part in parts[1:]])
+        self._tracks = [Track(character, part, self.joints) for part in parts]
         self._bin_weights = spec.bin_weights
         self._shape_cache: dict[bytes, np.ndarray] = {}
 
@@ -182,8 +169,7 @@ class BoundarySampler:
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
         lags = spec.dt * np.arange(spec.steps + 2)
-        position, turns = self._sample((times[:, None] - lags).ravel())
-        position, turns = position.reshape(len(times), -1, 3), turns.reshape(len(times), len(lags), -1, 3, 3)
+        position, turns = self._sample(times, lags)
         now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)
         result = np.zeros((len(times), spec.size), np.float32)
         parts = spec.slices
@@ -216,22 +202,19 @@ class BoundarySampler:
             self._shape_cache[key] = body_measures(self.character, shape)
         return self._shape_cache[key]
 
-    def _sample(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Head positions (m, 3) and rotations (m, n, 3, 3) of the joints read."""
-        if self.clip.loop:
-            base = self.clip.wrapped(times)
-            laps = np.round((times - base) / max(self.clip.end - self.clip.start, 1e-9))
-            values = self._spline(base)
-            drift = self.clip.joints[-1, self.character.head, :3, 3] - self.clip.joints[0, self.character.head, :3, 3]
-            position = values[:, :3] + laps[:, None] * drift
-        else:
-            base = np.clip(times, self._start, self._end)
-            values = self._spline(base)
-            outside = times - base
-            position = values[:, :3] + outside[:, None] * np.where(
-                outside[:, None] < 0, self._speeds[0], self._speeds[1]
-            )
-        return position, rotation.from_quaternion(values[:, 3:].reshape(len(times), -1, 4))
+    def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) and so long before them (L,), as if
+        there had been nothing before the last cut.
+        """
+        position = np.empty((len(times), len(lags), 3))
+        turns = np.empty((len(times), len(lags), len(self.joints), 3, 3))
+        part = np.searchsorted(self._cuts - 1e-9, times, side="right")
+        for one in np.unique(part):
+            rows = part == one
+            places, rotations = self._tracks[one].at((times[rows, None] - lags).ravel())
+            position[rows] = places.reshape(-1, len(lags), 3)
+            turns[rows] = rotations.reshape(-1, len(lags), len(self.joints), 3, 3)
+        return position, turns
 
     def _history(self, position, turns, static) -> np.ndarray:
         """(n, per_bin * bins): means over the bins, newest first, tapered."""
@@ -273,17 +256,3 @@ def _stance(character: Character, name: str) -> np.ndarray:
 def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors * np.minimum(1.0, limit / np.maximum(length, 1e-9))
-
-
-def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is
-    smooth.
-    """
-    if not clip.loop or len(clip.times) < 3:
-        return clip.times, clip.joints
-    pad = min(len(clip.times) - 1, 8)
-    period = clip.end - clip.start
-    drift = np.zeros((clip.joints.shape[1], 4, 4))
-    drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
-    times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])
-    return times, np.concatenate([clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift])

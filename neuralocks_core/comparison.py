@@ -55,7 +55,7 @@ def simulated(
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
 
-    It runs at its own step from the first time on and is interpolated in between.
+    It runs at its own step from the first time on, and anew from each cut, and is interpolated in between.
 
     Args:
         character: with its body.
@@ -70,15 +70,27 @@ def simulated(
     Raises:
         NeuralocksError: the solver is not installed, or would take more than MOST_STEPS.
     """
-    from neuralocks_core.reference import simulate
-
     steps = np.ceil((times[-1] - times[0]) / STEP - 1e-9)
     if not steps <= MOST_STEPS:
         raise NeuralocksError(
             f"frames: the solver goes from {times[0]:g} s to {times[-1]:g} s, {steps:g} steps where {MOST_STEPS} are "
             "the most; choose frames near the animation, or fewer"
         )
-    clock = times[0] + STEP * np.arange(int(steps) + 1)
+    parts = clip.parts
+    part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
+    options = {"substeps": substeps, "volume": volume, "progress": progress}
+    result = np.empty((len(times), *strands.rest.shape), np.float32)
+    for i in np.unique(part):
+        start = parts[i].start if i else times[0]
+        result[part == i] = _from(start, character, strands, parts[i], times[part == i], material, **options)
+    return result
+
+
+def _from(start: float, character, strands, clip, times, material, **options) -> np.ndarray:
+    """What `simulated` gives, of a clip without cuts and with hair at rest at `start` [s]."""
+    from neuralocks_core.reference import simulate
+
+    clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 1)
     joints, shapes = clip.at(clock), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
@@ -93,13 +105,11 @@ def simulated(
         triangles,
         material or Material(),
         dt=STEP,
-        substeps=substeps,
-        volume=volume,
         neighbours=lock_mates(strands.rest, strands.lock),
         bind_body=bind,
-        progress=progress,
+        **options,
     )
-    place = np.clip((times - times[0]) / STEP, 0, len(clock) - 1)
+    place = np.clip((times - start) / STEP, 0, len(clock) - 1)
     low = np.minimum(place.astype(int), max(len(clock) - 2, 0))
     part = (place - low)[:, None, None, None].astype(np.float32)
     high = np.minimum(low + 1, len(clock) - 1)

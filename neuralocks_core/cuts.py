@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cuts in a clip: where a character is put elsewhere from one sample to the next, and its hair must not feel the way."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from neuralocks_core.motion import Clip
@@ -14,13 +12,15 @@ _TURN = np.radians(72.0)
 """The same for the joint's rotation [rad]."""
 _LONGEST = 0.1
 """Longer steps [s] are no cuts: in that time people may come anywhere."""
+_APART = 0.2
+"""Steps that would be cuts, but have another one nearer [s], are none: motion too fast for its rate, or stepped animation."""
 
 
 def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     """Times (C,) [s] of the first sample after each cut, judged by one joint of a clip, the head.
 
-    A step is a cut if neither the motion before nor the motion after it explains it. Two steps in a row are none: that is
-    one damaged sample, or motion too fast for its rate.
+    A step is a cut if neither the motion before nor the motion after it explains it. Several in a row are none: those are
+    damaged samples, or motion too fast for its rate.
     """
     times = clip.times
     if len(times) < 3 or clip.loop:
@@ -38,15 +38,9 @@ def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     fling[0, 1:] = angle[1:] - angle[:-1] * span[1:] / span[:-1]
     fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
     jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)
-    alone = jumped & ~np.r_[False, jumped[:-1]] & ~np.r_[jumped[1:], False]
-    return times[1:][alone]
-
-
-def parts_of(clip: Clip, cuts) -> list[Clip]:
-    """A clip as parts, each from one cut (the time [s] of its first sample) up to the next."""
-    starts = np.searchsorted(clip.times, np.asarray(cuts, float) - 1e-9)
-    bounds = np.unique(np.concatenate([[0], starts[(starts > 0) & (starts < len(clip.times))], [len(clip.times)]]))
-    return [
-        replace(clip, times=clip.times[a:b], joints=clip.joints[a:b], shape=clip.shape[a:b])
-        for a, b in zip(bounds[:-1], bounds[1:])
-    ]
+    found = np.flatnonzero(jumped)
+    crowded = (np.diff(found) == 1) | (np.diff(times[1:][found]) < _APART)
+    alone = np.ones(len(found), bool)
+    alone[1:] &= ~crowded
+    alone[:-1] &= ~crowded
+    return times[1:][found[alone]]

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A clip of body motion, and its value at any time."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,18 +32,22 @@ class Clip:
         shape: blend shape weights, (T, B) or (T, 0).
         loop: whether the motion repeats, the last sample showing the pose of the first; history is then taken modulo the
             period.
+        cuts: times [s] of the first sample after each cut, ascending, (C,): no history reaches back over one. A loop has
+            none that count.
     """
 
     times: np.ndarray
     joints: np.ndarray
     shape: np.ndarray = None
     loop: bool = False
+    cuts: np.ndarray = ()
 
     def __post_init__(self):
         object.__setattr__(self, "times", np.asarray(self.times, float))
         object.__setattr__(self, "joints", np.asarray(self.joints, float))
         shape = np.zeros((len(self.times), 0)) if self.shape is None else np.asarray(self.shape, float)
         object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "cuts", np.asarray(self.cuts, float))
         count = len(self.times)
         if not count:
             raise NeuralocksError("animation: it has no samples; animate the skeleton over the frames to bake")
@@ -70,6 +76,18 @@ class Clip:
     def end(self) -> float:
         """Last sample time [s]."""
         return float(self.times[-1])
+
+    @property
+    def parts(self) -> list[Clip]:
+        """The clip from each cut up to the next; itself where there is none."""
+        if self.loop or not len(self.cuts):
+            return [self]
+        starts = np.searchsorted(self.times, self.cuts - 1e-9)
+        bounds = np.unique([0, *starts[starts < len(self.times)], len(self.times)])
+        return [
+            replace(self, times=self.times[a:b], joints=self.joints[a:b], shape=self.shape[a:b], cuts=())
+            for a, b in zip(bounds[:-1], bounds[1:])
+        ]
 
     def at(self, times) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) at any times (n,) [s].

@@ -15,6 +15,7 @@ from neuralocks_core.runtime import StrandModel, cores
 from .border import check_layer_name
 from .notes import out_of_place, out_of_range
 from .posing import GroomPoser
+from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .time_codes import time_codes
@@ -56,6 +57,7 @@ def bake(
     strength: float = 1.0,
     resolve: bool = True,
     loop: bool = False,
+    cuts=None,
     velocities: bool = True,
     jobs: int | None = None,
     progress: Progress | None = None,
@@ -76,6 +78,7 @@ def bake(
         strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
         resolve: push hair out of the body after the network.
         loop: the clip repeats, its last sample shows the pose of its first: hair there remembers the end of the clip.
+        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
         velocities: write velocities.
         jobs: threads; a core each, eight at most, if left out.
         progress: called with (done, total, message); raising from it stops the bake.
@@ -91,22 +94,27 @@ def bake(
     look = as_material(material)
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints)
+    if cuts and loop:
+        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {
         "model": _digest(strand_model),
         "material": look.log_ratios().tolist(),
-        "carried": [skeleton, head, joints or {}],
+        "carried": [skeleton, head, joints or {}, cuts],
     }
 
     def poser(item: StageGroom) -> GroomPoser:
         return GroomPoser(item, strand_model, look, **options)
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
+    facts |= cut_facts(cuts)
     resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
+    if cuts is None and not loop and strand_model.spec.bins:
+        notes += [text for rig in shot.rigs for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

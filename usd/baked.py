@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.film import Scene
 
 from .border import transformed
+from .recorded import recorded_cuts
 from .stage import Shot, StageGroom, read_shot
 
 MOST_BODY_POINTS = 400_000
@@ -92,6 +93,9 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
         NeuralocksError: it cannot be read, or no groom has samples.
     """
     shot = read_shot(path, grooms, skeleton, head, joints)
+    cuts = recorded_cuts([item.prim for item in shot.grooms])
+    if cuts is not None:
+        shot = read_shot(path, grooms, skeleton, head, joints, cuts)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):
         raise NeuralocksError(

@@ -11,7 +11,7 @@ import typer
 
 from neuralocks_core.errors import NeuralocksError
 
-from .cli_bake import bake_command, simulate_command
+from .cli_bake import bake_command, join_command, simulate_command
 from .cli_rig import app as rig_app
 from .cli_train import train_command
 from .command import command_of, note, print_json
@@ -28,6 +28,7 @@ app = typer.Typer(
 
 command = command_of(app)
 command("bake")(bake_command)
+command("join")(join_command)
 command("simulate")(simulate_command)
 command("train")(train_command)
 app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
@@ -237,5 +238,5 @@ def demo_command(
         typer.echo(f"{name}: {path}{took}")
 
 
-_IN_ORDER = "demo inspect bake preview evaluate simulate import grow body train export".split()
+_IN_ORDER = "demo inspect bake join preview evaluate simulate import grow body train export".split()
 app.registered_commands.sort(key=lambda each: _IN_ORDER.index(each.name))  # of first need, as help lists them

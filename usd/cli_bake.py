@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`neuralocks bake` and `neuralocks simulate`."""
+"""`neuralocks bake`, `neuralocks join` and `neuralocks simulate`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +7,22 @@ from typing import Annotated
 import typer
 
 from .command import note, print_json
-from .options import AsJson, Frames, Grooms, Head, Jobs, Joints, Materials, Model, Out, Skeleton, Subframes, pairs
+from .options import (
+    AsJson,
+    Cuts,
+    Frames,
+    Grooms,
+    Head,
+    Jobs,
+    Joints,
+    Materials,
+    Model,
+    Out,
+    Skeleton,
+    Subframes,
+    cut_codes,
+    pairs,
+)
 
 
 def bake_command(
@@ -28,6 +43,7 @@ def bake_command(
     loop: Annotated[
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
     ] = False,
+    cuts: Cuts = None,
     velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -35,7 +51,8 @@ def bake_command(
     """Bake moving hair into a layer that goes over the shot.
 
     The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back. A bake
-    that was stopped goes on where it was when the same command is given again.
+    that was stopped goes on where it was when the same command is given again. Machines of a farm bake parts of the
+    range with --frames; neuralocks join makes one bake of them.
     """
     from .bake import bake
     from .progress import progress_bar
@@ -44,10 +61,32 @@ def bake_command(
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
-            resolve=resolve, loop=loop, velocities=velocities,
+            resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
             jobs=jobs, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
+
+
+def join_command(
+    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of a shot's range, in any order.")],
+    out: Out,
+    as_json: AsJson = False,
+) -> None:
+    """Make one bake out of those of parts of a shot's range, as the machines of a farm write them.
+
+    The file is the same, byte for byte, as if all frames had been baked at once.
+    """
+    from .join import join
+    from .progress import progress_bar
+
+    with progress_bar("joining") as progress:
+        result = join(parts, out, progress=progress)
+    note(result.notes)
+    if as_json:
+        print_json(vars(result) | {"path": str(result.path)})
+    else:
+        first, last = result.frames[0], result.frames[-1]
+        typer.echo(f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} of {len(parts)} parts")
 
 
 def simulate_command(
@@ -62,6 +101,7 @@ def simulate_command(
     strands: Annotated[
         int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
     ] = None,
+    cuts: Cuts = None,
     volume: Annotated[
         float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
     ] = 0.0,
@@ -74,7 +114,8 @@ def simulate_command(
     with progress_bar("simulating") as progress:
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
-            subframes=subframes, material=material, strands=strands, volume=volume, progress=progress,
+            subframes=subframes, material=material, strands=strands, volume=volume, cuts=cut_codes(cuts),
+            progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
 

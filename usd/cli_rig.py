@@ -11,7 +11,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 
 from .command import command_of, note, print_json
-from .options import AsJson, Head, Seed, Skeleton
+from .options import AsJson, Cuts, Head, Seed, Skeleton, cut_codes
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -106,10 +106,7 @@ def bake(
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
     ] = False,
     strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
-    cuts: Annotated[
-        str | None,
-        typer.Option(help="First frames after cuts, such as 25,49: hair starts anew; found if left out, or 'none'."),
-    ] = None,
+    cuts: Cuts = None,
     head: Head = None,
     skeleton: Skeleton = None,
     as_json: AsJson = False,
@@ -128,7 +125,7 @@ def bake(
             subframes=subframes,
             loop=loop,
             strength=strength,
-            cuts=_frames(cuts),
+            cuts=cut_codes(cuts),
             progress=progress,
         )
     note(result.notes)
@@ -136,15 +133,6 @@ def bake(
         print_json(vars(result))
     else:
         typer.echo(f"{result.path}: {result.joints} hair joints, {result.samples} samples, in {result.animation}")
-
-
-def _frames(cuts: str | None) -> list[float] | None:
-    if cuts is None or cuts.strip().lower() == "none":
-        return None if cuts is None else []
-    try:
-        return [float(cut) for cut in cuts.split(",")]
-    except ValueError:
-        raise NeuralocksError(f"--cuts {cuts}: is no list of frames; write for example 25,49, or none") from None
 
 
 @command("export-c")

@@ -86,7 +86,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         ]
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
-        spoils += rig.notes + rig_notes(rig)
+        spoils += rig.notes + rig_notes(rig) + rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))

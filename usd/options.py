@@ -34,11 +34,27 @@ Materials = Annotated[
         "damping 4..20 /s, clumping 0..240 /s^2.",
     ),
 ]
+Cuts = Annotated[
+    str | None,
+    typer.Option(
+        "--cuts", help="First frames after cuts, such as 25,49: hair starts anew; found if left out, or 'none'."
+    ),
+]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of everything random.")]
 Jobs = Annotated[
     int | None, typer.Option("--jobs", help="Threads; a core each, eight at most, if left out. The result is the same.")
 ]
+
+
+def cut_codes(text: str | None) -> list[float] | None:
+    """Time codes of `--cuts`: none for 'none', None where they are to be found."""
+    if text is None or text.strip().lower() == "none":
+        return None if text is None else []
+    try:
+        return [float(code) for code in text.split(",")]
+    except ValueError:
+        raise NeuralocksError(f"--cuts {text}: is no list of frames; write for example 25,49, or none") from None
 
 
 def pairs(words: list[str] | None, option: str) -> dict[str, str]:

@@ -6,18 +6,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
 
-from .border import Border, first_line, transformed
+from .border import Border, transformed
 from .curves import rest_points
 from .recorded import record
+from .sample_layer import SampleLayer, named
 from .stage import Shot, StageGroom
-
-SAVE_EVERY = 32 << 20
-"""Bytes of samples held before they are saved: memory does not grow with the number of frames."""
 
 
 class OverrideWriter:
@@ -33,16 +30,13 @@ class OverrideWriter:
     """
 
     def __init__(self, part: Path, out: Path, shot: Shot, codes: list[float]):
-        self._out = out
-        part.unlink(missing_ok=True)
-        with _named(out):
-            self._layer = Sdf.Layer.CreateNew(str(part), {"format": "usdc"})
-            write_header(self._layer, shot.stage, shot.border, shot.path, out, codes)
-        self._held = 0
+        self._file = SampleLayer(part, out)
+        with named(out):
+            write_header(self._file.layer, shot.stage, shot.border, shot.path, out, codes)
 
     def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
         """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
-        layer, path = self._layer, item.prim.GetPath()
+        layer, path = self._file.layer, item.prim.GetPath()
         for above in path.GetPrefixes():
             if item.prim.GetStage().GetPrimAtPath(above).IsInstance():
                 # What lies inside an instance cannot be overridden.
@@ -85,63 +79,55 @@ class OverrideWriter:
             first += len(block)
             if name == "points":
                 corners += _corners(block)
-        with _named(self._out):
-            if name == "points":
-                pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
-                low, high = _corners(np.array(corners))
-                self._set(item, time_code, "extent", Vt.Vec3fArray.FromNumpy(np.stack([low - pad, high + pad])))
-            self._set(item, time_code, name, array)
-            if self._held >= SAVE_EVERY:
-                self._save()
-
-    def _set(self, item: StageGroom, time_code: float, name: str, array: Vt.Vec3fArray) -> None:
-        self._layer.SetTimeSample(item.prim.GetPath().AppendProperty(name), float(time_code), array)
-        self._held += 12 * len(array)
+        values = {name: array}
+        if name == "points":
+            pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
+            low, high = _corners(np.array(corners))
+            values = {"extent": Vt.Vec3fArray.FromNumpy(np.stack([low - pad, high + pad])), **values}
+        self._file.put(item.prim.GetPath(), time_code, values)
 
     def close(self) -> None:
         """Write what is held."""
-        with _named(self._out):
-            self._save()
-        self._layer = None
-
-    def _save(self) -> None:
-        self._layer.Save()
-        self._held = 0
+        self._file.close()
 
 
 def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
     """Sublayer the shot by a path relative to `out`, and repeat what USD reads of a stage's first layer only."""
-    root = layer.pseudoRoot
-    _repeat_metadata(stage.GetRootLayer(), layer, out)
-    layer.subLayerPaths.append(_relative(shot, out.parent))
-    root.SetInfo("metersPerUnit", border.metres_per_unit)
-    root.SetInfo("upAxis", border.up_axis)
-    layer.timeCodesPerSecond = border.rate
-    layer.framesPerSecond = stage.GetFramesPerSecond()
     ranged = stage.HasAuthoredTimeCodeRange()
-    layer.startTimeCode = stage.GetStartTimeCode() if ranged else codes[0]
-    layer.endTimeCode = stage.GetEndTimeCode() if ranged else codes[-1]
+    facts = {
+        "metersPerUnit": border.metres_per_unit,
+        "upAxis": border.up_axis,
+        "timeCodesPerSecond": border.rate,
+        "framesPerSecond": stage.GetFramesPerSecond(),
+        "startTimeCode": stage.GetStartTimeCode() if ranged else codes[0],
+        "endTimeCode": stage.GetEndTimeCode() if ranged else codes[-1],
+    }
     if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
-        layer.defaultPrim = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
+        facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
+    repeat_metadata(stage.GetRootLayer(), layer, out, facts)
+    layer.subLayerPaths.append(relative(shot, out.parent))
 
 
 LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
 """Metadata that is said of one layer, or that USD reads of sublayers, too."""
 
 
-def _repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path) -> None:
-    """Units, rates, range, default prim, render settings, and the variables without which references find nothing."""
-    for name in sorted(source.pseudoRoot.ListInfoKeys()):  # USD gives another order in each process
-        if name not in LAYERS_OWN:
-            layer.pseudoRoot.SetInfo(name, source.pseudoRoot.GetInfo(name))
+def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict) -> None:
+    """Units, rates, range, default prim, render settings, and the variables without which references find nothing; with
+    `facts` in place of what is said otherwise.
+    """
+    root = source.pseudoRoot
+    said = {name: root.GetInfo(name) for name in root.ListInfoKeys() if name not in LAYERS_OWN}
+    for name, value in sorted((said | facts).items()):  # USD gives another order in each process
+        layer.pseudoRoot.SetInfo(name, value)
 
     def placed(asset: str) -> str:
-        return _relative(source.ComputeAbsolutePath(asset), out.parent) if asset.startswith(("./", "../")) else asset
+        return relative(source.ComputeAbsolutePath(asset), out.parent) if asset.startswith(("./", "../")) else asset
 
     UsdUtils.ModifyAssetPaths(layer, placed)
 
 
-def _relative(file, folder: Path) -> str:
+def relative(file, folder: Path) -> str:
     """Path of a file relative to a folder, by the names it was given.
 
     What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
@@ -170,7 +156,7 @@ def _same(path: str, file) -> bool:
 
 def to_text(crate: Path, text: Path, out: Path) -> None:
     """Convert an assembled crate file to .usda."""
-    with _named(out):
+    with named(out):
         layer = Sdf.Layer.FindOrOpen(str(crate))
         layer.Export(str(text))
 
@@ -220,20 +206,3 @@ def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
 def _unit(item: StageGroom) -> float:
     """Length of a unit of the prim's own space [m]."""
     return float(abs(sizes(item.attachment.to_bind)))
-
-
-class _named:
-    """Turns USD's errors into one line that names the output."""
-
-    def __init__(self, out: Path):
-        self._out = out
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, trace):
-        if kind is not None and issubclass(kind, Tf.ErrorException):
-            raise NeuralocksError(
-                f"{self._out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
-            ) from None
-        return False

@@ -18,6 +18,7 @@ from .border import check_layer_name, check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
+from .stage import check_cuts
 from .time_codes import time_codes
 
 
@@ -82,31 +83,29 @@ def bake_rig(
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
-    hair = _read(shot, skeleton, head, model)
+    if cuts and loop:
+        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    hair = _read(shot, skeleton, head, model, cuts)
     source = hair.source.source
     check_not_input(out, hair.stage)
     _check_moves(hair)
     codes = _codes(hair, frames, subframes)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
-    sampler = _sampler(hair, model, clip, cuts)
+    sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
     animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
     notes += hair.source.loop_notes() if loop else []
-    if cuts is None and len(sampler.cuts):
-        found = hair.source.time_codes[np.searchsorted(hair.source.clip.times, sampler.cuts - 1e-9)]
-        named = ",".join(f"{code:g}" for code in found[:8]) + (", ..." if len(found) > 8 else "")
-        notes.append(
-            f"{source.path}: its head is put elsewhere at {named}; the hair starts anew there (--cuts says where)"
-        )
+    if cuts is None and model.dynamic and not loop:
+        notes += hair.source.cut_notes()
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
-def _read(shot, skeleton, head, model) -> RiggedHair:
+def _read(shot, skeleton, head, model, cuts) -> RiggedHair:
     # The model knows its joints: no guess is made about which ones are hair.
     tops = [model.chains.names[i] for i in model.chains.roots]
     try:
-        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops)
+        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops, cuts=cuts)
     except NoHairChains:
         raise NeuralocksError(
             f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
@@ -114,6 +113,7 @@ def _read(shot, skeleton, head, model) -> RiggedHair:
         ) from None
     model.chains.match(hair.source.character.skeleton.names)
     model.chains.check_same(hair.rig.chains)
+    check_cuts(cuts, [hair.source])
     return hair
 
 
@@ -148,21 +148,6 @@ def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
 def _rotation_samples(hair: RiggedHair) -> list[float]:
     animation = hair.source.source.animation
     return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
-
-
-def _sampler(hair, model, clip, cuts) -> RigSampler:
-    if cuts is None:
-        return RigSampler(model.spec, hair.source.character, clip)
-    known, cuts = hair.source.time_codes, [float(cut) for cut in cuts]
-    if cuts and clip.loop:
-        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
-    outside = [cut for cut in cuts if not known[0] < cut <= known[-1]]
-    if outside:
-        raise NeuralocksError(
-            f"--cuts {outside[0]:g}: lies outside the animation, which goes from {known[0]:g} to {known[-1]:g}; "
-            "give the first time code after each cut"
-        )
-    return RigSampler(model.spec, hair.source.character, clip, hair.border.seconds(cuts) if cuts else ())
 
 
 def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A skeleton of the stage as a Character and a Clip: metres, Y up, world space."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ from pxr import Usd, UsdSkel
 from scipy.spatial import cKDTree
 
 from neuralocks_core.character import Character, Skeleton, sizes_shown
+from neuralocks_core.cuts import find_cuts
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
@@ -68,6 +69,14 @@ class StageRig:
             "a loop ends with the pose that it begins with"
         ]
 
+    def cut_notes(self) -> list[str]:
+        """Where the hair starts anew, if it does anywhere."""
+        if self.clip.loop or not len(self.clip.cuts):
+            return []
+        codes = self.time_codes[np.searchsorted(self.clip.times, self.clip.cuts - 1e-9)]
+        named = ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
+        return [f"{self.path}: its head is put elsewhere at {named}; the hair starts anew there (--cuts says where)"]
+
     @cached_property
     def skins(self) -> list[cKDTree]:
         """The points of each mesh in bind world [m], by nearness."""
@@ -105,6 +114,7 @@ def read_rig(
     *,
     all_shapes: bool = False,
     joints=None,
+    cuts: list[float] | None = None,
     skins: Skins | None = None,
 ) -> StageRig:
     """Read a skeleton, its meshes and its motion.
@@ -116,6 +126,7 @@ def read_rig(
         head: joint that is the head; found by name and hierarchy if left out.
         all_shapes: keep blend shapes that the animation does not use.
         joints: semantic joint -> joint path or its last part, where names do not tell.
+        cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
         skins: of the stage, if they were looked for already.
 
     Raises:
@@ -141,6 +152,11 @@ def read_rig(
         border.to_core @ posed @ trim,
         np.concatenate([np.zeros((len(posed), 0)), *(shares(w, knots[name]) for name, w in used.items())], axis=1),
     )
+    if cuts is not None:
+        known = border.seconds([cut for cut in sorted(cuts) if time_codes[0] < cut <= time_codes[-1]])
+    else:
+        known = find_cuts(clip, character.head) if "head" in humanoid else ()
+    clip = replace(clip, cuts=known)
     return StageRig(
         path=source.path,
         source=source,

@@ -45,6 +45,7 @@ def read_rigged_hair(
     head: str | None = None,
     chains: list[str] | None = None,
     all_shapes: bool = False,
+    cuts: list[float] | None = None,
 ) -> RiggedHair:
     """Read the rigged mesh hair of a stage.
 
@@ -54,6 +55,7 @@ def read_rigged_hair(
         head: joint that carries the hair, if it is not named like a head.
         chains: name patterns of the chains' first joints, instead of finding them.
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
+        cuts: as for `stage.read_shot`.
 
     Raises:
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
@@ -73,7 +75,7 @@ def read_rigged_hair(
     for prim in prims:
         try:
             _check_authored(prim)
-            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, skins=skins)
+            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, cuts=cuts, skins=skins)
             rig = assemble_rig(source.character, core_meshes(source), chains)
         except NeuralocksError as error:
             errors.append(type(error)(_with_path(prim, error)))

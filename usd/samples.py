@@ -20,6 +20,7 @@ from neuralocks_core.progress import Progress, silent
 from .border import check_not_input, used_files
 from .damage import names_damage
 from .override import OverrideWriter, reload_open, to_text
+from .sample_layer import Lagging
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
 from .stencils import Stencils
@@ -101,6 +102,7 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
                 behind.put(store.frame, code, held)
                 done += 1
                 say(done, total, item.path)
+            behind.put(store.finish)
         behind.put(writer.close)
     if spool.out.suffix.lower() == ".usda":
         text = spool.layer_path.with_suffix(".usda")
@@ -116,7 +118,7 @@ class _Store:
 
     def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, number: int, plan: Stencils):
         self._spool, self._writer, self._item, self._number, self._plan = spool, writer, item, number, plan
-        self._due = list(plan.wanted) if plan.velocities else []
+        self._order = Lagging(item.attachment.rig.border.frame)
 
     def frame(self, code: float, held: list[np.ndarray]) -> None:
         """The points (P, 3) of the next time code in the list; an empty list if they are in the spool already."""
@@ -124,9 +126,15 @@ class _Store:
             self._spool.write(self._number, code, held.pop())
         if code in self._plan.wanted:
             self._writer.sample(self._item, code, "points", self._points(code))
-        while self._due and self._plan.last(self._due[0]) <= code:
-            due = self._due.pop(0)
-            self._writer.sample(self._item, due, "velocities", self._velocities(due))
+            self._differences(self._order.after(code))
+
+    def finish(self) -> None:
+        """Write what waits for frames that are not among those wanted."""
+        self._differences(self._order.rest())
+
+    def _differences(self, codes: list[float]) -> None:
+        for code in codes if self._plan.velocities else ():
+            self._writer.sample(self._item, code, "velocities", self._velocities(code))
 
     def _rows(self) -> Iterator[slice]:
         count = len(self._item.groom.points)

@@ -15,6 +15,7 @@ from neuralocks_core.progress import Progress
 from .bake import BakeResult, as_material, described
 from .border import check_layer_name
 from .placing import GroomPlacer
+from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .stencils import Stencils
@@ -38,12 +39,13 @@ def simulate(
     material=None,
     strands: int | None = None,
     volume: float = 0.0,
+    cuts=None,
     progress: Progress | None = None,
 ) -> BakeResult:
     """Simulate a shot's hair and write it as a bake.
 
     Args:
-        shot, out, grooms, skeleton, head, frames, subframes, material, progress: as for `bake`.
+        shot, out, grooms, skeleton, head, frames, subframes, material, cuts, progress: as for `bake`.
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
 
@@ -59,16 +61,18 @@ def simulate(
         raise NeuralocksError(f"--strands {count}: must be above 0")
     if not 0 <= volume <= STIFFEST_VOLUME:
         raise NeuralocksError(f"--volume {volume:g}: must lie between 0 and {STIFFEST_VOLUME:g}")
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head)
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, cuts=cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
-    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
+    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes, "cuts": cuts}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
         return _SimulatedPoser(item, codes, look, count, volume, progress)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
+    facts |= cut_facts(cuts)
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
-    return BakeResult(out, codes, described(shot), list(shot.notes), time.monotonic() - began, resumed)
+    notes = [*shot.notes, *(text for rig in shot.rigs if cuts is None for text in rig.cut_notes())]
+    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 
 class _SimulatedPoser:

@@ -80,7 +80,7 @@ class Shot:
 
 
 @names_damage
-def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Shot:
+def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None, cuts=None) -> Shot:
     """Read a shot for a bake.
 
     Args:
@@ -89,6 +89,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         skeleton: prim path of the skeleton that carries them; found if left out.
         head: joint (path, or its last part) that carries grooms for which no binding says so.
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -100,8 +101,9 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     curves = find_curves(stage, grooms)
     if not curves:
         raise no_groom(stage, path)
-    rigs = _rigs(stage, border, skeleton, head, path, joints=joints)
+    rigs = _rigs(stage, border, skeleton, head, path, joints=joints, cuts=cuts)
     _check_animated(rigs)
+    check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     every = [] if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
     others = [rig for rig in every if rig.path != skeleton]
@@ -158,6 +160,17 @@ def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
     return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
 
 
+def check_cuts(cuts, rigs) -> None:
+    """Refuse time codes of cuts at which no rig's animation could have one."""
+    for cut in cuts or ():
+        if not any(rig.time_codes[0] < cut <= rig.time_codes[-1] for rig in rigs):
+            known = rigs[0].time_codes
+            raise NeuralocksError(
+                f"--cuts {cut:g}: lies outside the animation, which goes from {known[0]:g} to {known[-1]:g}; "
+                "give the first time code after each cut"
+            )
+
+
 def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> list[StageGroom]:
     """The curves that are hair, read in bind-world metres."""
     found = []
@@ -181,7 +194,7 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     return moving
 
 
-def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None) -> list[StageRig]:
+def _rigs(stage, border, skeleton, head, path, **options) -> list[StageRig]:
     prims = find_skeletons(stage)
     names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
     if skeleton is not None:
@@ -190,7 +203,7 @@ def _rigs(stage, border, skeleton, head, path, *, all_shapes=False, joints=None)
             raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
     if not prims:
         raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
-    rigs, errors = read_each_rig(stage, prims, border, head, all_shapes=all_shapes, joints=joints)
+    rigs, errors = read_each_rig(stage, prims, border, head, **options)
     if errors and (not rigs or skeleton):
         raise errors[0]
     for error in errors:

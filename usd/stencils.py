@@ -10,8 +10,8 @@ class Stencils:
     """Which samples of a groom the velocity at each time code is made of.
 
     Central differences over one and two frames to both sides, right to fourth order: at 24 frames a second within 2 %
-    for hair that swings three times a second. Outside of its samples the animation stands still, so at its ends the
-    differences are taken to the side that moves, to second order. The velocity at a time code depends on that
+    for hair that swings three times a second. Outside of its samples the animation stands still, and at a cut the character
+    is put elsewhere: there the differences are taken to the side that moves, to second order. The velocity at a time code depends on that
     time code only, not on which others are baked.
 
     Args:
@@ -28,8 +28,10 @@ class Stencils:
         self.wanted = dict.fromkeys(codes)
         self.velocities = velocities
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
+        rig, border = item.attachment.rig, item.attachment.rig.border
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
-        border = item.attachment.rig.border
+        after = np.searchsorted(rig.clip.times, [] if rig.clip.loop else rig.clip.cuts - 1e-9)
+        self._before, self._after = clip[after - 1], clip[after]
         self._step, self._rate = border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep the very same number.
         self._known = np.array(codes, float)
@@ -39,7 +41,10 @@ class Stencils:
     def terms(self, code: float) -> list[tuple[float, float]]:
         """(time code, weight per second) whose weighted sum of points is the velocity at `code`."""
         step, slack = self._step, 1e-6
-        room = (code - self._first) / step + slack, (self._last - code) / step + slack
+        part = int(np.searchsorted(self._after - slack, code, side="right"))
+        first = self._after[part - 1] if part else self._first
+        last = self._before[part] if part < len(self._before) else self._last
+        room = (code - first) / step + slack, (last - code) / step + slack
         if min(room) >= 2:
             weights = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
         elif min(room) >= 1:
@@ -53,10 +58,6 @@ class Stencils:
         else:
             weights = {}
         return [(self._snapped(code + place * step), self._rate * weight) for place, weight in weights.items()]
-
-    def last(self, code: float) -> float:
-        """The latest time code that the velocity at `code` needs."""
-        return max([code, *(other for other, _ in self.terms(code))])
 
     def _snapped(self, code: float) -> float:
         near = int(np.searchsorted(self._known, code - 1e-6))

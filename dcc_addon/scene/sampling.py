@@ -2,10 +2,12 @@
 """Sampling a rig's motion by stepping through the frames, so that constraints, IK, drivers and NLA count."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
+from neuralocks_core.cuts import find_cuts
 from neuralocks_core.motion import Clip
 
 from ..services import rig as rig_service
@@ -187,6 +189,7 @@ class _Recording:
         metres = self._unit * rig_service.size_shown(rig, places[""][0], self._shown)
         character = rig_service.character(rig, places[""][0], arrays, metres)
         clip = Clip(motion.times, self._world, motion.shape, armature.neuralocks_character.loop)
+        clip = replace(clip, cuts=find_cuts(clip, character.head))
         before = session.rigs.get(self.name)
         if before is not None and rig_service.same(before.character, character):
             character = before.character

@@ -15,7 +15,6 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.cuts import find_cuts, parts_of
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig.chains import HairChains
@@ -170,31 +169,16 @@ class RigSampler:
         spec: what is read.
         character: skeleton and head.
         clip: its motion.
-        cuts: times [s] from which the character is elsewhere, and no history reaches back; found by itself if left out.
-
-    Attributes:
-        cuts: those that count, (C,) [s]; none for a model without history.
     """
 
-    def __init__(self, spec: BoundarySpec, character: Character, clip: Clip, cuts=None):
-        found = find_cuts(clip, character.head) if cuts is None else cuts
-        parts = parts_of(clip, found if spec.bins else ())
-        self.cuts = np.array([part.start for part in parts[1:]])
+    def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         # The network does not read the body's shape: measuring it would be most of the work.
-        self._samplers = [BoundarySampler(spec, replace(character, body=None), part) for part in parts]
+        self._sampler = BoundarySampler(spec, replace(character, body=None), clip)
         self._columns = feature_columns(spec)
 
     def features(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
         """Features (n, F) float32 at times (n,) [s]; the arguments are those of `BoundarySampler.vectors`."""
-        times = np.atleast_1d(np.asarray(times, float))
-        part = np.searchsorted(self.cuts - 1e-9, times, side="right")
-        result = np.empty((len(times), len(self._columns)), np.float32)
-        for index in np.unique(part):
-            rows = part == index
-            shown = None if joints is None else joints[rows]
-            vectors = self._samplers[index].vectors(times[rows], strength=strength, joints=shown)
-            result[rows] = vectors[:, self._columns]
-        return result
+        return self._sampler.vectors(times, strength=strength, joints=joints)[:, self._columns]
 
 
 def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray) -> np.ndarray:

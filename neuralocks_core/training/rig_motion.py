@@ -152,7 +152,7 @@ def _teleports(rig, models, fit) -> dict:
     result = {}
     for name in [SPRINGS, *models]:
         if name in models:
-            points = _model_points(rig, models[name], clip, clip.times, cuts=())
+            points = _model_points(rig, models[name], clip, clip.times)
         else:
             points = _spring_points(rig, clip, 1 / rate, fit)
         away = np.linalg.norm(points - points[before - 10], axis=-1).max(axis=-1)[before:]
@@ -181,9 +181,9 @@ def _spring_points(rig, clip: Clip, step: float, fit) -> np.ndarray:
     return hair_points(rig, spring_bones(rig.chains, rig.character.canonical_to_world(clip.joints)[None], step, fit))[0]
 
 
-def _model_points(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
-    return hair_points(rig, _model_turns(rig, model, motion, times, cuts)[None])[0]
+def _model_points(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
+    return hair_points(rig, _model_turns(rig, model, motion, times)[None])[0]
 
 
-def _model_turns(rig, model: RigModel, motion: Clip, times, cuts=None) -> np.ndarray:
-    return model.canonical_turns(RigSampler(model.spec, rig.character, motion, cuts).features(times))
+def _model_turns(rig, model: RigModel, motion: Clip, times) -> np.ndarray:
+    return model.canonical_turns(RigSampler(model.spec, rig.character, motion).features(times))

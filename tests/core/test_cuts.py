@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cuts are where a character is put elsewhere; nothing that a body can do is one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from neuralocks_core.cuts import find_cuts, parts_of
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.cuts import find_cuts
 from neuralocks_core.motion import Clip
 from neuralocks_core.random_motion import KINDS, scripted_clip
-from neuralocks_core.rig import RigSampler, rig_spec
+from neuralocks_core.rig import rig_spec
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character
 
@@ -52,25 +55,40 @@ def test_motion_and_damaged_samples_are_no_cuts():
         assert not len(find_cuts(scripted_clip(who, kind, 4.0, 24.0), who.head)), kind
 
 
-def test_nothing_of_the_way_is_felt():
-    """After a cut the features are those of the part by itself, before it those of the clip without it."""
+def test_stepped_animation_has_no_cuts():
+    """On twos, at a run: every second step stands still, every other one is large."""
+    who, t, joints = walking(24)
+    joints[:, who.head, 0, 3] += 10 * (np.arange(len(t)) // 2 * 2) / 24
+    assert not len(find_cuts(Clip(t, joints), who.head))
+
+
+def cut_clip():
+    """A character that is put 5 m aside after a second: who, times, joints before, joints after, clip."""
     who, t, joints = walking(rate=30)
     put = joints.copy()
     put[30:, :, 0, 3] += 5
-    clip, spec = Clip(t, put), rig_spec(True)
-    sampler = RigSampler(spec, who, clip)
-    assert sampler.cuts == pytest.approx([1.0])
-    alone = RigSampler(spec, who, parts_of(clip, sampler.cuts)[1])
+    clip = Clip(t, put)
+    return who, t, joints, put, replace(clip, cuts=find_cuts(clip, who.head))
+
+
+@pytest.mark.parametrize("spec", [rig_spec(True), BoundarySpec()])
+def test_nothing_of_the_way_is_felt(spec):
+    """After a cut what a network reads is that of the part by itself, before it that of the clip without it."""
+    who, t, joints, put, clip = cut_clip()
+    assert clip.cuts == pytest.approx([1.0])
+    sampler, alone = BoundarySampler(spec, who, clip), BoundarySampler(spec, who, clip.parts[1])
     after, before = t[30:], t[:30] + 0.001
-    np.testing.assert_allclose(sampler.features(after), alone.features(after), atol=1e-6)
-    first = RigSampler(spec, who, Clip(t[:30], joints[:30]))
-    np.testing.assert_allclose(sampler.features(before), first.features(before), atol=1e-6)
-    assert np.abs(RigSampler(spec, who, clip, cuts=()).features(after) - alone.features(after)).max() > 1
-    mixed = sampler.features(t[::-1], joints=put[::-1])  # in any order
-    np.testing.assert_array_equal(mixed[::-1], sampler.features(t, joints=put))
+    np.testing.assert_array_equal(sampler.vectors(after), alone.vectors(after))
+    first = BoundarySampler(spec, who, Clip(t[:30], joints[:30]))
+    np.testing.assert_array_equal(sampler.vectors(before), first.vectors(before))
+    felt = BoundarySampler(spec, who, replace(clip, cuts=())).vectors(after)
+    assert np.abs(felt - alone.vectors(after)).max() > 1
+    mixed = sampler.vectors(t[::-1], joints=put[::-1])  # in any order
+    np.testing.assert_array_equal(mixed[::-1], sampler.vectors(t, joints=put))
 
 
-def test_held_poses_know_no_cuts():
-    who, t, joints = walking()
-    joints[30:, who.head, 0, 3] += 5
-    assert not len(RigSampler(rig_spec(), who, Clip(t, joints)).cuts)
+def test_held_poses_and_loops_know_no_cuts():
+    who, t, _, _, clip = cut_clip()
+    for spec, other in ((rig_spec(), clip), (rig_spec(True), replace(clip, loop=True))):
+        with_cuts, without = (BoundarySampler(spec, who, c).vectors(t) for c in (other, replace(other, cuts=())))
+        np.testing.assert_array_equal(with_cuts, without)

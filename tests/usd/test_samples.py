@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, UsdUtils
 
 from usd.bake import bake
 
@@ -32,17 +31,6 @@ def test_order_chunks_and_jobs_give_the_same_bytes(tmp_path, model):
             samples(p, "points", "velocities", "extent", at=code) for p in (tmp_path / "bake.usdc", part.path)
         )
         assert [a.tobytes() for a in one] == [a.tobytes() for a in other]
-
-
-def test_parts_of_a_farm_stitched_by_usds_own_tools_are_the_one_bake(tmp_path, model):
-    """What `usdstitch` does with the bakes of parts of a range; layers over each other would hide the weaker's samples."""
-    shot = write_shot(tmp_path, Recipe(bound="mesh"))
-    whole = bake(shot, tmp_path / "whole.usda", model, subframes=2).path
-    stitched = Sdf.Layer.CreateAnonymous(".usda")
-    for number, frames in enumerate(("1:4", "5:9")):
-        part = bake(shot, tmp_path / f"part{number}.usdc", model, frames=frames, subframes=2).path
-        UsdUtils.StitchLayers(stitched, Sdf.Layer.FindOrOpen(str(part)))
-    assert stitched.ExportToString() == Sdf.Layer.FindOrOpen(str(whole)).ExportToString()
 
 
 def test_large_grooms_are_written_in_blocks_that_leave_no_trace(tmp_path, model, monkeypatch):

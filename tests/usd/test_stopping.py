@@ -13,6 +13,14 @@ from usd.command import INTERRUPTED, command_of
 from usd.progress import progress_bar
 
 
+@pytest.fixture(autouse=True)
+def _heard():
+    """Whatever started the tests may have them deaf to Ctrl-C, as a shell's background jobs are."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def _press() -> None:
     """Press Ctrl-C."""
     os.kill(os.getpid(), signal.SIGINT)
