@@ -5,17 +5,18 @@ import os
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.rig.hair_names import says_hair
 
 from .attach import Attachment, rig_joint
 from .border import Border
-from .rig_source import StageRig
+from .rig_source import StageRig, find_skeletons
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -38,9 +39,19 @@ def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
     """The error for a stage without BasisCurves."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
     remedy = _in_a_variant(stage) or "add one, or import a hair file with 'neuralocks import'"
+    hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
+    if hairy:
+        remedy = (
+            f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
+        )
     if other:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
     return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
+
+
+def has_hair_joints(prim: Usd.Prim) -> bool:
+    """Whether joints of a Skeleton are named like hair."""
+    return any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()))
 
 
 def _in_a_variant(stage: Usd.Stage, most: int = 64) -> str:

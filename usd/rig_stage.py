@@ -9,13 +9,12 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from .border import Border, open_stage
 from .damage import names_damage
-from .notes import nothing_found
+from .notes import has_hair_joints, nothing_found
 from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import find_skins, rest_primvar
 
@@ -83,7 +82,7 @@ def read_rigged_hair(
         found.append(RiggedHair(stage, border, source, rig))
     if not found:
         # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
-        hairy = [any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ())) for prim in prims]
+        hairy = [has_hair_joints(prim) for prim in prims]
         raise errors[hairy.index(True) if any(hairy) else 0]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)

@@ -9,10 +9,12 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from usd.evaluate import evaluate
 from usd.inspect import as_text, inspect
 from usd.rig_bake import bake_rig
 from usd.rig_layer import NAME
 from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
+from usd.stage import read_shot
 
 from ..blenders import installed
 from .rig_shots import EXAMPLE, hair_turns, model_for, small_shot
@@ -141,6 +143,14 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     with pytest.raises(NeuralocksError, match=words):
         bake_rig(shot, tmp_path / "out.usda", model)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
+
+
+def test_commands_for_strands_say_what_is_for_joints(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    baked = bake_rig(shot, tmp_path / "rig.usda", model_for(read_rigged_hair(shot), dynamic=True))
+    for use in (read_shot, evaluate):
+        with pytest.raises(NeuralocksError, match="hair that is joints of /Who/.* is moved by 'neuralocks rig bake'"):
+            use(baked.path)
 
 
 def test_hair_with_a_skeleton_of_its_own_is_told_what_it_needs(tmp_path):
