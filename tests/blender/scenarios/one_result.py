@@ -79,6 +79,31 @@ def out_of_the_body(folder: Path) -> None:
     assert apart(points_at(strands, 2), free[2]) == 0.0
 
 
+def put_elsewhere(folder: Path) -> None:
+    """A character that is 3 m aside from one frame to the next: its hair feels nothing of the way, live and baked."""
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 40)
+    make_live(rig, strands)
+    unmoved = {f: points_at(strands, f) for f in (12, 24)}
+    for frame, aside in ((1, 0), (12, 0), (13, 3), (24, 3)):
+        rig.delta_location = (aside, 0, 0)
+        rig.keyframe_insert("delta_location", frame=frame)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    shown = {f: points_at(strands, f) for f in (24, 13, 12, 20)}
+    assert len(session.rigs["Rig"].clip.cuts) == 1
+    assert apart(shown[12], unmoved[12]) < 1e-3, (
+        "the motion before it has no frame after it now, and nothing else changed"
+    )
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "bake.usdc")) == {"FINISHED"}
+    for f, points in shown.items():
+        assert apart(baked_points(folder / "bake.usdc", "/Character/Hair_Hair", f), points) < SAME
+    # Half a second later what came before the cut would still be felt, but not three metres in a frame.
+    assert apart(shown[24] - (3, 0, 0), unmoved[24]) < 0.05
+
+
 def other_frames(folder: Path) -> None:
     """A bake of more frames than the scene has, or fewer, is what is shown live: both remember the same past."""
     from dcc_addon import live
