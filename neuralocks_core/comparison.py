@@ -81,7 +81,7 @@ def simulated(
     options = {"substeps": substeps, "volume": volume, "progress": progress}
     result = np.empty((len(times), *strands.rest.shape), np.float32)
     for i in np.unique(part):
-        start = parts[i].start if i else times[0]
+        start = times[0] if i == part[0] else parts[i].start
         result[part == i] = _from(start, character, strands, parts[i], times[part == i], material, **options)
     return result
 

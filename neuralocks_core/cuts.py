@@ -17,24 +17,24 @@ _APART = 0.2
 
 
 def find_cuts(clip: Clip, joint: int) -> np.ndarray:
-    """Times (C,) [s] of the first sample after each cut, judged by one joint of a clip, the head.
+    """Times (C,) [s] of the first sample after each cut, judged by one joint of a clip, the head, whether it loops or not.
 
     A step is a cut if neither the motion before nor the motion after it explains it. Several in a row are none: those are
     damaged samples, or motion too fast for its rate.
     """
     times = clip.times
-    if len(times) < 3 or clip.loop:
+    if len(times) < 3:
         return np.zeros(0)
     places, turns = clip.joints[:, joint, :3, 3], clip.joints[:, joint, :3, :3]
     span = np.diff(times)
     speed = np.diff(places, axis=0) / span[:, None]
     spin = np.einsum("tij,tij->t", turns[1:], turns[:-1]) / np.einsum("tij,tij->t", turns[:-1], turns[:-1])
     angle = np.arccos(np.clip((3 * spin - 1) / 2, -1, 1))
-    # The steps at both ends have a neighbour on one side only.
-    unlike = np.full((2, len(span)), np.inf)
+    # Before its first sample and after its last one a clip stands still.
+    unlike = np.tile(np.linalg.norm(np.diff(places, axis=0), axis=1), (2, 1))
     gap = np.linalg.norm(np.diff(speed, axis=0), axis=1)
     unlike[0, 1:], unlike[1, :-1] = gap * span[1:], gap * span[:-1]
-    fling = np.full((2, len(span)), np.inf)
+    fling = np.tile(angle, (2, 1))
     fling[0, 1:] = angle[1:] - angle[:-1] * span[1:] / span[:-1]
     fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
     jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)

@@ -18,7 +18,7 @@ from .posing import GroomPoser
 from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
-from .time_codes import time_codes
+from .time_codes import ascending, time_codes
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def bake(
     """Bake moving hair.
 
     Args:
-        shot: path of a USD stage, or a `Shot` already read.
+        shot: path of a USD stage, or a `Shot` already read, with its grooms, skeletons, joints and cuts.
         out: `.usdc`, `.usd` or `.usda` to write.
         model: path of a strand model, or a StrandModel; the shipped one if left out.
         grooms: prim paths; all grooms if left out.
@@ -94,8 +94,10 @@ def bake(
     look = as_material(material)
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
-    if cuts and loop:
+    if loop and cuts is not None and len(cuts):
         raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    # A loop has none, whatever its clip looks like.
+    cuts = [] if loop else ascending(cuts)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
@@ -109,11 +111,11 @@ def bake(
         return GroomPoser(item, strand_model, look, **options)
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
-    facts |= cut_facts(cuts)
+    facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
     resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
-    if cuts is None and not loop and strand_model.spec.bins:
+    if cuts is None and strand_model.spec.bins:
         notes += [text for rig in shot.rigs for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 

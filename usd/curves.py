@@ -32,8 +32,8 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
             prim = stage.GetPrimAtPath(text)
             fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
             raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
-        chosen += [p for p in below if p not in chosen]
-    return chosen
+        chosen += below
+    return [prim for prim in every if prim in chosen]
 
 
 def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:

@@ -30,7 +30,7 @@ from .notes import (
     rig_notes,
 )
 from .placement import Placement
-from .recorded import recorded
+from .recorded import recorded, recorded_cuts
 from .rig_source import StageRig, find_skeletons, read_each_rig
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
 from .stage import frame_range
@@ -84,16 +84,17 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         stops += [str(error) for error in errors] or [
             f"{path.name}: holds no UsdSkel skeleton; export the character with its armature"
         ]
+    curves = find_curves(stage)
+    told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
-        spoils += rig.notes + rig_notes(rig) + rig.cut_notes()
+        spoils += rig.notes + rig_notes(rig) + ([] if told else rig.cut_notes())
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
     elif rigs:
         stops.append(not_animated(rigs[0]))
-    curves = find_curves(stage)
     grooms = _grooms(curves, rigs, border, head, spoils, stops)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")

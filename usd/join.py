@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Tf
+from pxr import Sdf, Tf, Usd
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 
 from .border import Border, check_layer_name, check_not_input, first_line, open_stage
-from .override import relative, repeat_metadata, to_text
+from .notes import composition_notes, out_of_place
+from .override import relative, reload_open, repeat_metadata, to_text
 from .recorded import KEY
 from .sample_layer import Lagging, SampleLayer, named
 from .spool import Spool, fingerprint
@@ -39,7 +40,7 @@ class JoinResult:
 def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     """Write one bake out of several of the same shot, byte for byte what a bake of all their frames is.
 
-    Memory does not grow with the number of frames.
+    Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
 
     Args:
         parts: files that `bake` or `simulate` wrote, in any order. Of frames that several have the first file's count.
@@ -84,11 +85,13 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
             to_text(spool.layer_path, text, out)
             os.replace(text, spool.layer_path)
         spool.finish()
+        reload_open(out)
     except BaseException:
         spool.discard()
         raise
     codes = sorted({code for sources in plan.values() for code in sources})
-    return JoinResult(out, [str(groom) for groom in plan], codes, _gaps(codes))
+    notes = composition_notes(stage, first.path) + _gaps(codes, frame, stage) + out_of_place(stage, out)
+    return JoinResult(out, [str(groom) for groom in plan], codes, notes)
 
 
 class _Part:
@@ -219,13 +222,13 @@ def _below(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
         yield from _below(child)
 
 
-def _gaps(codes: list[float]) -> list[str]:
-    """The note on frames that no part has."""
-    steps = np.diff(codes)
-    wide = np.flatnonzero(steps > 1.5 * np.median(steps)) if len(steps) else []
-    named_gaps = [f"{codes[i]:g} and {codes[i + 1]:g}" for i in wide]
-    return (
-        [f"no part has samples between {', '.join(named_gaps[:4])}{', ...' if len(wide) > 4 else ''}"]
-        if named_gaps
-        else []
-    )
+def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
+    """The notes on frames of the shot that no part has."""
+    frames = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6)) * frame + codes[0]
+    steps = np.diff(frames)
+    usual = np.median(steps) if len(steps) > 1 else frame
+    gaps = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
+    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    gaps = ([f"from {first:g} to {codes[0]:g}"] if codes[0] - first > 0.5 * usual else []) + gaps
+    gaps += [f"from {codes[-1]:g} to {last:g}"] if last - frames[-1] > 0.5 * usual else []
+    return [f"no part has samples {', '.join(gaps[:4])}{', ...' if len(gaps) > 4 else ''}"] if gaps else []

@@ -37,7 +37,7 @@ Materials = Annotated[
 Cuts = Annotated[
     str | None,
     typer.Option(
-        "--cuts", help="First frames after cuts, such as 25,49: hair starts anew; found if left out, or 'none'."
+        "--cuts", help="First frames after cuts, such as 25,49: all hair starts anew; found if left out, or 'none'."
     ),
 ]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]

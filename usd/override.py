@@ -42,7 +42,7 @@ class OverrideWriter:
                 # What lies inside an instance cannot be overridden.
                 _over(layer, above).instanceable = False
         over = _over(layer, path)
-        record(over, facts)
+        record(over, {**facts, "joint": item.joint})
         if item.attachment.skinned:
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             if not item.prim.HasAPI("SkelBindingAPI"):

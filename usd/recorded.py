@@ -16,22 +16,24 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 
 def recorded(prim: Usd.Prim) -> dict:
-    """What `record` wrote, empty where nothing did."""
+    """What `record` wrote, arrays as lists; empty where nothing did."""
     # The strongest layer's alone: composed, a bake over another one would tell a mixture of both.
     told = (spec.customData[KEY] for spec in prim.GetPrimStack() if KEY in spec.customData)
     facts = next(told, None)
-    return dict(facts) if isinstance(facts, dict) else {}
+    if not isinstance(facts, dict):
+        return {}
+    return {name: list(value) if isinstance(value, Vt.DoubleArray) else value for name, value in facts.items()}
 
 
-def cut_facts(cuts) -> dict:
+def cut_facts(cuts: list[float] | None) -> dict:
     """What a bake tells of the cuts, by time code, that its user gave; nothing where they were found."""
-    return {} if cuts is None else {"cuts": Vt.DoubleArray([float(cut) for cut in cuts])}
+    return {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
 
 
-def recorded_cuts(prims: list[Usd.Prim]) -> list[float] | None:
-    """The cuts that the bake of any of these grooms tells of; None where they were found, and will be again."""
-    told = [cuts for prim in prims if isinstance(cuts := recorded(prim).get("cuts"), Vt.DoubleArray)]
-    return [float(cut) for cut in told[0]] if told else None
+def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
+    """The cuts that a groom's bake tells of; None where they were found, and will be again."""
+    told = recorded(prim).get("cuts")
+    return told if isinstance(told, list) else None
 
 
 def recorded_material(prim: Usd.Prim) -> Material | None:

@@ -19,7 +19,7 @@ from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
 from .stage import check_cuts
-from .time_codes import time_codes
+from .time_codes import ascending, time_codes
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ def bake_rig(
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
+    cuts = ascending(cuts)
     if cuts and loop:
         raise NeuralocksError("--cuts: a loop has none; leave out --loop")
     hair = _read(shot, skeleton, head, model, cuts)

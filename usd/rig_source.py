@@ -178,13 +178,16 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
 
 
 def read_each_rig(
-    stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, **options
+    stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, *, cuts=None, **options
 ) -> tuple[list[StageRig], list[NeuralocksError]]:
-    """`read_rig` of several skeletons: those that can be used, and what is wrong with the others."""
+    """`read_rig` of several skeletons: those that can be used, and what is wrong with the others. `cuts` are those of all, or
+    a dictionary of them by path.
+    """
     rigs, errors, skins = [], [], find_skins(stage)
     for prim in prims:
         try:
-            rigs.append(read_rig(stage, prim, border, head, skins=skins, **options))
+            own = cuts.get(str(prim.GetPath())) if isinstance(cuts, dict) else cuts
+            rigs.append(read_rig(stage, prim, border, head, cuts=own, skins=skins, **options))
         except NeuralocksError as error:
             errors.append(error)
     return rigs, errors

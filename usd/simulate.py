@@ -19,7 +19,7 @@ from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .stencils import Stencils
-from .time_codes import time_codes
+from .time_codes import ascending, time_codes
 
 STRANDS = 2000
 """Strands simulated where no number is given."""
@@ -61,6 +61,7 @@ def simulate(
         raise NeuralocksError(f"--strands {count}: must be above 0")
     if not 0 <= volume <= STIFFEST_VOLUME:
         raise NeuralocksError(f"--volume {volume:g}: must lie between 0 and {STIFFEST_VOLUME:g}")
+    cuts = ascending(cuts)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, cuts=cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes, "cuts": cuts}
@@ -84,10 +85,11 @@ class _SimulatedPoser:
         chosen = whole_locks(every, count)
         if not len(chosen):
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
-        # Simulation begins with the animation, whatever frames are wanted.
-        start = min(codes[0], float(self._rig.time_codes[0]))
-        times = sorted({start, *Stencils(item, codes).codes})
-        self._row = {code: row for row, code in enumerate(times)}
+        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest.
+        start = float(self._rig.time_codes[0])
+        wanted = {code: max(code, start) for code in Stencils(item, codes).codes}
+        times = sorted({start, *wanted.values()})
+        self._row = {code: times.index(time) for code, time in wanted.items()}
         seconds = self._rig.border.seconds(times)
         clip, character = self._rig.clip, item.attachment.character
         self._moved = simulated(

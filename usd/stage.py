@@ -89,7 +89,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         skeleton: prim path of the skeleton that carries them; found if left out.
         head: joint (path, or its last part) that carries grooms for which no binding says so.
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
-        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
+        cuts: time codes from which every character is elsewhere and its hair starts anew, or these by skeleton path; found
+            where None.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -162,7 +163,7 @@ def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
 
 def check_cuts(cuts, rigs) -> None:
     """Refuse time codes of cuts at which no rig's animation could have one."""
-    for cut in cuts or ():
+    for cut in () if isinstance(cuts, dict) else cuts or ():
         if not any(rig.time_codes[0] < cut <= rig.time_codes[-1] for rig in rigs):
             known = rigs[0].time_codes
             raise NeuralocksError(

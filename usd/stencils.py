@@ -30,7 +30,7 @@ class Stencils:
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
         rig, border = item.attachment.rig, item.attachment.rig.border
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
-        after = np.searchsorted(rig.clip.times, [] if rig.clip.loop else rig.clip.cuts - 1e-9)
+        after = np.searchsorted(rig.clip.times, rig.clip.cuts - 1e-9)
         self._before, self._after = clip[after - 1], clip[after]
         self._step, self._rate = border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep the very same number.

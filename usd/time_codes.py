@@ -53,9 +53,20 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
         count = math.floor(count) + 1
         # The same time is the same number in every part of a range that is baked in parts.
-        whole = [round(begin + i * step, 9) for i in range(count)]
+        whole = [round(_on_frame(begin + i * step, first, frame), 9) for i in range(count)]
     else:
         whole = [float(code) for code in frames]
     if not whole or not all(math.isfinite(code) for code in whole):
         raise NeuralocksError("frames: none given, or not finite; give at least one time code")
     return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})
+
+
+def ascending(cuts) -> list[float] | None:
+    """Time codes of cuts as the layers below take them: ascending, without doubles; None where they are to be found."""
+    return None if cuts is None else sorted({float(cut) for cut in cuts})
+
+
+def _on_frame(code: float, first: float, frame: float) -> float:
+    """A time code, or the shot's frame that it was rounded from, where a frame is no whole number."""
+    near = first + frame * round((code - first) / frame)
+    return near if frame != 1 and abs(near - code) < 1e-6 * frame else code

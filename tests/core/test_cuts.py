@@ -37,6 +37,14 @@ def test_a_jump_and_a_turn_on_the_spot_are_cuts(rate, turned):
     assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[late][0]])
 
 
+@pytest.mark.parametrize("first", [1, 2, 3, -3, -2, -1])
+def test_cuts_near_the_ends_are_found(first):
+    """A bind pose of a frame or two before the action, which starts elsewhere, is usual."""
+    who, t, joints = walking()
+    joints[first:, who.head, 0, 3] += 3
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[first]])
+
+
 def test_a_held_key_just_before_a_cut():
     """As animators key it: two samples a thousandth of a frame apart."""
     who, t, joints = walking()

@@ -3,13 +3,14 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdSkel, Vt
 from typer.testing import CliRunner
 
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
 from usd.baked import read_baked
 from usd.cli import app
+from usd.inspect import inspect
 from usd.recorded import recorded
 
 from .shots import Recipe, samples, write_shot
@@ -76,21 +77,44 @@ def test_a_bake_tells_the_cuts_that_were_given(bakes):
     assert "cuts" not in recorded(found.prim) and len(found.attachment.rig.clip.cuts) == 1
 
 
+def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
+    """One bake over another, of two characters in a shot."""
+    stage = Usd.Stage.Open(str(shots[0]))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero", stage.GetRootLayer(), "/Twin")
+    stage.GetRootLayer().Export(str(tmp_path / "two.usda"))
+    first = bake(tmp_path / "two.usda", tmp_path / "first.usdc", model, ["/Hero"], cuts=[7, 5, 7]).path
+    second = bake(first, tmp_path / "second.usdc", model, ["/Twin"], cuts=np.zeros(0)).path
+    rigs = {item.attachment.rig.path: item.attachment.rig for item in read_baked(second).shot.grooms}
+    assert rigs["/Hero/Rig"].clip.cuts * 24 == pytest.approx([5, 7])
+    assert not len(rigs["/Twin/Rig"].clip.cuts)
+    assert not any("elsewhere" in note for note in inspect(second)["spoils"])
+
+
+def test_a_loop_has_no_cuts(shots, tmp_path, model):
+    loops = [
+        bake(shots[0], tmp_path / f"{i}.usdc", model, loop=True, cuts=cuts).path for i, cuts in enumerate((None, []))
+    ]
+    for name in ("points", "velocities"):
+        assert (samples(loops[0], name, at=CUT) == samples(loops[1], name, at=CUT)).all()
+    assert not len(read_baked(loops[0]).shot.rigs[0].clip.cuts)
+
+
 def test_the_reference_starts_anew_too(bakes):
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     from neuralocks_core.comparison import simulated
     from neuralocks_core.strands import strands_on
 
     moved = {}
-    for name in ("given", "after", "none"):
-        baked = read_baked(bakes[name].path)
+    for name in ("given", "after", "none", "late"):
+        baked = read_baked(bakes["given" if name == "late" else name].path)
         item = baked.shot.grooms[0]
         character = item.attachment.character
-        times = baked.times[baked.codes >= CUT] if name == "after" else baked.times
+        times = baked.times[baked.codes >= CUT] if name in ("after", "late") else baked.times
         moved[name] = simulated(character, strands_on(character, item.groom), item.attachment.rig.clip, times)
-    at, length = CUT - 1, LAST + 1 - CUT
-    assert np.abs(moved["given"][at : at + length] - moved["after"]).max() < 2e-3
-    assert np.abs(moved["none"][at : at + length] - moved["after"]).max() > 0.02
+    length = LAST + 1 - CUT
+    for name in ("given", "late"):
+        assert np.abs(moved[name][-length:] - moved["after"]).max() < 2e-3
+    assert np.abs(moved["none"][-length:] - moved["after"]).max() > 0.02
 
 
 def test_what_no_cut_can_be_is_refused(shots, tmp_path, model):

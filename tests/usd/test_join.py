@@ -75,6 +75,24 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
         )
 
 
+def test_steps_are_no_gaps(shot, tmp_path, model):
+    parts = parts_of(shot, tmp_path, model, ("3:5:2", "7:9:2"), subframes=3)
+    joined = join(parts, tmp_path / "hair.usdc")
+    assert joined.notes == ["no part has samples from 1 to 3, from 9.66667 to 12"]
+    whole = bake(shot, tmp_path / "whole.usdc", model, frames="3:9:2", subframes=3).path
+    assert joined.path.read_bytes() == whole.read_bytes()
+
+
+def test_an_open_stage_sees_what_was_joined(shot, tmp_path, model):
+    parts = parts_of(shot, tmp_path, model)
+    out = join(parts[:1], tmp_path / "hair.usdc").path
+    stage = Usd.Stage.Open(str(out))
+    points = stage.GetAttributeAtPath("/Hero/Hair.points")
+    assert points.GetNumTimeSamples() == 6
+    join(parts, out)
+    assert points.GetNumTimeSamples() == 12
+
+
 def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
     part, other = tmp_path / "part.usdc", tmp_path / "other.usdc"
     bake(shot, part, model, frames="1:4")
@@ -89,6 +107,7 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
             "other.usdc: /Hero/Hair was baked with other material than in .*part.usdc",
         ),
         (shot, {"strength": 0.5, "resolve": False}, "other resolve, strength than"),
+        (shot, {"joints": {"upper_chest": "spine"}}, "other joints than"),
         (shot, {"velocities": False}, "other velocities than"),
         (elsewhere, {}, "is a bake of another shot than .*part.usdc is"),
         (None, "empty.usda", "is no bake"),
