@@ -45,7 +45,9 @@ def main() -> None:
     if options.floor:
         print(f"floor of forgetting: motion error {floor_of_forgetting(rig, material):.3f}")
         return
-    held = {name: static_report(m, rig, material, options.poses, options.seed) for name, m in models.items()}
+    held = {
+        name: static_report(m, rig, material, options.poses, options.seed, optimised=32) for name, m in models.items()
+    }
     motion = motion_report(rig, material, models)
     if options.json:
         print(json.dumps({"held": held, "motion": motion}, indent=1))

@@ -43,7 +43,9 @@ class Beginning:
         """How the model came about, for the card of what begins with it."""
         training = self._meta.get("training", {})
         return {
-            name: training[name] for name in ("command", "minutes", "steps", "began", "began with") if name in training
+            name: training[name]
+            for name in ("command", "minutes", "steps", "mean", "began", "began with")
+            if name in training
         }
 
     def check(self, spec: BoundarySpec, options) -> None:

@@ -118,7 +118,7 @@ def train_dynamic(
     model = net.model(rig.chains, training)
     if report_poses:
         held_poses, in_motion = within(say, 750, 880, 1000), within(say, 880, 1000, 1000)
-        model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses, optimised=16))
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses))
         model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
     return model
 
