@@ -24,7 +24,7 @@ _ROOM = 0.01
 """Kept from the body over the material's margin while learning [m]: the network sees neither the body's shape nor its arms,
 nor can it hit the mark to the millimetre, and so goes less deep into the body."""
 _RATE = 3e-3
-_LEARNING = 600
+_LEARNING = 700
 """Thousandths of the work that are learning, as by default; the rest is the report."""
 
 

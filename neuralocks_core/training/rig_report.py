@@ -30,9 +30,9 @@ def static_report(
     Returns:
         plain numbers; energies in m^2/s^2 per unit of mass, zero in the bind pose, shares in percent, depths and
         distances in millimetres. `energy`: means over the optimised poses; `excess_percent` is the network's excess
-        over direct optimisation, which is not fully converged, in percent of the latter's magnitude. `tip_error_mm`: mean distance of the chains' ends
-        from where direct optimisation has them. `penetration_*`: of the vertices that lie outside at rest, exact
-        distances.
+        over direct optimisation, which is not fully converged, in percent of the latter's magnitude. `tip_error_mm`: mean
+        distance of the chains' ends from where direct optimisation has them. `penetration_*`: of the vertices that lie
+        outside at rest, exact distances.
     """
     say = progress or silent
     pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)
@@ -44,7 +44,7 @@ def static_report(
     energy = RigEnergy(rig, material)
     directly = _optimise(energy, pool, few, gravity[few], model.max_angle, turns[few], within(say, 0, 300, 1000))
     states = {"network": turns, "optimised": directly}
-    states["rigid"] = rigid[: max(len(few), count // 10)]
+    states["rigid"] = rigid[: max(len(few), count // 20)]
     report = {"poses": count, "energy": {}, "energy_collision": {}}
     for name, state in states.items():
         with torch.no_grad():

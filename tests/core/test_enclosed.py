@@ -31,3 +31,14 @@ def test_air_beside_a_crease_is_no_depth():
     air = np.array([[-0.28, 0.0, 0.0], [-0.22, 0.01, 0.0]])
     assert (Collider(points, box.faces).distance(air)[0] < -0.01).all()
     assert (proven_distances(points, box.faces, air) > 0.01).all()
+
+
+def test_few_points_are_measured_as_many_are():
+    """Those are compared with the triangles in their reach alone, far from these and near, inside and outside."""
+    ball = trimesh.creation.icosphere(4, 0.1)
+    points = np.random.default_rng(1).uniform(-0.13, 0.13, (200, 3))
+    every = proven_distances(ball.vertices, ball.faces, points)
+    few = np.concatenate([proven_distances(ball.vertices, ball.faces, some) for some in np.split(points, 50)])
+    near = every < 0.03
+    np.testing.assert_allclose(few[near], every[near], atol=1e-9)
+    assert (few[~near] > 0.029).all()

@@ -34,3 +34,14 @@ def test_what_would_take_for_ever_is_refused(tmp_path):
         with pytest.raises(NeuralocksError, match=said):
             simulate(shot, tmp_path / "slow.usdc", **wrong)
     assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_path):
+    """So that parts of a range are the whole; before it, hair is at rest."""
+    shot = write_shot(tmp_path, Recipe(strands=6))
+    early, late = (
+        simulate(shot, tmp_path / f"{name}.usdc", strands=6, frames=frames).path
+        for name, frames in (("early", "-3:5"), ("late", "4:5"))
+    )
+    assert samples(early, "points", at=5).tobytes() == samples(late, "points", at=5).tobytes()
+    assert samples(early, "points", at=-3).tobytes() == samples(early, "points", at=1).tobytes()
