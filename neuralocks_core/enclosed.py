@@ -37,7 +37,7 @@ def _in_reach(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -
     """The triangles that the nearest one to any of the points may be among, with all that it shares a corner with there.
 
     Nothing is farther than the nearest vertex, and whatever touches the nearest place is as near. To index a whole body for
-    two points in it takes twenty times as long.
+    two points in it takes three times as long.
     """
     if len(points) > _FEW_ENOUGH:
         return triangles

@@ -18,7 +18,7 @@ from .posing import GroomPoser
 from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
-from .time_codes import ascending, time_codes
+from .time_codes import given_cuts, time_codes
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,7 @@ def bake(
     look = as_material(material)
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
-    if loop and cuts is not None and len(cuts):
-        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
-    # A loop has none, whatever its clip looks like.
-    cuts = [] if loop else ascending(cuts)
+    cuts = given_cuts(cuts, loop)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}

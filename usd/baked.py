@@ -93,8 +93,9 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
         NeuralocksError: it cannot be read, or no groom has samples.
     """
     shot = read_shot(path, grooms, skeleton, head, joints)
-    told = {item.attachment.rig.path: recorded_cuts(item.prim) for item in shot.grooms}
-    if any(cuts is not None for cuts in told.values()):
+    told = [(item.attachment.rig.path, recorded_cuts(item.prim)) for item in shot.grooms]
+    told = {path: cuts for path, cuts in told if cuts is not None}
+    if told:
         shot = read_shot(path, grooms, skeleton, head, joints, told)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):

@@ -22,7 +22,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     ]
     if not wanted:
         return every
-    chosen = []
+    chosen = set()
     for path in wanted:
         text = str(path)
         if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
@@ -32,7 +32,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
             prim = stage.GetPrimAtPath(text)
             fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
             raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
-        chosen += below
+        chosen.update(below)
     return [prim for prim in every if prim in chosen]
 
 

@@ -14,7 +14,7 @@ from neuralocks_core.progress import Progress, silent
 
 from .border import Border, check_layer_name, check_not_input, first_line, open_stage
 from .notes import composition_notes, out_of_place
-from .override import relative, reload_open, repeat_metadata, to_text
+from .override import deliver, relative, repeat_metadata
 from .recorded import KEY
 from .sample_layer import Lagging, SampleLayer, named
 from .spool import Spool, fingerprint
@@ -80,12 +80,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
                     done += 1
                     say(done, total, str(prim.path))
         file.close()
-        if out.suffix.lower() == ".usda":
-            text = spool.layer_path.with_suffix(".usda")
-            to_text(spool.layer_path, text, out)
-            os.replace(text, spool.layer_path)
-        spool.finish()
-        reload_open(out)
+        deliver(spool)
     except BaseException:
         spool.discard()
         raise

@@ -38,12 +38,7 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
 def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
     """The error for a stage without BasisCurves."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
-    remedy = _in_a_variant(stage) or "add one, or import a hair file with 'neuralocks import'"
-    hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
-    if hairy:
-        remedy = (
-            f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
-        )
+    remedy = _in_a_variant(stage) or _on_joints(stage) or "add one, or import a hair file with 'neuralocks import'"
     if other:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
     return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
@@ -52,6 +47,14 @@ def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
 def has_hair_joints(prim: Usd.Prim) -> bool:
     """Whether joints of a Skeleton are named like hair."""
     return any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()))
+
+
+def _on_joints(stage: Usd.Stage) -> str:
+    """Which skeleton has joints for hair, and what moves them; '' if none has."""
+    hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
+    if hairy is None:
+        return ""
+    return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
 
 
 def _in_a_variant(stage: Usd.Stage, most: int = 64) -> str:

@@ -14,6 +14,7 @@ from .border import Border, transformed
 from .curves import rest_points
 from .recorded import record
 from .sample_layer import SampleLayer, named
+from .spool import Spool
 from .stage import Shot, StageGroom
 
 
@@ -154,16 +155,15 @@ def _same(path: str, file) -> bool:
         return False
 
 
-def to_text(crate: Path, text: Path, out: Path) -> None:
-    """Convert an assembled crate file to .usda."""
-    with named(out):
-        layer = Sdf.Layer.FindOrOpen(str(crate))
-        layer.Export(str(text))
-
-
-def reload_open(path: Path) -> None:
-    """Let stages that this process has open see the file that has just been replaced."""
-    layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
+def deliver(spool: Spool) -> None:
+    """Put an assembled layer under its final name, as text where that asks for it; stages that this process has open see it."""
+    if spool.out.suffix.lower() == ".usda":
+        text = spool.layer_path.with_suffix(".usda")
+        with named(spool.out):
+            Sdf.Layer.FindOrOpen(str(spool.layer_path)).Export(str(text))
+        os.replace(text, spool.layer_path)
+    spool.finish()
+    layer = Sdf.Layer.Find(os.path.realpath(spool.out)) or Sdf.Layer.Find(str(spool.out))
     if layer:
         layer.Reload(force=True)
 

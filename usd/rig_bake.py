@@ -19,7 +19,7 @@ from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
 from .stage import check_cuts
-from .time_codes import ascending, time_codes
+from .time_codes import given_cuts, time_codes
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,7 @@ def bake_rig(
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
-    cuts = ascending(cuts)
-    if cuts and loop:
-        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    cuts = given_cuts(cuts, loop)
     hair = _read(shot, skeleton, head, model, cuts)
     source = hair.source.source
     check_not_input(out, hair.stage)
@@ -97,7 +95,7 @@ def bake_rig(
     animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
     notes += hair.source.loop_notes() if loop else []
-    if cuts is None and model.dynamic and not loop:
+    if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 

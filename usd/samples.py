@@ -6,7 +6,6 @@ the file.
 """
 
 import math
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,7 +18,7 @@ from neuralocks_core.progress import Progress, silent
 
 from .border import check_not_input, used_files
 from .damage import names_damage
-from .override import OverrideWriter, reload_open, to_text
+from .override import OverrideWriter, deliver
 from .sample_layer import Lagging
 from .spool import Spool, fingerprint, program_files
 from .stage import Shot, StageGroom
@@ -104,12 +103,7 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
                 say(done, total, item.path)
             behind.put(store.finish)
         behind.put(writer.close)
-    if spool.out.suffix.lower() == ".usda":
-        text = spool.layer_path.with_suffix(".usda")
-        to_text(spool.layer_path, text, spool.out)
-        os.replace(text, spool.layer_path)
-    spool.finish()
-    reload_open(spool.out)
+    deliver(spool)
     return resumed
 
 

@@ -19,7 +19,7 @@ from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
 from .stencils import Stencils
-from .time_codes import ascending, time_codes
+from .time_codes import given_cuts, time_codes
 
 STRANDS = 2000
 """Strands simulated where no number is given."""
@@ -61,7 +61,7 @@ def simulate(
         raise NeuralocksError(f"--strands {count}: must be above 0")
     if not 0 <= volume <= STIFFEST_VOLUME:
         raise NeuralocksError(f"--volume {volume:g}: must lie between 0 and {STIFFEST_VOLUME:g}")
-    cuts = ascending(cuts)
+    cuts = given_cuts(cuts)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, cuts=cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes, "cuts": cuts}
@@ -89,7 +89,8 @@ class _SimulatedPoser:
         start = float(self._rig.time_codes[0])
         wanted = {code: max(code, start) for code in Stencils(item, codes).codes}
         times = sorted({start, *wanted.values()})
-        self._row = {code: times.index(time) for code, time in wanted.items()}
+        rows = {time: row for row, time in enumerate(times)}
+        self._row = {code: rows[time] for code, time in wanted.items()}
         seconds = self._rig.border.seconds(times)
         clip, character = self._rig.clip, item.attachment.character
         self._moved = simulated(

@@ -10,9 +10,9 @@ class Stencils:
     """Which samples of a groom the velocity at each time code is made of.
 
     Central differences over one and two frames to both sides, right to fourth order: at 24 frames a second within 2 %
-    for hair that swings three times a second. Outside of its samples the animation stands still, and at a cut the character
-    is put elsewhere: there the differences are taken to the side that moves, to second order. The velocity at a time code depends on that
-    time code only, not on which others are baked.
+    for hair that swings three times a second. Outside of its samples the animation stands still, and at a cut the
+    character is put elsewhere: there the differences are taken to the side that moves, to second order. The velocity at
+    a time code depends on that time code only, not on which others are baked.
 
     Args:
         item: the groom.

@@ -61,9 +61,17 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})
 
 
-def ascending(cuts) -> list[float] | None:
-    """Time codes of cuts as the layers below take them: ascending, without doubles; None where they are to be found."""
-    return None if cuts is None else sorted({float(cut) for cut in cuts})
+def given_cuts(cuts, loop: bool = False) -> list[float] | None:
+    """Time codes of cuts as the layers below take them: ascending, without doubles; None where they are to be found. A loop
+    has none, whatever its clip looks like.
+
+    Raises:
+        NeuralocksError: some are given for a loop.
+    """
+    given = None if cuts is None else sorted({float(cut) for cut in cuts})
+    if loop and given:
+        raise NeuralocksError("--cuts: a loop has none; leave out --loop")
+    return [] if loop else given
 
 
 def _on_frame(code: float, first: float, frame: float) -> float:
