@@ -18,8 +18,7 @@ import torch
 
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.strands import scalp_local
-from neuralocks_core.training import checkpoint
-from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.methods import normalise, samples
@@ -53,8 +52,7 @@ ROWS = {
 
 def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollouts: int) -> None:
     """Train and measure each variant; prints a Markdown table as it goes."""
-    coder = StrandAutoencoder()
-    checkpoint.load(work / "codes.npz", {"coder": coder})
+    coder = kept_coder(work)
     codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
     scenes = {"rollouts": scene, "held_out": replace(scene, held_out=True)}
     files = {name: sorted((work / name).glob("*.npz"))[:rollouts] for name in scenes}

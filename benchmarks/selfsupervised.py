@@ -19,8 +19,7 @@ import torch
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.strands import scalp_local
-from neuralocks_core.training import checkpoint
-from neuralocks_core.training.autoencoder import StrandAutoencoder
+from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.methods import MomentMethod, normalise
@@ -50,8 +49,7 @@ ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {
 
 def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
     """Train and measure each variant; prints a Markdown table as it goes."""
-    coder = StrandAutoencoder()
-    checkpoint.load(work / "codes.npz", {"coder": coder})
+    coder = kept_coder(work)
     codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
     files = sorted((work / "held_out").glob("*.npz"))
     names = "position static motion motion_static motion_ratio velocity droop penetration".split()

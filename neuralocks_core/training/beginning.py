@@ -15,8 +15,10 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.onnx_graph import OnnxWeights
+from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.work import BEGINNING, CODES
 
 
 class Beginning:
@@ -123,6 +125,15 @@ class Beginning:
             raise NeuralocksError(
                 f"{self.path}: its network is not built as ours ({fact}); begin with another"
             ) from None
+
+
+def kept_coder(work: Path) -> StrandAutoencoder:
+    """The encoder, frozen, of the training that has left this work folder behind."""
+    saved, coder = work / CODES, StrandAutoencoder()
+    if not saved.exists():
+        return Beginning(work / BEGINNING).coder()
+    checkpoint.load(saved, {"coder": coder})
+    return coder.eval().requires_grad_(False)
 
 
 def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) -> None:

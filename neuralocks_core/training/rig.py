@@ -13,7 +13,7 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend, muon
-from neuralocks_core.training.rig_contact import HairOnBodies
+from neuralocks_core.training.rig_contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig_energy import RigMaterial
 from neuralocks_core.training.rig_network import TinyNet
 from neuralocks_core.training.rig_report import static_report, within
@@ -23,6 +23,8 @@ _POOL = 512
 _ROOM = 0.01
 """Kept from the body over the material's margin while learning [m]: the network sees neither the body's shape nor its arms,
 nor can it hit the mark to the millimetre, and so goes less deep into the body."""
+_COLLISION = 0.3
+"""Times the body's stiffness."""
 _RATE = 3e-3
 _LEARNING = 700
 """Thousandths of the work that are learning, as by default; the rest is the report."""
@@ -65,7 +67,7 @@ def train_static(
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
-        return {"elastic": elastic.mean(), "collision": collision.mean()}
+        return {"elastic": elastic.mean(), "collision": contact_weight(done) * _COLLISION * collision.mean()}
 
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)

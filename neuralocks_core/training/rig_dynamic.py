@@ -16,7 +16,7 @@ from neuralocks_core.random_motion import random_clip
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.descent import Schedule, descend, muon
-from neuralocks_core.training.rig_contact import HairOnBodies, Moments
+from neuralocks_core.training.rig_contact import HairOnBodies, Moments, contact_weight
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial
 from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig_network import TinyNet
@@ -96,8 +96,9 @@ def train_dynamic(
         if held.pool.collides:
             # Near the body a small error is a deep one, which squared errors do not tell.
             elastic, collision = held.parts(net, _HELD)
-            result["held"] = _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic.mean()
-            result["moving"] = _COLLISION * moving.parts(net, _MOVING)[1].mean()
+            felt = contact_weight(done)
+            result["held"] = felt * _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic.mean()
+            result["moving"] = felt * _COLLISION * moving.parts(net, _MOVING)[1].mean()
         return result
 
     began = time.monotonic()

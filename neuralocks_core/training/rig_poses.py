@@ -4,6 +4,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from neuralocks_core.collider import Collider
@@ -19,6 +20,8 @@ RANGE = np.radians([60.0, 80.0, 45.0])
 """Most nod, turn and tilt of the head against the chest that people have [rad]."""
 _SIEVE = 5e-3
 """Points farther than this [m] outside the plane of the nearest body vertex are not asked for exactly."""
+_FEW = 128
+"""Points for which the nearest body vertex is found by comparing all: sooner than a tree is made and asked."""
 
 
 class PosePool:
@@ -55,9 +58,10 @@ class PosePool:
         self._patch = _BodyPatch(rig, rng, most_points) if rig.character.body is not None and len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.offsets) if self._patch else 0))
         self.bodies = [None] * count if self._patch and whole else None
-        self._trees = [None] * count
         kept = len(self._patch.kept) if self._patch else 0
-        self._points, self._normals = np.empty((2, count, kept, 3), np.float32)
+        self._normals = np.empty((count, kept, 3), np.float32)
+        # x, y, z and x.x of each body vertex: a matrix product with (-2 p, 1) tells which is nearest to p.
+        self._points = np.empty((count, 4, kept), np.float32)
         self.renew(count)
 
     @property
@@ -84,10 +88,10 @@ class PosePool:
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
         for row, matrices in zip(rows, skinning):
-            body, normals = self._patch.posed(matrices, self.shapes[row])
-            self._points[row] = body[self._patch.kept]
-            self._normals[row] = normals[self._patch.kept]
-            self._trees[row] = cKDTree(self._points[row], balanced_tree=False, compact_nodes=False)
+            body = self._patch.posed(matrices, self.shapes[row])
+            points = body[self._patch.kept]
+            self._points[row, :3], self._points[row, 3] = points.T, np.square(points).sum(axis=1)
+            self._normals[row] = self._patch.normals(body)
             if self.bodies is not None:
                 self.bodies[row] = body
         return rows
@@ -114,9 +118,9 @@ class PosePool:
         """
         normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
         for row, pose in enumerate(poses):
-            nearest = self._trees[pose].query(points[row])[1]
-            normals[row] = self._normals[pose][nearest]
-            offsets[row] = np.einsum("vi,vi->v", normals[row], self._points[pose][nearest])
+            nearest = _nearest(points[row], self._points[pose])
+            normals[row] = self._normals[pose, nearest]
+            offsets[row] = np.einsum("vi,iv->v", normals[row], self._points[pose, :3][:, nearest])
             # Where the rest of the body was cut off, a plane says nothing about inside and outside.
             offsets[row][self._patch.rim[nearest]] = -1e3
         return normals, offsets
@@ -139,6 +143,15 @@ class PosePool:
         return result
 
 
+def _nearest(points: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Which of the body's vertices, columns x, y, z, x.x of (4, n), is nearest to each of the points (V, 3)."""
+    if len(points) > _FEW:
+        return cKDTree(body[:3].T, balanced_tree=False, compact_nodes=False).query(points)[1]
+    asked = np.ones((len(points), 4), np.float32)
+    asked[:, :3] = -2 * points
+    return (asked @ body).argmin(axis=1)
+
+
 class _BodyPatch:
     """The part of the body around the head that hair can reach.
 
@@ -158,24 +171,37 @@ class _BodyPatch:
         place = np.zeros(len(body.points), int)
         place[used] = np.arange(len(used))
         self.triangles = place[body.triangles[inside]]
-        self.points, self.weights, self.indices = body.points[used], body.joint_weights[used], body.joint_indices[used]
+        self.points = body.points[used].astype(np.float32)
+        joints, shares = body.joint_indices[used], body.joint_weights[used].astype(np.float32)
+        rows = np.repeat(np.arange(len(used)), joints.shape[1])
+        self.weights = csr_array((shares.ravel(), (rows, joints.ravel())), (len(used), len(character.skeleton.names)))
         shapes = list(body.shapes.values())
         offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
         # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(self.weights * (self.indices == character.head), axis=1)
+        on_head = np.sum(shares * (joints == character.head), axis=1)
         mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
-        self.offsets = (offsets - mean) * (1 - on_head)[:, None]
+        self.offsets = ((offsets - mean) * (1 - on_head)[:, None]).astype(np.float32)
         self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        corners = self.triangles.ravel()
+        around = csr_array(
+            (np.ones(len(corners)), (corners, np.arange(len(corners)) // 3)), (len(used), len(self.triangles))
+        )
+        self._around = around.astype(np.float32)[self.kept]
         cut = np.zeros(len(body.points), bool)
         cut[body.triangles[~inside]] = True
         self.rim = cut[used][self.kept]
 
-    def posed(self, skinning: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices and normals (V, 3) float32 under skinning matrices (J, 4, 4) and blend shape weights (B,)."""
-        shaped = self.points + np.tensordot(shape, self.offsets, 1)
-        blended = np.einsum("vi,vixy->vxy", self.weights, skinning[self.indices, :3])
-        points = (np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]).astype(np.float32)
-        return points, vertex_normals(points, self.triangles).astype(np.float32)
+    def posed(self, skinning: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Vertices (V, 3) float32 under skinning matrices (J, 4, 4) and blend shape weights (B,)."""
+        shaped = self.points + np.tensordot(shape.astype(np.float32), self.offsets, 1)
+        blended = (self.weights @ skinning[:, :3].reshape(len(skinning), 12).astype(np.float32)).reshape(-1, 3, 4)
+        return np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Unit normals (kept, 3) float32 of vertices (V, 3), as `vertex_normals`."""
+        a, b, c = (points[corner] for corner in self.triangles.T)
+        total = self._around @ np.cross(b - a, c - a)
+        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
 
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -184,7 +210,7 @@ def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.
     patch = _BodyPatch(rig, np.random.default_rng(0), 1)
     skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
     shape = np.zeros(len(patch.offsets))
-    return np.stack([proven_distances(patch.posed(m, shape)[0], patch.triangles, p) for m, p in zip(skinning, points)])
+    return np.stack([proven_distances(patch.posed(m, shape), patch.triangles, p) for m, p in zip(skinning, points)])
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:

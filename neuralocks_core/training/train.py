@@ -20,7 +20,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.strands import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
-from neuralocks_core.training.beginning import Beginning
+from neuralocks_core.training.beginning import Beginning, kept_coder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import Gauge, measure
@@ -29,7 +29,7 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.work import beginning_of, discard, keep_beginning, work_folder
+from neuralocks_core.training.work import CODES, beginning_of, discard, keep_beginning, work_folder
 
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
@@ -253,11 +253,9 @@ def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginn
 
 def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
     """The strand autoencoder: trained once, kept for a resumed run."""
-    saved = work / "codes.npz"
-    coder = StrandAutoencoder()
+    saved = work / CODES
     if saved.exists():
-        checkpoint.load(saved, {"coder": coder})
-        return coder.eval().requires_grad_(False)
+        return kept_coder(work)
     shapes = np.concatenate([scalp_local(groom)[groom.valid] for groom in scene.grooms])
     budget = {"steps": min(1000, options.steps)} if options.steps else {"seconds": min(35.0, 4.0 * options.minutes)}
     coder = train_autoencoder(

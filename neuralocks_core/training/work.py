@@ -10,6 +10,8 @@ from neuralocks_core.files import atomic_write
 
 BEGINNING = "begin.neuralocks"
 """In the work folder: the model that a training begins with."""
+CODES = "codes.npz"
+"""In the work folder: the strand autoencoder, where a training makes its own."""
 
 
 def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
@@ -22,7 +24,7 @@ def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = 
     if out.suffix != ".neuralocks":
         raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
     work = Path(work) if work else out.with_name(out.name + ".training")
-    if resume and not any((work / name).exists() for name in ("checkpoint.npz", "codes.npz", BEGINNING)):
+    if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work
 
