@@ -27,6 +27,7 @@ from .notes import (
     no_groom,
     not_animated,
     out_of_range,
+    partial_body,
     rig_notes,
 )
 from .placement import Placement
@@ -88,7 +89,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
-        spoils += rig.notes + rig_notes(rig) + ([] if told else rig.cut_notes())
+        spoils += rig.notes + rig_notes(rig) + partial_body(rig, rigs) + ([] if told else rig.cut_notes())
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))

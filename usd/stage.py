@@ -24,6 +24,7 @@ from .notes import (
     no_groom,
     not_animated,
     nothing_found,
+    partial_body,
     rig_notes,
     stands_still,
 )
@@ -106,8 +107,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
-    every = [] if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
-    others = [rig for rig in every if rig.path != skeleton]
+    every = rigs if skeleton is None else _rigs(stage, border, None, head, path, joints=joints)
+    others = [rig for rig in every if rig.path != skeleton] if skeleton and not grooms else []
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
     found = _grooms(search, curves, notes)
     if not found:
@@ -120,7 +121,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
     for rig in used:
         _check_animated([rig])
-        notes += rig.notes
+        notes += rig.notes + partial_body(rig, every)
     for item in found:
         notes += rig_notes(replace(item.attachment.rig, character=item.attachment.character))
     first, last = frame_range(stage, used)

@@ -256,3 +256,18 @@ def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
     assert rigs[1].source.animated
     np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
     assert len(rigs[1].time_codes) == 9
+
+
+def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
+    path = write_shot(tmp_path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    Sdf.CopySpec(layer, "/Hero", layer, "/Coat")  # the binding is copied with its targets
+    stage = Usd.Stage.Open(layer)
+    stage.RemovePrim("/Coat/Hair")
+    layer.Save()
+    told = "/Hero/Rig: /Coat/Rig is the same character, whose meshes hair is not kept out of; bind them"
+    assert any(note.startswith(told) for note in read_shot(path).notes)
+    assert any(note.startswith(told) for note in inspect(path)["spoils"])
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))
+    layer.Save()  # now it is somebody else
+    assert not any("same character" in note for note in read_shot(path).notes)
