@@ -11,13 +11,16 @@ from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
+ROOM = 0.2
+"""So far beyond where hair rests [m] it could come to touch a body: the neck bends."""
+
 
 @dataclass(frozen=True)
 class HairRig:
     """What training, report and pictures need of a rig.
 
     Attributes:
-        character: its body holds no hair.
+        character: its body holds no hair; without one where none of it is in the hair's reach, as shoes are not.
         chains: the hair joints.
         points: vertices that the hair joints move, canonical bind pose, (V, 3) [m].
         weights: on the head and on each hair joint, (V, 1 + N).
@@ -29,6 +32,11 @@ class HairRig:
     points: np.ndarray
     weights: np.ndarray
     triangles: np.ndarray
+
+    def near(self, points: np.ndarray) -> np.ndarray:
+        """Which canonical points of a body (..., 3) [m] the hair could come to touch, (...) bool."""
+        hair = np.concatenate([self.points, self.chains.origins])
+        return np.linalg.norm(points, axis=-1) < np.linalg.norm(hair, axis=1).max() + ROOM
 
 
 def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list[str] | None = None) -> HairRig:
@@ -55,13 +63,16 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
     if body is not None:
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
         body = Body(body.points, faces, body.joint_indices, body.joint_weights, body.shapes) if len(faces) else None
-    return HairRig(
-        replace(character, body=body),
+    rig = HairRig(
+        replace(character, body=None),
         chains,
         np.concatenate(points) if points else np.zeros((0, 3)),
         np.concatenate(weights) if weights else np.zeros((0, len(chains) + 1)),
         np.concatenate(triangles) if triangles else np.zeros((0, 3), int),
     )
+    if body is None or not rig.near(character.canonical(body.points[body.triangles])).all(axis=1).any():
+        return rig
+    return replace(rig, character=replace(character, body=body))
 
 
 def _parted(meshes: list[SkinnedMesh], skeleton: Skeleton, head: int, moving: np.ndarray):

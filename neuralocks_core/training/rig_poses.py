@@ -164,9 +164,7 @@ class _BodyPatch:
 
     def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
         body, character = rig.character.body, rig.character
-        reach = np.linalg.norm(rig.points, axis=1).max() + 0.2
-        near = np.linalg.norm(rig.character.canonical(rig.character.body.points), axis=1) < reach
-        inside = near[body.triangles].all(axis=1)
+        inside = rig.near(character.canonical(body.points))[body.triangles].all(axis=1)
         used = np.unique(body.triangles[inside])
         place = np.zeros(len(body.points), int)
         place[used] = np.arange(len(used))
@@ -274,7 +272,7 @@ def _random_skinning(character, count, rng) -> np.ndarray:
 
 def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tuple[np.ndarray, np.ndarray] | None:
     """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
-    canonical space of the head.
+    canonical space of the head; None if there are none.
     """
     body, character = rig.character.body, rig.character
     if body is None:
@@ -283,6 +281,8 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tu
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
+    if not len(near):
+        return None
     chosen = np.sort(np.random.default_rng(0).permutation(near)[:most_points])
     normals = vertex_normals(body.points, body.triangles)[chosen]
     to_head = np.linalg.inv(character.canonical_to_world(joints))

@@ -15,9 +15,11 @@ from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import feature_columns
-from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.training import rig_dynamic
+from neuralocks_core.training.rig import train_static
 from neuralocks_core.training.rig_contact import HairOnBodies, Moments
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree
 from neuralocks_core.training.rig_report import hair_points, no_turns
@@ -145,3 +147,29 @@ def test_twist_of_a_lock_is_seen_and_learned_from():
     # Of a turn R by an angle a, |R - 1|^2 = 4 (1 - cos a).
     expected = rig_dynamic._BESIDE**2 * 4 * (1 - np.cos(angle))
     assert (marks[1] - marks[0]).square().sum().item() == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("away", [0.0, 1.5])
+def test_a_body_out_of_the_hairs_reach_is_none(away):
+    """Shoes alone on the skeleton: nothing is near, and training goes on without a body."""
+    rig = on_a_ball()
+    who, body, feet = rig.character, rig.character.body, rig.character.skeleton.names.index("hips")
+    joint = who.head if not away else feet
+    joints = np.full((len(body.points), 1), joint)
+    body = replace(body, points=body.points - (0, away, 0), joint_indices=joints)
+    ribbon = rig.points + who.skeleton.bind[who.head, :3, 3]
+    on = rig.chains.joints[rig.weights[:, 1:].argmax(axis=1)][:, None]
+    meshes = [
+        SkinnedMesh("body", body.points, body.triangles, joints, body.joint_weights),
+        SkinnedMesh("hair", ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
+    ]
+    hair = Body(ribbon, meshes[1].triangles, on, meshes[1].joint_weights)
+    both = Body(
+        np.concatenate([body.points, hair.points]),
+        np.concatenate([body.triangles, hair.triangles + len(body.points)]),
+        np.concatenate([joints, on]),
+        np.concatenate([body.joint_weights, hair.joint_weights]),
+    )
+    rig = assemble_rig(replace(who, body=both), meshes)
+    assert (rig.character.body is None) == (away > 0)
+    assert train_static(rig, steps=2, batch=4, report_poses=0).training["steps"] == 2
