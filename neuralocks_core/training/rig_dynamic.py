@@ -34,6 +34,8 @@ _POOL = 256
 """Bodies held ready, as many in motion."""
 _HELD, _MOVING = 16, 8
 """Bodies in held poses and in motion of which the contact is felt in a step."""
+_CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
+"""About how long each takes [s], so that progress goes evenly."""
 _MOMENTS = 16
 """Of each simulated motion, from which those in motion are drawn."""
 _ROOM, _HELD_ROOM = 0.006, 0.012
@@ -75,7 +77,9 @@ def train_dynamic(
     rng = np.random.default_rng(seed)
     say = progress or silent
     spec = rig_spec(dynamic=True)
-    features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, say)
+    simulate, learn = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
+    first, second = (int(1000 * t / (simulate + learn + _REPORT_TAKES)) for t in (simulate, simulate + learn))
+    features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, first, 1000))
     held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
@@ -104,7 +108,7 @@ def train_dynamic(
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
     for state in descend(muon(net, _RATE, 0.1), losses, schedule):
-        say(200 + int(550 * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
+        say(first + int((second - first) * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
         "method": "dynamic, regression on simulated chains",
         "steps": state.step,
@@ -118,9 +122,11 @@ def train_dynamic(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        held_poses, in_motion = within(say, 750, 880, 1000), within(say, 880, 1000, 1000)
+        middle = (second + 1000) // 2
+        held_poses, in_motion = within(say, second, middle, 1000), within(say, middle, 1000, 1000)
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses))
         model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
+        say(1000, 1000, "report done")
     return model
 
 
@@ -137,7 +143,7 @@ def _simulated(rig, material, spec, clips, seconds, rng, say) -> tuple[np.ndarra
     """
     parts, read, posed = [], [], []
     for first in range(0, clips, 16):
-        say(200 * first // clips, 1000, f"simulating motion, {first} of {clips} clips")
+        say(first, clips, f"simulating motion, {first} of {clips} clips")
         few = [random_clip(rig.character, rng, seconds, rate=RATE) for _ in range(min(16, clips - first))]
         parts.append(simulate_motions(rig, material, spec, few))
         for motion, features in zip(few, parts[-1][0]):
