@@ -14,7 +14,8 @@ import torch
 from neuralocks_core.motion import GRAVITY, G
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
-from neuralocks_core.training.rig_poses import PosePool, rest_clearance
+from neuralocks_core.training.rig_body import rest_clearance
+from neuralocks_core.training.rig_poses import PosePool
 
 
 @dataclass(frozen=True)

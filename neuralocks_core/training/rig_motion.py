@@ -16,8 +16,8 @@ from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig.kinematics import pose_chains, quaternion_matrices, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.training.rig_body import body_around, posed_distances, rest_distances
 from neuralocks_core.training.rig_energy import RigMaterial, RodTree
-from neuralocks_core.training.rig_poses import body_around, posed_distances, rest_distances
 from neuralocks_core.training.rig_report import depths, hair_points, no_turns
 
 RATE = 30.0

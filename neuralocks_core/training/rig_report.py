@@ -6,8 +6,9 @@ import torch
 
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
+from neuralocks_core.training.rig_body import rest_distances
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, bounded_turns
-from neuralocks_core.training.rig_poses import PosePool, rest_distances
+from neuralocks_core.training.rig_poses import PosePool
 
 POINTS = 400
 """Of a hair mesh, by which its motion is measured."""

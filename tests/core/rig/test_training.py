@@ -24,10 +24,11 @@ from neuralocks_core.rig.kinematics import (
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig import train_static
+from neuralocks_core.training.rig_body import posed_distances, rest_distances
 from neuralocks_core.training.rig_dynamic import train_dynamic
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns
 from neuralocks_core.training.rig_motion import SPRINGS, motion_report
-from neuralocks_core.training.rig_poses import PosePool, posed_distances, rest_distances
+from neuralocks_core.training.rig_poses import PosePool
 from tests.core.rig.builders import character, random_model, tail
 
 

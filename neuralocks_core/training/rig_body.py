@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The body around the head of a rig with mesh hair: posed, and how far from it points are."""
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from neuralocks_core.collider import Collider
+from neuralocks_core.enclosed import proven_distances
+from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.rig.rigging import HairRig
+
+
+class BodyPatch:
+    """The part of the body around the head that hair can reach.
+
+    Attributes:
+        triangles: into its vertices.
+        kept: vertices whose planes are used.
+        rim: which of these touch the cut, (kept,).
+        offsets: of its blend shapes, (B, vertices, 3).
+    """
+
+    def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
+        body, character = rig.character.body, rig.character
+        inside = rig.near(character.canonical(body.points))[body.triangles].all(axis=1)
+        used = np.unique(body.triangles[inside])
+        place = np.zeros(len(body.points), int)
+        place[used] = np.arange(len(used))
+        self.triangles = place[body.triangles[inside]]
+        self.points = body.points[used].astype(np.float32)
+        joints, shares = body.joint_indices[used], body.joint_weights[used].astype(np.float32)
+        rows = np.repeat(np.arange(len(used)), joints.shape[1])
+        self.weights = csr_array((shares.ravel(), (rows, joints.ravel())), (len(used), len(character.skeleton.names)))
+        shapes = list(body.shapes.values())
+        offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
+        # The hair was fitted to its own head: other bodies vary below it.
+        on_head = np.sum(shares * (joints == character.head), axis=1)
+        mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
+        self.offsets = ((offsets - mean) * (1 - on_head)[:, None]).astype(np.float32)
+        self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        corners = self.triangles.ravel()
+        around = csr_array(
+            (np.ones(len(corners)), (corners, np.arange(len(corners)) // 3)), (len(used), len(self.triangles))
+        )
+        self._around = around.astype(np.float32)[self.kept]
+        cut = np.zeros(len(body.points), bool)
+        cut[body.triangles[~inside]] = True
+        self.rim = cut[used][self.kept]
+
+    def posed(self, skinning: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Vertices (V, 3) float32 under skinning matrices (J, 4, 4) and blend shape weights (B,)."""
+        shaped = self.points + np.tensordot(shape.astype(np.float32), self.offsets, 1)
+        blended = (self.weights @ skinning[:, :3].reshape(len(skinning), 12).astype(np.float32)).reshape(-1, 3, 4)
+        return np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Unit normals (kept, 3) float32 of vertices (V, 3), as `vertex_normals`."""
+        a, b, c = (points[corner] for corner in self.triangles.T)
+        total = self._around @ np.cross(b - a, c - a)
+        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+
+
+def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
+    character = rig.character
+    patch = BodyPatch(rig, np.random.default_rng(0), 1)
+    skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
+    shape = np.zeros(len(patch.offsets))
+    return np.stack([proven_distances(patch.posed(m, shape), patch.triangles, p) for m, p in zip(skinning, points)])
+
+
+def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Distance (V,) [m] that canonical points (V, 3) may come near the body: what they have in bind pose, exactly or by
+    the nearest body vertex's plane, whichever is less.
+
+    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair was thrown
+    from where the artist had put it.
+    """
+    exact, body = rest_distances(rig, points), rig.character.body
+    if body is None or not len(points):
+        return exact
+    used = np.unique(body.triangles)
+    vertices = rig.character.canonical(body.points)
+    normals = vertex_normals(vertices, body.triangles)[used]
+    nearest = cKDTree(vertices[used]).query(points)[1]
+    return np.minimum(exact, np.einsum("vi,vi->v", points - vertices[used][nearest], normals[nearest]))
+
+
+def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Signed distances (V,) [m] of canonical points (V, 3) to the body in bind pose; infinite without one."""
+    body = rig.character.body
+    if body is None:
+        return np.full(len(points), np.inf)
+    return Collider(rig.character.canonical(rig.character.body.points), body.triangles).distance(points)[0]
+
+
+def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tuple[np.ndarray, np.ndarray] | None:
+    """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
+    canonical space of the head; None if there are none.
+    """
+    body, character = rig.character.body, rig.character
+    if body is None:
+        return None
+    canonical = rig.character.canonical(rig.character.body.points)
+    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
+    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
+    near = np.flatnonzero(used)
+    if not len(near):
+        return None
+    chosen = np.sort(np.random.default_rng(0).permutation(near)[:most_points])
+    normals = vertex_normals(body.points, body.triangles)[chosen]
+    to_head = np.linalg.inv(character.canonical_to_world(joints))
+    skinning = to_head[:, None] @ joints @ character.inverse_bind
+    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
+    for row, matrices in enumerate(skinning):
+        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
+        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
+        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
+    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)
