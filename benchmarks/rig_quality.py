@@ -53,9 +53,10 @@ def main() -> None:
         print(json.dumps({"held": held, "motion": motion}, indent=1))
         return
     print(
-        "| held poses | energy | of it collision | tips off direct, mm | inside % | deeper than 5 mm, % of poses | worst mm |"
+        "| held poses | energy | of it collision | tips off direct, mm | inside % | deeper than 5 mm, % of poses | worst mm | "
+        "joint turned most, degrees |"
     )
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     first = next(iter(held))
     for name, report in held.items():
         _held_row(name, report, "network")
@@ -101,6 +102,8 @@ def _held_row(name: str, report: dict, key: str) -> None:
     values = [f"{report['energy'][key]:.3f}", f"{report['energy_collision'][key]:.3f}"]
     values += [f"{report['tip_error_mm'][key]:.0f}", f"{depth['percent']:.3f}"]
     values += [f"{depth['percent_of_poses_deeper_than_5_mm']:.1f}", f"{depth['worst_mm']:.1f}"]
+    turned = report["most_turned"]["degrees"]
+    values.append(f"{turned:.0f}" if key == "network" else "-")
     print(f"| {name} ({depth['poses']} poses) | " + " | ".join(values) + " |")
 
 

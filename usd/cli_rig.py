@@ -206,6 +206,12 @@ def report_lines(report: dict) -> list[str]:
             f"held poses: tips {off['network']:.0f} mm from where direct optimisation has them (carried rigidly "
             f"{off['rigid']:.0f} mm)"
         )
+    if "most_turned" in report:
+        turned = report["most_turned"]
+        line = f"held poses: no joint is turned more than '{turned['joint']}', by {turned['degrees']:.0f} degrees in the mean"
+        lines.append(
+            line + ("; look at it, and train with another --seed if it stands out" if turned["degrees"] > 60 else "")
+        )
     for name, words in (("network", "network"), ("optimised", "direct optimisation"), ("rigid", "carried rigidly")):
         if f"penetration_{name}" in report:
             p = report[f"penetration_{name}"]

@@ -4,6 +4,7 @@
 import numpy as np
 import torch
 
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
 from neuralocks_core.training.rig_body import rest_distances
@@ -32,7 +33,8 @@ def static_report(
         plain numbers; energies in m^2/s^2 per unit of mass, zero in the bind pose, shares in percent, depths and
         distances in millimetres. `energy`: means over the optimised poses; `excess_percent` is the network's excess
         over direct optimisation, which is not fully converged, in percent of the latter's magnitude. `tip_error_mm`: mean
-        distance of the chains' ends from where direct optimisation has them. `penetration_*`: of the vertices that lie
+        distance of the chains' ends from where direct optimisation has them. `most_turned`: the joint that is turned most
+        in the mean over all poses, and by how much [degrees]: a lock that stands out from the head. `penetration_*`: of the vertices that lie
         outside at rest, exact distances.
     """
     say = progress or silent
@@ -58,6 +60,8 @@ def static_report(
     tips = {name: _ends(rig, state[few])[:, rig.chains.bone_end < 0] for name, state in states.items()}
     off = {name: np.linalg.norm(points - tips["optimised"], axis=-1) for name, points in tips.items()}
     report["tip_error_mm"] = {name: 1e3 * float(distance.mean()) for name, distance in off.items()}
+    angle = np.degrees(2 * np.arccos(np.clip(np.abs(turns[..., 0]), 0, 1)).mean(axis=0))
+    report["most_turned"] = {"joint": leaf(rig.chains.names[angle.argmax()]), "degrees": float(angle.max())}
     if pool.collides:
         rest = rest_distances(rig, rig.points)
         outside, done, whole = rest > 0, 0, sum(map(len, states.values()))
