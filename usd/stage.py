@@ -107,8 +107,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
-    every = rigs if skeleton is None else _rigs(stage, border, None, head, path, joints=joints)
-    others = [rig for rig in every if rig.path != skeleton] if skeleton and not grooms else []
+    every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
+    others = [rig for rig in every if skeleton and rig.path != skeleton]
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
     found = _grooms(search, curves, notes)
     if not found:

@@ -33,10 +33,11 @@ class HairRig:
     weights: np.ndarray
     triangles: np.ndarray
 
-    def near(self, points: np.ndarray) -> np.ndarray:
-        """Which canonical points of a body (..., 3) [m] the hair could come to touch, (...) bool."""
+    def in_reach(self, body: Body) -> np.ndarray:
+        """Which triangles (F,) bool of the character's body the hair could come to touch."""
         hair = np.concatenate([self.points, self.chains.origins])
-        return np.linalg.norm(points, axis=-1) < np.linalg.norm(hair, axis=1).max() + ROOM
+        away = np.linalg.norm(self.character.canonical(body.points), axis=1)
+        return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
 
 
 def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list[str] | None = None) -> HairRig:
@@ -70,7 +71,7 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
         np.concatenate(weights) if weights else np.zeros((0, len(chains) + 1)),
         np.concatenate(triangles) if triangles else np.zeros((0, 3), int),
     )
-    if body is None or not rig.near(character.canonical(body.points[body.triangles])).all(axis=1).any():
+    if body is None or not rig.in_reach(body).any():
         return rig
     return replace(rig, character=replace(character, body=body))
 

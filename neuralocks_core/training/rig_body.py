@@ -2,9 +2,9 @@
 """The body around the head of a rig with mesh hair: posed, and how far from it points are."""
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
+from neuralocks_core.character import Body
 from neuralocks_core.collider import Collider
 from neuralocks_core.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
@@ -15,59 +15,37 @@ class BodyPatch:
     """The part of the body around the head that hair can reach.
 
     Attributes:
-        triangles: into its vertices.
+        body: that part, whose blend shapes leave the head as it is.
         kept: vertices whose planes are used.
         rim: which of these touch the cut, (kept,).
-        offsets: of its blend shapes, (B, vertices, 3).
     """
 
     def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
         body, character = rig.character.body, rig.character
-        inside = rig.near(character.canonical(body.points))[body.triangles].all(axis=1)
+        inside = rig.in_reach(body)
         used = np.unique(body.triangles[inside])
         place = np.zeros(len(body.points), int)
         place[used] = np.arange(len(used))
-        self.triangles = place[body.triangles[inside]]
-        self.points = body.points[used].astype(np.float32)
-        joints, shares = body.joint_indices[used], body.joint_weights[used].astype(np.float32)
-        rows = np.repeat(np.arange(len(used)), joints.shape[1])
-        self.weights = csr_array((shares.ravel(), (rows, joints.ravel())), (len(used), len(character.skeleton.names)))
-        shapes = list(body.shapes.values())
-        offsets = np.stack([s[used] for s in shapes]) if shapes else np.zeros((0, len(used), 3))
+        weights, joints = body.joint_weights[used], body.joint_indices[used]
         # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(shares * (joints == character.head), axis=1)
-        mean = offsets[:, on_head > 0.9].mean(axis=1, keepdims=True) if (on_head > 0.9).any() else 0.0
-        self.offsets = ((offsets - mean) * (1 - on_head)[:, None]).astype(np.float32)
+        on_head = np.sum(weights * (joints == character.head), axis=1)
+        shapes = {}
+        for name, offsets in body.shapes.items():
+            mean = offsets[used][on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
+            shapes[name] = (offsets[used] - mean) * (1 - on_head)[:, None]
+        self.body = Body(body.points[used], place[body.triangles[inside]], joints, weights, shapes)
         self.kept = np.sort(rng.permutation(len(used))[:most_points])
-        corners = self.triangles.ravel()
-        around = csr_array(
-            (np.ones(len(corners)), (corners, np.arange(len(corners)) // 3)), (len(used), len(self.triangles))
-        )
-        self._around = around.astype(np.float32)[self.kept]
         cut = np.zeros(len(body.points), bool)
         cut[body.triangles[~inside]] = True
         self.rim = cut[used][self.kept]
-
-    def posed(self, skinning: np.ndarray, shape: np.ndarray) -> np.ndarray:
-        """Vertices (V, 3) float32 under skinning matrices (J, 4, 4) and blend shape weights (B,)."""
-        shaped = self.points + np.tensordot(shape.astype(np.float32), self.offsets, 1)
-        blended = (self.weights @ skinning[:, :3].reshape(len(skinning), 12).astype(np.float32)).reshape(-1, 3, 4)
-        return np.einsum("vxy,vy->vx", blended[:, :, :3], shaped) + blended[:, :, 3]
-
-    def normals(self, points: np.ndarray) -> np.ndarray:
-        """Unit normals (kept, 3) float32 of vertices (V, 3), as `vertex_normals`."""
-        a, b, c = (points[corner] for corner in self.triangles.T)
-        total = self._around @ np.cross(b - a, c - a)
-        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
 
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
     character = rig.character
-    patch = BodyPatch(rig, np.random.default_rng(0), 1)
+    body = BodyPatch(rig, np.random.default_rng(0), 1).body
     skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
-    shape = np.zeros(len(patch.offsets))
-    return np.stack([proven_distances(patch.posed(m, shape), patch.triangles, p) for m, p in zip(skinning, points)])
+    return np.stack([proven_distances(body.posed(m), body.triangles, p) for m, p in zip(skinning, points)])
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:

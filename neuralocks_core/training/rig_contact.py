@@ -18,7 +18,7 @@ EVERY, RENEWED = 16, 8
 went twice as deep into others."""
 HARD = 256
 """So many situations in which hair lay deepest are remembered. Among random ones alone they are met too seldom to be
-learned: of 1,000 held-out poses hair was deeper than 5 mm in ten to twenty, and is in at most two."""
+learned: of 1,000 held-out poses hair was deeper than 5 mm in ten to twenty, and is in at most six."""
 
 GENTLE, GROWING = 1e-3, 0.6
 """Contact begins with this share of its weight, which grows evenly in its logarithm over this share of the budget. With all

@@ -77,9 +77,12 @@ def train_dynamic(
     rng = np.random.default_rng(seed)
     say = progress or silent
     spec = rig_spec(dynamic=True)
-    simulate, learn = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
-    first, second = (int(1000 * t / (simulate + learn + _REPORT_TAKES)) for t in (simulate, simulate + learn))
-    features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, first, 1000))
+    simulating, learning = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
+    ends = np.cumsum([simulating, learning, _REPORT_TAKES])
+    simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
+    features, turns, moments = _simulated(
+        rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated, 1000)
+    )
     held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
@@ -108,7 +111,8 @@ def train_dynamic(
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
     for state in descend(muon(net, _RATE, 0.1), losses, schedule):
-        say(first + int((second - first) * state.done), 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
+        far = simulated + int((learned - simulated) * state.done)
+        say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
         "method": "dynamic, regression on simulated chains",
         "steps": state.step,
@@ -122,8 +126,8 @@ def train_dynamic(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        middle = (second + 1000) // 2
-        held_poses, in_motion = within(say, second, middle, 1000), within(say, middle, 1000, 1000)
+        middle = (learned + 1000) // 2
+        held_poses, in_motion = within(say, learned, middle, 1000), within(say, middle, 1000, 1000)
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses))
         model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
         say(1000, 1000, "report done")

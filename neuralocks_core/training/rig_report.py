@@ -34,8 +34,8 @@ def static_report(
         distances in millimetres. `energy`: means over the optimised poses; `excess_percent` is the network's excess
         over direct optimisation, which is not fully converged, in percent of the latter's magnitude. `tip_error_mm`: mean
         distance of the chains' ends from where direct optimisation has them. `most_turned`: the joint that is turned most
-        in the mean over all poses, and by how much [degrees]: a lock that stands out from the head. `penetration_*`: of the vertices that lie
-        outside at rest, exact distances.
+        in the mean over all poses, and by how much [degrees]; it tells of a lock that stands out from the head.
+        `penetration_*`: of the vertices that lie outside at rest, exact distances.
     """
     say = progress or silent
     pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)

@@ -20,6 +20,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig import train_static
+from neuralocks_core.training.rig_body import BodyPatch
 from neuralocks_core.training.rig_contact import HairOnBodies, Moments
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree
 from neuralocks_core.training.rig_report import hair_points, no_turns
@@ -173,3 +174,19 @@ def test_a_body_out_of_the_hairs_reach_is_none(away):
     rig = assemble_rig(replace(who, body=both), meshes)
     assert (rig.character.body is None) == (away > 0)
     assert train_static(rig, steps=2, batch=4, report_poses=0).training["steps"] == 2
+
+
+def test_other_bodies_vary_below_the_head():
+    """To which the hair was fitted: whatever a blend shape does there, and all that it moves both by."""
+    rig = with_chest(on_a_ball())
+    who, body = rig.character, rig.character.body
+    on_head = body.joint_indices[:, 0] == who.head
+    offsets = np.where(on_head[:, None], [0.0, 0.01, 0.0], [0.0, 0.01, 0.05])
+    rig = replace(rig, character=replace(who, body=replace(body, shapes={"wide": offsets})))
+    patch = BodyPatch(rig, np.random.default_rng(0), 300)
+    still = np.tile(np.eye(4), (len(who.skeleton.names), 1, 1))
+    moved = patch.body.posed(still, np.array([1.0])) - patch.body.points
+    below = patch.body.joint_indices[:, 0] != who.head
+    assert below.any() and not below.all()
+    np.testing.assert_allclose(moved[~below], 0, atol=1e-12)
+    np.testing.assert_allclose(moved[below], np.tile([0, 0, 0.05], (below.sum(), 1)), atol=1e-12)
