@@ -41,8 +41,9 @@ $(BIN)/python:
 	    { echo "python: $$($(PYTHON) --version 2>&1) is too old; install 3.11 or newer, or: make PYTHON=/path/to/it"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
+# Modules are compiled when they are first imported: most of what is installed here never is.
 $(VENV)/installed-demo: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) install -q -c constraints.txt -e ".[preview]"
+	$(PIP) install -q --no-compile -c constraints.txt -e ".[preview]"
 	touch $@
 
 # torch first and by its number: left to the resolver, a newer build with several gigabytes of CUDA would come.

@@ -5,7 +5,6 @@ import numpy as np
 
 from neuralocks_core import metrics
 from neuralocks_core.character import Character
-from neuralocks_core.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.locks import lock_mates
 from neuralocks_core.materials import Material
@@ -126,14 +125,6 @@ def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
     rank[order] = np.arange(len(order))
     by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]
     return np.sort(by_lock[:count])
-
-
-def penetration_of(points: np.ndarray, rest_distance: np.ndarray, colliders: list[Collider]) -> dict[str, float]:
-    """`metrics.penetration` of points (T, N, 3) [m] in canonical space, one collider a frame; `rest_distance` (N,) [m] is
-    how far outside each lies at rest.
-    """
-    distance = np.stack([c.distance(p, limit=0.005)[0] for c, p in zip(colliders, points, strict=True)])
-    return metrics.penetration(distance, rest_distance)
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

@@ -91,7 +91,9 @@ def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: floa
 def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
     import imageio.v2 as imageio
 
-    with imageio.get_writer(part, fps=rate, codec="libx264", quality=8, macro_block_size=2) as writer:
+    # The encoder's own default takes three times the cores for the same size and look.
+    fast = {"codec": "libx264", "quality": 8, "ffmpeg_params": ["-preset", "veryfast"]}
+    with imageio.get_writer(part, fps=rate, macro_block_size=2, **fast) as writer:
         for image in images:
             writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
 

@@ -124,31 +124,33 @@ class ShadowMap:
         # One array a coordinate: several times as fast as rows of three.
         place = (axes.T @ queries.T.astype(np.float32) - low[:, None]) / cell
         # Half a cell towards the light, or a vertex would lie in its own shadow.
-        place[2] += np.float32(0.5)
+        place[0] += np.float32(0.5)
         last = np.array(summed.shape, np.float32)[:, None] - 1
-        outside = ((place[:2] < 0) | (place[:2] > last[:2])).any(axis=0)
+        outside = ((place[1:] < 0) | (place[1:] > last[1:])).any(axis=0)
         np.clip(place, 0, last - np.float32(1e-3), out=place)
         corner = place.astype(np.int32)
         part = place - corner
-        sides, height = summed.shape[1] * summed.shape[2], summed.shape[2]
-        index, flat = corner[0] * sides + corner[1] * height + corner[2], summed.ravel()
-        (left, low_, near), (right, high, far) = 1 - part, part
+        layer, row = summed.shape[1] * summed.shape[2], summed.shape[2]
+        index, flat = corner[0] * layer + corner[1] * row + corner[2], summed.ravel()
+        (behind, left, low_), (ahead, right, high) = 1 - part, part
         result = np.zeros(len(queries), np.float32)
-        for aside, across in ((0, left), (sides, right)):
-            for above, up in ((0, low_), (height, high)):
-                column = flat.take(index + (aside + above)) * near
-                column += flat.take(index + (aside + above + 1)) * far
-                result += column * (across * up)
+        for forth, along in ((0, behind), (layer, ahead)):
+            for aside, across in ((0, left), (row, right)):
+                pair = flat.take(index + (forth + aside)) * low_
+                pair += flat.take(index + (forth + aside + 1)) * high
+                result += pair * (along * across)
         result[outside] = 0
         return result
 
     def _seen_from(self, towards):
         """Light axes, the box's low corner, its cell [m], and the hair from each cell on towards the light."""
-        key = np.asarray(towards).tobytes()
+        towards = np.asarray(towards, np.float32)
+        key = towards.tobytes()
         if key not in self._columns:
             side = np.cross(towards, [0.0, 1.0, 0.0] if abs(towards[1]) < 0.9 else [1.0, 0.0, 0.0])
             side /= np.linalg.norm(side)
-            axes = np.stack([side, np.cross(towards, side), towards], axis=1).astype(np.float32)
+            # The way to the light first: whole layers are summed at once.
+            axes = np.stack([towards, side, np.cross(towards, side)], axis=1).astype(np.float32)
             seen = axes.T @ self.points.T.astype(np.float32)
             low, high = seen.min(axis=1), seen.max(axis=1)
             cell = np.float32(max(CELL, float((high - low).max()) / MOST_CELLS))
@@ -156,8 +158,9 @@ class ShadowMap:
             low = low - np.float32(1.5) * cell
             index = np.ravel_multi_index(((seen - low[:, None]) / cell + np.float32(0.5)).astype(int), shape)
             grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape).astype(np.float32)
-            summed = np.cumsum(grid[:, :, ::-1], axis=2)[:, :, ::-1]
-            self._columns[key] = axes, low, cell, np.ascontiguousarray(summed)
+            for layer in range(len(grid) - 2, -1, -1):
+                grid[layer] += grid[layer + 1]
+            self._columns[key] = axes, low, cell, grid
         return self._columns[key]
 
 

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks`, and `python -m usd`: the command line, which Ctrl-C ends in one word while it is still being read, too."""
 
+import os
 import sys
 
 
 def main() -> None:
     """Entry point."""
+    # Strands, frames and pictures share the cores. OpenBLAS would start threads of its own for every small product, and
+    # they wait for the next one by spinning: a clip takes a third longer with them. It reads this when numpy is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from .cli import main as run
     except KeyboardInterrupt:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks evaluate`: the report card of a bake."""
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +15,7 @@ from neuralocks_core.pose_energies import energies, stretch_energy
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.report import Card
 from neuralocks_core.resolve import CLAMPED, Resolver
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import K, StrandSet, strands_on
 
@@ -170,13 +171,19 @@ class _Subject:
         if resolver.at_rest is None or not len(self._own):
             return {}
         rig, baked = self.item.attachment.rig, self.baked
-        colliders = []
-        for done, frame in enumerate(self.collision_frames):
-            shape = rig.clip.shape_at(baked.times[frame : frame + 1])[0]
-            colliders.append(resolver.collider(rig.joints_at(baked.codes[frame]), shape))
-            self.say(done + 1, len(self.collision_frames), "measuring distances to the body")
-        rest_distance = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
-        return comparison.penetration_of(self.own, rest_distance, colliders)
+        frames, distance = self.collision_frames, []
+        joints = [rig.joints_at(baked.codes[frame]) for frame in frames]
+        shapes = rig.clip.shape_at(baked.times[frames])
+
+        def measured(points, joints, shape) -> np.ndarray:
+            return resolver.collider(joints, shape).distance(points, limit=0.005)[0]
+
+        with ThreadPoolExecutor(cores()) as pool:
+            for each in pool.map(measured, self.own, joints, shapes):
+                distance.append(each)
+                self.say(len(distance), len(frames), "measuring distances to the body")
+        at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
+        return metrics.penetration(np.stack(distance), at_rest)
 
     def _stops(self, joints) -> dict:
         """Settling after the longest stop, and what still moves once it should be over."""
