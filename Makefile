@@ -7,7 +7,9 @@ PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= out/demo
 BIN    := $(VENV)/bin
-PIP     = $(BIN)/python -m pip --disable-pip-version-check
+# Modules are compiled when they are first imported: most of what is installed never is.
+PIP_INSTALL = -m pip --disable-pip-version-check install -q --no-compile
+INSTALL = $(BIN)/python $(PIP_INSTALL)
 # One thread a process: the tests run in two processes, and small matrices only get slower with more.
 ONE_THREAD = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -41,15 +43,14 @@ $(BIN)/python:
 	    { echo "python: $$($(PYTHON) --version 2>&1) is too old; install 3.11 or newer, or: make PYTHON=/path/to/it"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
-# Modules are compiled when they are first imported: most of what is installed here never is.
 $(VENV)/installed-demo: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) install -q --no-compile -c constraints.txt -e ".[preview]"
+	$(INSTALL) -c constraints.txt -e ".[preview]"
 	touch $@
 
 # torch first and by its number: left to the resolver, a newer build with several gigabytes of CUDA would come.
 $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) install -q "$$(grep '^torch==' constraints.txt)"
-	$(PIP) install -q -c constraints.txt -e ".[train,body,preview,compare,test]"
+	$(INSTALL) "$$(grep '^torch==' constraints.txt)"
+	$(INSTALL) -c constraints.txt -e ".[train,body,preview,compare,test]"
 	touch $@ $(VENV)/installed-demo
 
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
@@ -72,6 +73,6 @@ define blender-venv
 @if [ -z "$(1)" ]; then echo "Blender $(2): its Python is not installed; its tests will be skipped"; else \
     echo "Blender $(2): installing into $(@D)"; \
     { [ -d $(@D) ] || $(1) -m venv $(@D); } && \
-    { $(@D)/bin/python -m pip --disable-pip-version-check install -q bpy==$(2) $(BLENDER_NEEDS) && touch $@; } || \
+    { $(@D)/bin/python $(PIP_INSTALL) bpy==$(2) $(BLENDER_NEEDS) && touch $@; } || \
     echo "Blender $(2): could not be installed; its tests will be skipped"; fi
 endef
