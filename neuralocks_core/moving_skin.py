@@ -120,17 +120,24 @@ class PosedSkin:
         held = [(x > a) & (x < b) for x, a, b in zip(self._place, low, high)]
         asked = np.flatnonzero(held[0] & held[1] & held[2])
         place, normal = place.take(asked, axis=0), normal.take(asked, axis=0)
+        entered = np.zeros(box.count, np.uint8)
+
+        def enter(cells: np.ndarray) -> None:
+            self._start[cells] = asked
+            entered[cells] = bit
+
         # From the farthest cells to a sample's own: the last one entered is the nearest.
         for depth in range(DEPTH, 0, -1):
-            self._enter(box.cells(place - normal * np.float32(depth * box.cell)), asked, marks, bit)
+            enter(box.cells(place - normal * np.float32(depth * box.cell)))
         own = box.cells(place)
+        # Around them, of samples in one cell the last one stands for all.
+        self._start[own] = asked
+        last = self._start.take(own) == asked
+        own, asked = own[last], asked[last]
         around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
         for step in around[np.argsort(-np.abs(around).sum(axis=1), kind="stable")] @ box.strides:
-            self._enter(own + np.int32(step), asked, marks, bit)
-
-    def _enter(self, cells: np.ndarray, samples: np.ndarray, marks: np.ndarray, bit: int) -> None:
-        self._start[cells] = samples
-        marks[cells] |= np.uint8(bit)
+            enter(own + np.int32(step))
+        np.bitwise_or(marks, entered, out=marks)
 
     def rough(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Height [m] over the plane of some sample near by, (N,), of points (N, 3) float32 in marked cells."""

@@ -204,7 +204,9 @@ def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: n
     """
     result = wanted.copy()
     free = np.ones(wanted.shape[2], bool)
-    for i in range(CLAMPED, len(wanted)):
+    # Before any vertex comes under its plane (by so much more than rounding does) there is nothing to lay.
+    under = np.einsum("kcn,kcn->kn", normal, wanted) < height + 1e-5
+    for i in range(max(CLAMPED, int(under.any(axis=1).argmax())), len(wanted)):
         before, length, n = result[i - 1], lengths[i - 1], normal[i]
         up = height[i] - _dot(n, before)
         along = wanted[i] - before
