@@ -196,11 +196,12 @@ class BoundarySampler:
 
     def _measures(self, shape: np.ndarray) -> np.ndarray:
         key = shape.tobytes()
-        if key not in self._shape_cache:
+        known = self._shape_cache.get(key)
+        if known is None:
             if len(self._shape_cache) > 64:
                 self._shape_cache.clear()
-            self._shape_cache[key] = body_measures(self.character, shape)
-        return self._shape_cache[key]
+            known = self._shape_cache[key] = body_measures(self.character, shape)
+        return known
 
     def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) and so long before them (L,), as if

@@ -17,7 +17,7 @@ from .stage import StageGroom
 
 
 class GroomPoser:
-    """Deforms one groom of a shot with a model.
+    """Deforms one groom of a shot with a model. Several threads may ask for points at a time.
 
     Args:
         item: the groom.
@@ -65,7 +65,7 @@ class GroomPoser:
             placed = self._placer.at(time_code, joints)
             self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
-        moved = self.moved(time_code)
+        moved = self._displacement(time_code, joints)
         # Each chunk's points take the place of its displacement where they are as many.
         placed = self._placer.at(time_code, joints, moved.reshape(-1, 3) if self._placer.same_size else None)
         for strands in chunks(len(moved)):
@@ -74,7 +74,9 @@ class GroomPoser:
 
     def moved(self, time_code: float) -> np.ndarray:
         """Displacement (S, 24, 3) float32 [m] of the network's vertices, in canonical space."""
-        joints = self._rig.joints_at(time_code)
+        return self._displacement(time_code, self._rig.joints_at(time_code))
+
+    def _displacement(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         moved = self._session.displacement(self._vector(time_code, joints))
         if self._resolver is not None:
             shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
