@@ -59,6 +59,7 @@ def bind(armature, sampled) -> LiveBones:
             model, sampled.rig, sampled.character, settings.chains
         )
         bones.modes, bones.file = rotations.free_modes(armature, bones.bones), file
+    rotations.check_free(armature, bones.bones)
     bones.follow(sampled.character, sampled.clip)
     return bones
 

@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
-from . import preparing
+from . import edited, preparing
 from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
@@ -65,12 +65,14 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     if hair.name_full not in sampled.motion.places:
         sampled.stale = session.wanting = True
         raise NeuralocksError(f"{armature.name_full}: its motion was sampled without this hair; press Sample Motion")
+    place = world(hair, graph)
+    edited.follow(hair, sampled, place)
     joints = pose(armature, sampled, scene, graph, moved)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
-    frame, place = shown_frame(scene), world(hair, graph)
+    frame = shown_frame(scene)
     row = sampled.motion.row(frame)
-    if moved and row is not None and np.abs(place - sampled.motion.places[hair.name_full][row]).max() > TOLERANCE:
-        sampled.stale = session.wanting = True  # the hair object has been moved since
+    if moved and row is not None and _elsewhere(hair, place, sampled, row, graph):
+        sampled.stale = session.wanting = True
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
     wanted = time, joints, to_local, material(settings), typed(settings, "motion"), settings.resolve
@@ -81,9 +83,17 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     points = prepared.points(*wanted)
     curves.keep_rest(hair.data)
     mute_deformers(hair)
-    curves.write(hair.data, points)
+    edited.write(hair, points, place)
     hair.data.update_tag()
     session.messages.pop(hair.name_full, None)
+
+
+def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:
+    """Whether the hair object, which is at `place`, or a body has been moved since the motion was sampled."""
+    now = {hair.name_full: place}
+    now |= {body.name_full: world(body, graph) for name in sampled.bodies if (body := find(name)) is not None}
+    places = sampled.motion.places
+    return any(np.abs(at - places[name][row]).max() > TOLERANCE for name, at in now.items() if name in places)
 
 
 def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
@@ -104,6 +114,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     prepared = session.hairs.get(name)
     if prepared is not None and not known(hair):
         _let_go(prepared.of, hair)
+        curves.complete_rest(hair.data)
         session.doubtful.add(name)
     path = model_path(hair.neuralocks_hair.model)
     if prepared is not None and prepared.file != (path, stamp(path)):

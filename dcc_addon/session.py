@@ -41,6 +41,8 @@ class SampledRig:
     """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
     rigging: int = 0
     """How what moves the rig was put together; see `scene.sampling.rigging_of`."""
+    posture: int = 0
+    """How what is not keyed was posed; see `scene.sampling.posture_of`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -54,6 +56,8 @@ class Session:
 
     rigs: dict[str, SampledRig] = field(default_factory=dict)
     hairs: dict[str, object] = field(default_factory=dict)
+    written: dict[str, object] = field(default_factory=dict)
+    """What the live view wrote to each hair object last; see `edited`."""
     preparing: dict[str, Threaded] = field(default_factory=dict)
     """Hair objects that a thread is preparing."""
     readers: dict[str, object] = field(default_factory=dict)
@@ -65,6 +69,8 @@ class Session:
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""
+    working: str = ""
+    """Name of the operator that is at work over several slices."""
     sampling: float | None = None
     """Share of a sampling in the background that is done."""
     failed: set[str] = field(default_factory=set)
@@ -80,6 +86,7 @@ class Session:
     def doubt(self) -> None:
         """Anything in the file may have changed: look before use."""
         self.doubtful.update(self.hairs)
+        self.written.clear()
         self.stop_preparing_all()
         self.weights.clear()
         self.chains.clear()
@@ -88,6 +95,7 @@ class Session:
         """Drop what was prepared for a hair object or for the hair bones of an armature."""
         self.stop_preparing(name)
         self.hairs.pop(name, None)
+        self.written.pop(name, None)
         self.chains.pop(name, None)
         self.messages.pop(name, None)
 
@@ -114,7 +122,7 @@ class Session:
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on goes; who steps frames meanwhile still has to end it."""
         self.stop_preparing_all()
-        self.__init__(paused=self.paused)
+        self.__init__(paused=self.paused, working=self.working)
 
     def tell(self, name: str, error: Exception) -> None:
         """Say in the panel what went wrong with an object; what its user cannot mend is on the console as well."""

@@ -141,7 +141,8 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
     filepath: StringProperty(name="File", description="USD file to write; the one of the panel when empty", **FILE)
 
     def steps(self, context):
-        armature, hair = shown_armature(context), shown_hair(context)
+        armature = shown_armature(context)
+        hair = shown_hair(context, armature)
         attach.check_possible(hair)
         name, path = hair.name_full, output_path(self.filepath or context.scene.neuralocks.output)
         if any(other != hair for other in attach.players(path)):  # the panel's output is the same for all hair
@@ -181,7 +182,8 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         import shutil
         import tempfile
 
-        armature, hair = shown_armature(context), shown_hair(context)
+        armature = shown_armature(context)
+        hair = shown_hair(context, armature)
         name = hair.name_full
         folder = tempfile.mkdtemp(prefix="neuralocks_")
         try:

@@ -72,10 +72,14 @@ class Stepwise(Hardened):
     def invoke(self, context, _event):
         if bpy.app.background:
             return self.execute(context)
+        if session.working:
+            self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
+            return {"CANCELLED"}
         self._steps = None
         problem = self.guarded(lambda: setattr(self, "_steps", self.steps(context)))
         if problem == {"CANCELLED"}:
             return problem
+        session.working = self.bl_label
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0, 1000)
@@ -125,6 +129,7 @@ class Stepwise(Hardened):
         return None
 
     def _finish(self, context):
+        session.working = ""
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace is not None:
@@ -155,13 +160,20 @@ def shown_armature(context):
     return armature
 
 
-def shown_hair(context):
-    """The hair object that the panel shows.
+def shown_hair(context, armature=None):
+    """The hair object that the panel shows; of this armature, if one is given.
 
     Raises:
-        NeuralocksError: there is none.
+        NeuralocksError: there is none, or it belongs to another character.
     """
     hair = context.scene.neuralocks.hair
     if hair is None or hair.name not in context.scene.objects:
         raise NeuralocksError("Strands: no hair chosen; choose a hair Curves object, or convert a particle system")
+    carrier = hair.neuralocks_hair.armature
+    if armature is not None and carrier != armature:
+        other = "" if carrier is None else f"choose {carrier.name_full} above, or "
+        raise NeuralocksError(
+            f"{hair.name_full}: it belongs to {'no' if carrier is None else 'another'} character; {other}press Attach to "
+            f"Character to give it to {armature.name_full}"
+        )
     return hair

@@ -61,7 +61,9 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         bones, frames = bind(armature, sampled), frame_numbers(first, last, 0)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
-        action = actions.bake_keys(armature, bones.bones, frames, turns, own)
+        # Blender evaluates animation at stretched time.
+        stretched = frames * (context.scene.render.frame_map_old / context.scene.render.frame_map_new)
+        action = actions.bake_keys(armature, bones.bones, stretched, turns, own)
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
 
@@ -102,7 +104,8 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         bind(find(name), sampled)  # says what is wrong before anything is written
         shot = out.with_name(f"{out.stem}_shot.usdc")
         write_shot(shot, find(name), scene, sampled, [])
-        bake_rig(shot, out, model_path(settings.rig_model, "rig"), strength=settings.rig_motion, loop=settings.loop)
+        head, model = sampled.character.skeleton.names[sampled.character.head], model_path(settings.rig_model, "rig")
+        bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
 

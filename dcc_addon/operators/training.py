@@ -73,7 +73,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         if running is not None and running.running:
             raise NeuralocksError("Training: one is running already; wait for it or cancel it")
         armature = shown_armature(context)
-        target = shown_hair(context) if self.kind == "strands" else armature
+        target = shown_hair(context, armature) if self.kind == "strands" else armature
         python, name, wanted = training_python(), armature.name_full, target.name_full
         asking = Threaded(lambda _: problem(python), "Looking for what training needs", leave=True)
         _checked[python] = yield from asking.steps()

@@ -4,7 +4,10 @@
 import bpy
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
+
 from . import rotations
+from .animated import animated
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
@@ -21,25 +24,53 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     Args:
         armature: the armature object.
         bones: bone names, (N).
-        frames: (T,).
+        frames: (T,), as animation counts them.
         turns, own: rotations (T, N, 4) wxyz with the hair's motion and without.
 
     Returns:
         the action of the hair's motion.
+
+    Raises:
+        NeuralocksError: strips, or keys on some bone, would have no effect.
     """
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
+    _check_heard(armature, data, bones)
     # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
     modes = rotations.free_modes(armature, bones, rotations.KEYED)
     before = rotations.kept(armature, bones)
     for name in bones:
         armature.pose.bones[name].rotation_mode = modes[name]
+    if frames[0] % 1:  # a strip begins at a whole frame
+        frames = np.concatenate([np.floor(frames[:1]), frames])
+        turns, own = (np.concatenate([each[:1], each]) for each in (turns, own))
     needed = 1 if np.ptp(own, axis=0).max(initial=0.0) < STILL else len(frames)
     _strip(data, BEFORE, _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed]))
     action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
     action[KEPT] = before
     _strip(data, TRACK, action)
     return action
+
+
+def _check_heard(armature, data, bones) -> None:
+    name = armature.name_full
+    if not data.use_nla:
+        raise NeuralocksError(
+            f"{name}: its NLA is switched off, and with it baked keys; switch it on in the NLA editor"
+        )
+    for track in data.nla_tracks:
+        if track.is_solo:
+            raise NeuralocksError(
+                f"{name}: NLA track '{track.name}' is solo, so that no other one plays; take its star off"
+            )
+    written = animated(data)
+    for bone in bones:
+        start = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
+        if all(start + rotations.CHANNELS[mode] in written for mode in rotations.KEYED):
+            raise NeuralocksError(
+                f"{name}: hair bone '{bone}' has keys in every rotation mode, which play over baked ones; delete its keys of "
+                "one of them"
+            )
 
 
 def has_keys(armature) -> bool:

@@ -41,7 +41,9 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
 
 
 def hidden(armature) -> NeuralocksError:
-    """What to say of an armature that is not evaluated."""
+    """What to say of an armature that is not evaluated, or not posed."""
+    if armature.mode == "EDIT":
+        return NeuralocksError(f"{armature.name_full}: its bones are being edited; leave Edit Mode")
     return NeuralocksError(
         f"{armature.name_full}: the armature is hidden or in an excluded collection; show it so that it is evaluated"
     )

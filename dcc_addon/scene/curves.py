@@ -103,6 +103,22 @@ def keep_rest(data) -> None:
     attribute.data.foreach_set("vector", values.ravel())
 
 
+def move_rest(data, matrix: np.ndarray) -> None:
+    """Move the rest shape that is kept aside by a transform (4, 4)."""
+    moved = _read(data, REST) @ matrix[:3, :3].T + matrix[:3, 3]
+    data.attributes[REST].data.foreach_set("vector", np.ascontiguousarray(moved, np.float32).ravel())
+
+
+def complete_rest(data) -> None:
+    """Strands that were joined to live hair have no rest shape yet, zeros that is: they are at rest as they are."""
+    if has_rest(data):
+        values = _read(data, REST)
+        bare = ~values.any(axis=1)
+        if bare.any():
+            values[bare] = _read(data, "position")[bare]
+            data.attributes[REST].data.foreach_set("vector", values.ravel())
+
+
 def restore_rest(data) -> bool:
     """Put the points back to rest and forget the copy; whether there was one."""
     if not has_rest(data):

@@ -45,15 +45,14 @@ def mute_deformers(hair, kept: str = "muted") -> None:
     live view, or a cache, has already done that.
     """
     settings = hair.neuralocks_hair
-    if getattr(settings, kept):
-        return
-    found = {}
+    text = getattr(settings, kept)
+    found = _remembered(text)
     for modifier in hair.modifiers:
-        cached = modifier.type == "MESH_SEQUENCE_CACHE"
-        if cached or (modifier.type == "NODES" and _moves_hair(modifier.node_group)):
-            found[modifier.name] = [modifier.show_viewport, modifier.show_render]
+        if (modifier.show_viewport or modifier.show_render) and _moves(modifier):
+            found.setdefault(modifier.name, [modifier.show_viewport, modifier.show_render])
             modifier.show_viewport = modifier.show_render = False
-    setattr(settings, kept, json.dumps(found) if found else "")
+    if found and (now := json.dumps(found)) != text:
+        setattr(settings, kept, now)
 
 
 def unmute_deformers(hair, kept: str = "muted") -> None:
@@ -61,15 +60,27 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
     settings = hair.neuralocks_hair
     if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
         return
-    try:
-        found = json.loads(getattr(settings, kept))
-    except json.JSONDecodeError:
-        found = {}
+    found = _remembered(getattr(settings, kept))
+    hidden = [m for m in hair.modifiers if not (m.show_viewport or m.show_render) and _moves(m)]
+    renamed = iter([modifier for modifier in hidden if modifier.name not in found])
     for name, (viewport, render) in found.items():
-        modifier = hair.modifiers.get(name)
+        modifier = hair.modifiers.get(name) or next(renamed, None)
         if modifier is not None:
             modifier.show_viewport, modifier.show_render = viewport, render
     setattr(settings, kept, "")
+
+
+def _remembered(text: str) -> dict[str, list[bool]]:
+    """Whether each modifier was shown in the viewport and in renders, by name."""
+    try:
+        return json.loads(text or "{}")
+    except json.JSONDecodeError:
+        return {}
+
+
+def _moves(modifier) -> bool:
+    cached = modifier.type == "MESH_SEQUENCE_CACHE"
+    return cached or (modifier.type == "NODES" and _moves_hair(modifier.node_group))
 
 
 def _moves_hair(tree, depth: int = 0) -> bool:

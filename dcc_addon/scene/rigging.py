@@ -9,11 +9,13 @@ import bpy
 import numpy as np
 
 from .animated import animated, strips_of
+from .unkeyed import PLACE
 
 REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, "use_deform": 1}
 IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
 LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axis in "xyz")
 """Settings of bones that posing does not change."""
+DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
 """What only tells how something is shown; and, of strips, what Blender itself writes."""
 _written: dict[type, list[str]] = {}
@@ -22,6 +24,13 @@ _written: dict[type, list[str]] = {}
 def rigging(things) -> int:
     """A number that changes when one of these objects, or one that it depends on, is put together otherwise."""
     return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
+
+
+def posture(things, live: set[str]) -> int:
+    """A number that changes when one of these objects, or one that it depends on, is placed or posed otherwise by values
+    that no animation writes: those count in all frames. Bones named in `live` are left out.
+    """
+    return zlib.crc32(repr([_held(thing, live) for thing in _reached(things)]).encode())
 
 
 def _reached(things) -> list:
@@ -63,6 +72,45 @@ def _object(thing) -> list:
             start = f'pose.bones["{_quoted(bone)}"]'
             found += [bone.name, bone.parent and bone.parent.name, _numbers(bone, start, moving)]
             found += [_constraint(c, f'{start}.constraints["{_quoted(c)}"].', moving) for c in bone.constraints]
+    return found
+
+
+def _held(thing, live: set[str]) -> list:
+    moving = animated(thing.animation_data)
+    found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
+    found += [_lists(thing), *(_read(data) for data in _animation(thing))]
+    if thing.pose is not None:
+        bones = thing.pose.bones
+        starts = [f'pose.bones["{_quoted(bone)}"].' for bone in bones]
+        left_out = np.array([bone.name in live for bone in bones], bool)
+        for name, size in PLACE.items():
+            values = np.empty(len(bones) * size, np.float32)
+            bones.foreach_get(name, values)
+            values.reshape(-1, size)[left_out | [start + name in moving for start in starts]] = 0
+            found.append(zlib.crc32(values))
+        found += [_lists(bone) for bone in bones]
+    if thing.type == "CURVE":
+        found += [[point.co[:] for point in (*spline.points, *spline.bezier_points)] for spline in thing.data.splines]
+    return found
+
+
+def _lists(owner) -> list:
+    """Lists of numbers among the custom properties; single ones are among what `rigging` tells."""
+    return [(key, value.to_list()) for key, value in owner.items() if hasattr(value, "to_list")]
+
+
+def _read(data) -> list:
+    """What drivers read, and no animation writes, of anything but objects' places."""
+    found = []
+    for target in (t for curve in data.drivers for v in curve.driver.variables for t in v.targets):
+        path, owner = target.data_path, target.id
+        if not path or owner is None or path in animated(getattr(owner, "animation_data", None)):
+            continue
+        try:
+            value = owner.path_resolve(path)
+        except ValueError:  # the driver is broken
+            continue
+        found.append(value if isinstance(value, (int, float, str)) else repr(value))
     return found
 
 

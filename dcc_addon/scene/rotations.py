@@ -7,6 +7,8 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
+from neuralocks_core.errors import NeuralocksError
+
 from .animated import animated
 
 SAME = 1e-7
@@ -31,12 +33,17 @@ def kept(armature, bones) -> str:
     return json.dumps(found)
 
 
+def named(text: str) -> dict[str, list]:
+    """What `kept` found, by bone."""
+    try:
+        return json.loads(text or "{}")
+    except json.JSONDecodeError:
+        return {}
+
+
 def give_back(armature, text: str) -> bool:
     """Turn bones as `kept` found them, those that are still there; whether there was anything to give back."""
-    try:
-        found = json.loads(text or "{}")
-    except json.JSONDecodeError:
-        found = {}
+    found = named(text)
     for name, (mode, quaternion, euler, axis_angle) in found.items():
         bone = armature.pose.bones.get(name) if armature.pose else None
         if bone is not None:
@@ -55,6 +62,27 @@ def free_modes(armature, bones, modes=tuple(CHANNELS)) -> dict[str, str]:
         start = f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
         found[name] = next((mode for mode in modes if start + CHANNELS[mode] not in written), modes[-1])
     return found
+
+
+def check_free(armature, bones) -> None:
+    """Refuse bones that something else than their rotation and their parent's turns: hair would be turned twice.
+
+    Raises:
+        NeuralocksError: one has a constraint, or does not turn with its parent.
+    """
+    for name in bones:
+        bone = armature.pose.bones[name]
+        acting = next((c.name for c in bone.constraints if not c.mute and c.influence), None)
+        if acting is not None:
+            raise NeuralocksError(
+                f"{armature.name_full}: hair bone '{name}' has the constraint '{acting}', which would turn it once more; mute "
+                "the constraint"
+            )
+        if not bone.bone.use_inherit_rotation:
+            raise NeuralocksError(
+                f"{armature.name_full}: hair bone '{name}' does not turn with its parent; switch on Inherit Rotation (bone "
+                "properties, Relations)"
+            )
 
 
 def values(mode: str, turns: np.ndarray) -> np.ndarray:

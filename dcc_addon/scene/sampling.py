@@ -12,14 +12,16 @@ from neuralocks_core.motion import Clip
 
 from ..services import rig as rig_service
 from ..services.axes import to_core
+from ..services.hidden import unhidden
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
+from . import rotations
 from .binding import bind_places, hidden
 from .lookup import find, named
 from .placing import world
-from .rigging import rigging
+from .rigging import posture, rigging
 from .unkeyed import Unkeyed
 
 BLOCK = 16
@@ -86,6 +88,14 @@ def rigging_of(armature, scene) -> int:
     return rigging([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
 
 
+def posture_of(armature, scene) -> int:
+    """A number that changes when this armature, or what it depends on, is posed otherwise by what is not keyed. The hair
+    bones that the live view turns are no part of it.
+    """
+    live = set(rotations.named(armature.neuralocks_character.rig_kept))
+    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], live)
+
+
 def notice(armature, scene) -> None:
     """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints."""
     sampled = session.rigs.get(armature.name_full)
@@ -117,10 +127,15 @@ class _Recording:
     def __init__(self, context, armature):
         self._context, self._scene, self.name = context, context.scene, armature.name_full
         self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
-        self._head = self._rig.humanoid()["head"]
+        humanoid = self._rig.humanoid()
+        self._head, self._needed = humanoid["head"], set(humanoid.values())
+        for joint in reversed(range(len(self._rig.bones))):  # parents come first
+            if joint in self._needed:
+                self._needed.add(self._rig.parents[joint])
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
+        self._posture = posture_of(armature, self._scene)
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._rate = self._scene.render.fps / self._scene.render.fps_base
         self._unit = self._scene.unit_settings.scale_length
@@ -160,7 +175,8 @@ class _Recording:
 
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""
-        rows, joints = slice(first, end), self._joints[: end - first]
+        rows = slice(first, end)
+        joints = unhidden(self._joints[: end - first], self._rig, self._needed, self.frames[rows])
         part = Motion.from_world(
             frames=self.frames[rows],
             rate=self._rate,
@@ -204,6 +220,7 @@ class _Recording:
             bind_metres=metres,
             drawn=self._drawn,
             rigging=self._rigging,
+            posture=self._posture,
         )
 
 
@@ -229,10 +246,11 @@ class stepping:
 
 
 def ensure(context, armature) -> SampledRig:
-    """The sampled motion, sampled now if there is none or it is stale."""
+    """The sampled motion, sampled now if there is none, it is stale, or what is not keyed was posed since."""
     notice(armature, context.scene)
     found = session.rigs.get(armature.name_full)
-    if found is None or found.stale or found.key != key_of(armature, context.scene):
+    known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
+    if not known or found.posture != posture_of(armature, context.scene):
         with stepping(context.scene):
             for _ in sample(context, armature):
                 pass

@@ -1,24 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that are not keyed yet: animators move several bones before they set a key, and stepping through frames, which
-happens by itself in the background, evaluates the animation over them.
+"""Poses that are not keyed yet: animators move several bones, or turn a lamp up, before they set a key, and stepping
+through frames, which happens by itself in the background, evaluates the animation over them.
 """
 
+import bpy
 import numpy as np
 
+from .animated import animated
 from .lookup import find
 
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
 
 
+OTHERS = ("objects", "lights", "cameras", "armatures", "materials", "worlds", "node_groups", "curves", "scenes")
+"""What else has keys, of `bpy.data`."""
+
+
 class Unkeyed:
-    """Channels of all animated objects of a scene as they are now."""
+    """Channels of all animated objects of a scene, and whatever else keys write, as they are now."""
 
     def __init__(self, scene):
         self._kept = {o.name_full: _channels(o) for o in scene.objects if o.library is None and _animated(o)}
+        self._others = [
+            (kind, thing.name, within, path, value)
+            for kind in OTHERS
+            for thing in getattr(bpy.data, kind)
+            if thing.library is None
+            for within in (False, True)
+            for path, value in _written(_owner(thing, within))
+        ]
 
     def put_back(self) -> None:
         """Give what has changed since its value again."""
+        for kind, name, within, path, value in self._others:
+            owner = _owner(getattr(bpy.data, kind).get(name), within)
+            if owner is not None and _value(owner, path) not in (None, value):
+                _write(owner, path, value)
         for name, kept in self._kept.items():
             thing = find(name)
             if thing is None:
@@ -31,6 +49,41 @@ class Unkeyed:
                 thing.update_tag()
                 if _keys(thing) is not None:
                     _keys(thing).update_tag()
+
+
+def _owner(thing, within: bool):
+    """A data block, or the node tree that is part of it."""
+    return getattr(thing, "node_tree", None) if within else thing
+
+
+def _written(owner) -> list[tuple[str, object]]:
+    """Paths that animation writes, those of PLACE left out, and their values."""
+    data = getattr(owner, "animation_data", None)
+    if data is None or not (data.action is not None or len(data.nla_tracks)):
+        return []
+    paths = [path for path in animated(data) if path.rpartition(".")[2] not in PLACE]
+    return [(path, value) for path in paths if (value := _value(owner, path)) is not None]
+
+
+def _value(owner, path: str):
+    """Number, text or list of numbers; None where there is no such property any more."""
+    try:
+        value = owner.path_resolve(path)
+    except ValueError:
+        return None
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    return list(value) if hasattr(value, "__len__") else None
+
+
+def _write(owner, path: str, value) -> None:
+    if path.endswith('"]'):  # a custom property
+        of, _, key = path[:-2].rpartition('["')
+        (owner.path_resolve(of) if of else owner)[bpy.utils.unescape_identifier(key)] = value
+    else:
+        of, _, name = path.rpartition(".")
+        setattr(owner.path_resolve(of) if of else owner, name, value)
+    owner.update_tag()
 
 
 def _animated(thing) -> bool:

@@ -11,6 +11,8 @@ WORDS = (
     ("name none where the shipped one will do", "leave Model empty for the shipped one"),
     ("or give --model", "or choose another model"),
     ("name it with --head JOINT", "choose it as Head bone"),
+    ("name the joint that carries the hair with --head JOINT", "choose the bone that carries the hair as Head bone"),
+    ("name that with --head ", "choose as Head bone "),
     ("use a narrower pattern or another --head", "use a narrower pattern or another Head bone"),
     ("with --chains", "under Chains"),
     ("--chains", "Chains"),

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, messages
+from tests.blender.checks import SAME, apart, messages, refused
 
 
 def bones(folder: Path) -> None:
@@ -116,6 +116,46 @@ def keyed_bones(folder: Path) -> None:
         assert not rig.animation_data.nla_tracks and not [a for a in bpy.data.actions if "Hair" in a.name]
         for frame, matrices in still.items():
             assert apart(turns(frame), matrices) < 1e-6
+
+
+def turned_otherwise(folder: Path) -> None:
+    """Hair bones that something else turns, too, are refused, live and by bakes, and keys that would not be heard; where
+    time is stretched, keys play as the live view does.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    scene, bone = bpy.context.scene, rig.pose.bones["hair.01"]
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def turns(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+
+    limit = bone.constraints.new("LIMIT_ROTATION")
+    rig.neuralocks_character.rig_live = True
+    turns(5)
+    assert "'Limit Rotation'" in messages()["Rig"]
+    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "mute the constraint")
+    limit.mute, bone.bone.use_inherit_rotation = True, False
+    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "Inherit Rotation")
+    bone.bone.use_inherit_rotation = True
+    rig.animation_data.use_nla = False
+    refused(bpy.ops.neuralocks.bake_keys, "NLA is switched off")
+    rig.animation_data.use_nla = True
+
+    for old, new in ((100, 50), (100, 200)):
+        scene.render.frame_map_old, scene.render.frame_map_new = old, new
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        rig.neuralocks_character.rig_live = True
+        live = {frame: turns(frame) for frame in (1, 4, 11)}
+        assert not messages(), messages()
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        for frame, expected in live.items():
+            assert apart(turns(frame), expected) < SAME, (new, frame)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
 
 
 def renamed_bones(folder: Path) -> None:

@@ -8,9 +8,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from dcc_addon.scene.nodes import geometry_nodes
 from neuralocks_core.model import shipped
 from tests.blender import scenes
-from tests.blender.checks import MODEL, apart, baked_points, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
 
 
 def rearranged(_folder: Path) -> None:
@@ -170,6 +171,160 @@ def replaced_model(folder: Path) -> None:
     model.unlink()
     points_at(strands, 9)
     assert "mine.neuralocks" in messages()["Hair"], messages()
+
+
+def applied(_folder: Path) -> None:
+    """What is applied to the points of live hair is applied to its rest shape: as it would be with Live off, and nothing
+    moves meanwhile. What cannot be is told, and Live is off then.
+    """
+
+    def groomed(live: bool, change):
+        """Rest points after `change`, in the world, and by how much live hair moved meanwhile."""
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        strands, scene = scenes.hair(rig, 20), bpy.context.scene
+        strands.rotation_euler, strands.scale = (0.1, 0.3, 0.5), (1.4, 1.4, 1.4)
+        before = points_at(strands, 9)
+        if live:
+            make_live(rig, strands)
+            before = points_at(strands, 9)
+        _choose(strands)
+        change(strands)
+        bpy.context.view_layer.update()
+        moved = apart(points_at(strands, 9), before) if len(strands.data.points) * 3 == before.size else None
+        if live:
+            assert strands.neuralocks_hair.live, messages()
+            strands.neuralocks_hair.live = False
+        scene.frame_set(1)
+        return scenes.points(strands), moved
+
+    def more(strands):
+        scenes.hair(strands.parent, 10, name="More", length=0.1).select_set(True)
+        bpy.ops.object.join()
+
+    changes = [
+        lambda _: bpy.ops.object.transform_apply(location=True, rotation=True, scale=True),
+        lambda _: bpy.ops.object.origin_set(type="ORIGIN_GEOMETRY"),
+    ]
+    if bpy.app.version >= (5, 2):
+        changes.append(more)
+    for change in changes:
+        off, _ = groomed(False, change)
+        live, moved = groomed(True, change)
+        assert apart(off, live) < 1e-6
+        assert change is more or moved < 1e-5
+
+    scenes.empty()
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    groom = np.array([point.position for point in strands.data.points])
+    tree, source, target = geometry_nodes("Frizz")
+    offset = tree.nodes.new("GeometryNodeSetPosition")
+    offset.inputs["Offset"].default_value = (0, 0.05, 0)
+    tree.links.new(source, offset.inputs[0])
+    tree.links.new(offset.outputs[0], target)
+    strands.modifiers.new("Frizz", "NODES").node_group = tree
+    make_live(rig, strands)
+    points_at(strands, 9)
+    _choose(strands)
+    bpy.ops.object.modifier_apply(modifier="Frizz")
+    bpy.context.view_layer.update()
+    assert "'Frizz' was applied" in messages()["Hair"] and not strands.neuralocks_hair.live
+    assert np.array_equal([point.position for point in strands.data.points], groom)
+
+
+def held_otherwise(_folder: Path) -> None:
+    """What is not keyed counts in all frames: where it changes in the past alone, a render knows; a body that is put
+    elsewhere is noticed in the next frame.
+    """
+    from dcc_addon import handlers
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    strands, control = scenes.hair(rig, 20), bpy.data.objects.new("Control", None)
+    scene.collection.objects.link(control)
+    rig.data["swing"] = scene["swing"] = 0.0
+    rig.pose.bones["head"]["swings"] = [0.0, 0.0]
+    read = [
+        (control, "OBJECT", "location[0]"),
+        (rig.data, "ARMATURE", '["swing"]'),
+        (scene, "SCENE", '["swing"]'),
+        (rig, "OBJECT", 'pose.bones["head"]["swings"][1]'),
+        (rig, "OBJECT", 'pose.bones["forearm.L"].location[0]'),
+    ]
+    driver = rig.pose.bones["neck"].driver_add("rotation_euler", 0).driver
+    for number, (owner, kind, path) in enumerate(read):
+        variable = driver.variables.new()
+        variable.name, target = f"v{number}", variable.targets[0]
+        target.id_type, target.id, target.data_path = kind, owner, path
+    driver.expression = "(v0 + v1 + v2 + v3 + v4) * sin(frame) if 12 < frame < 17 else 0"
+    make_live(rig, strands)
+    seen = points_at(strands, 20)
+
+    def edit(number: int) -> None:
+        if number == 0:
+            control.location[0] = 1.0
+        elif number == 3:
+            rig.pose.bones["head"]["swings"] = [0.0, 1.0]
+        elif number == 4:
+            rig.pose.bones["forearm.L"].location[0] = 1.0
+        else:
+            read[number][0]["swing"] = 1.0
+        read[number][0].update_tag()
+
+    for number in range(len(read)):
+        edit(number)
+        bpy.context.view_layer.update()
+        handlers.before_render(scene)
+        handlers.after_render()
+        now = scenes.points(strands)
+        assert apart(now, seen) > 1e-3, read[number]
+        bpy.ops.neuralocks.sample_motion()
+        seen = points_at(strands, 20)
+        assert apart(now, seen) < 1e-6, read[number]
+
+    sampled = session.rigs["Rig"]
+    handlers.before_render(scene)
+    handlers.after_render()
+    assert session.rigs["Rig"] is sampled, "nothing was changed"
+    skin.location.x += 0.05
+    points_at(strands, 21)
+    assert session.rigs["Rig"].stale
+
+
+def hidden_prop(folder: Path) -> None:
+    """A prop that is hidden by a scale of zero does not keep anybody from baking; of a bone that moves hair it is told."""
+    prop = [*scenes.BONES, ("prop", "forearm.L", (0.5, 0, 1.2), (0.6, 0, 1.2))]
+    rig, scene = scenes.armature(bones=prop), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    bone = rig.pose.bones["prop"]
+    for frame, size in ((8, (1, 1, 1)), (12, (0, 0, 0)), (16, (1, 1, 0))):
+        bone.scale = size
+        bone.keyframe_insert("scale", frame=frame)
+    make_live(rig, strands)
+    view = points_at(strands, 14)
+    baked = folder / "out.usdc"
+    assert bpy.ops.neuralocks.bake(filepath=str(baked)) == {"FINISHED"}
+    assert apart(view, baked_points(baked, "/Character/Hair_Hair", 14)) < SAME
+
+    head = rig.pose.bones["head"]
+    for frame, size in ((5, 1), (6, 0)):
+        head.scale = [size] * 3
+        head.keyframe_insert("scale", frame=frame)
+    scene.frame_set(3)
+    refused(bpy.ops.neuralocks.sample_motion, "bone 'head'", "zero scale in frame 6")
+
+
+def _choose(thing) -> None:
+    for other in bpy.data.objects:
+        other.select_set(other == thing)
+    bpy.context.view_layer.objects.active = thing
 
 
 class _Returned:

@@ -211,3 +211,21 @@ def two_characters(_folder: Path) -> None:
     points_at(one, 13)
     assert "Two" in messages() and "armature" in messages()["Two"]
     assert apart(np.array([p.position for p in two.data.points]), groomed) == 0.0
+
+
+def deformer_added(_folder: Path) -> None:
+    """A modifier that would move live hair a second time is off, whenever it comes, and on again afterwards."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    first = scenes.surface_deform(strands)
+    make_live(rig, strands)
+    before = points_at(strands, 9)
+    second = scenes.surface_deform(strands)
+    for _ in range(2):
+        assert apart(before, points_at(strands, 9)) == 0.0
+        assert not second.show_viewport and not first.show_viewport
+        second.show_viewport, first.name = True, "Mine"
+    points_at(strands, 10)
+    strands.neuralocks_hair.live = False
+    assert all(modifier.show_viewport and modifier.show_render for modifier in strands.modifiers)

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What others do to the points of live hair: applied transforms, a moved origin, applied modifiers. The points are not the
+hair's rest shape then, so what was done to them is done to that.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import inverse
+
+from .scene import curves
+from .scene.armature import matrix
+from .session import session
+
+ROUNDING = 1e-5
+"""Points that differ by less, relative to the largest coordinate, are the same."""
+
+
+class Written(NamedTuple):
+    """What the live view wrote last.
+
+    Attributes:
+        points: (P, 3) float32 in the object's space.
+        places: the object's transforms (4, 4) then, its own and in the world.
+        modifiers: names of its modifiers.
+    """
+
+    points: np.ndarray
+    places: tuple[np.ndarray, np.ndarray]
+    modifiers: tuple[str, ...]
+
+
+def write(hair, points: np.ndarray, world: np.ndarray) -> None:
+    """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them."""
+    curves.write(hair.data, points)
+    places = matrix(hair.matrix_basis), world
+    session.written[hair.name_full] = Written(points.copy(), places, tuple(hair.modifiers.keys()))
+
+
+def follow(hair, sampled, world: np.ndarray) -> None:
+    """Let the rest shape follow what was done to the points since they were written, if anything was.
+
+    Args:
+        hair: the hair object.
+        sampled: the `SampledRig` that carries it.
+        world: where it stands now (4, 4).
+
+    Raises:
+        NeuralocksError: it cannot, after a modifier was applied to moved hair, say; live is off then.
+    """
+    name, data = hair.name_full, hair.data
+    before = session.written.get(name)
+    if before is None or not curves.has_rest(data) or len(before.points) != len(data.points):
+        return
+    now = curves.shown(data)
+    if np.array_equal(now, before.points):
+        return
+    del session.written[name]
+    # What is applied to the points is taken from the object's own transform; or, where its parent's was applied with it,
+    # from where it stands in the world.
+    for then, place in zip(before.places, (matrix(hair.matrix_basis), world), strict=True):
+        change = inverse(place) @ then
+        moved = before.points @ change[:3, :3].T + change[:3, 3]
+        if np.abs(moved - now).max() <= ROUNDING * np.abs(moved).max():
+            break
+    else:
+        gone = [f"'{modifier}' was applied to it" for modifier in before.modifiers if modifier not in hair.modifiers]
+        hair.neuralocks_hair.live = False
+        raise NeuralocksError(
+            f"{name}: {[*gone, 'its points were changed'][0]} while it was moved, and that is lost, for Live puts the "
+            "points back to rest; undo, and do it with Live off"
+        )
+    curves.move_rest(data, change)
+    session.doubtful.add(name)
+    if name in sampled.bind_places:  # the hair is where it was, in another space
+        back = inverse(change)
+        sampled.bind_places[name] = sampled.bind_places[name] @ back
+        sampled.motion.places[name] = sampled.motion.places[name] @ back
