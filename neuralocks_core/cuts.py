@@ -28,7 +28,9 @@ def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     places, turns = clip.joints[:, joint, :3, 3], clip.joints[:, joint, :3, :3]
     span = np.diff(times)
     speed = np.diff(places, axis=0) / span[:, None]
-    spin = np.einsum("tij,tij->t", turns[1:], turns[:-1]) / np.einsum("tij,tij->t", turns[:-1], turns[:-1])
+    # Where a joint has no size, which a bake refuses, nothing is said of its turn.
+    size = np.maximum(np.einsum("tij,tij->t", turns[:-1], turns[:-1]), 1e-30)
+    spin = np.einsum("tij,tij->t", turns[1:], turns[:-1]) / size
     angle = np.arccos(np.clip((3 * spin - 1) / 2, -1, 1))
     # Before its first sample and after its last one a clip stands still.
     unlike = np.tile(np.linalg.norm(np.diff(places, axis=0), axis=1), (2, 1))

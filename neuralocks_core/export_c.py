@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rig model as one self-contained C99 header for engines, and a worked example beside it."""
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
-from neuralocks_core.rig.network import RigModel
+from neuralocks_core.rig.network import RigModel, rig_spec
 
 _TEXTS = Path(__file__).parent / "rig"
 _AT_ONCE = 4
@@ -26,13 +27,17 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         prefix: of every name in it, so that several models can live in one program.
 
     Raises:
-        NeuralocksError: the name or the prefix cannot be used, or the folder cannot be written.
+        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, or the model reads what the
+            header does not compute.
     """
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
         raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
         raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
+    known = rig_spec(model.dynamic)
+    if any(getattr(model.spec, name) != getattr(known, name) for name in ("pose_joints", "linear", "chest")):
+        raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
     example = path.with_name(f"{path.stem}_example.c")
     for target, text in ((path, header_text(model, prefix)), (example, _example(model, path.name, prefix))):
         with atomic_write(target) as part:
@@ -53,6 +58,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
     values = {
         "PREFIX": prefix,
         "UPPER": prefix.upper(),
+        "DIGEST": _digest(model),
         "JOINTS": len(chains),
         "FEATURES": model.inputs,
         "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
@@ -74,6 +80,14 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         **_network(layers),
     }
     return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _digest(model: RigModel) -> str:
+    """By which a compiler tells two models apart."""
+    digest = hashlib.sha256(repr(model.chains.names).encode("utf-8", "replace"))
+    for array in (model.limits, *(each for layer in model.layers for each in layer)):
+        digest.update(array.tobytes())
+    return digest.hexdigest()[:12].upper()
 
 
 def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:

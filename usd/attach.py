@@ -18,7 +18,8 @@ from .border import transformed
 from .curves import moment, rest_points
 from .placement import Placement
 from .rig_source import StageRig
-from .seat import NEAR, Seat, find_seat, kinship, some_roots, ways
+from .seat import NEAR, Seat, find_seat, kinship, some_ends, ways
+from .seat_notes import floats, moved_away, upside_down
 from .surface import bound_skeleton, geom_bind, joint_influences
 
 REACH = 1.0
@@ -85,13 +86,14 @@ def attach(
             how=f"{why} (its own skel binding)",
             skinned=True,
         )
+        notes += upside_down(prim, rig, found.to_bind)
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
         if seats:
             found = _on_mesh(prim, seats, placement, notes)
         else:
             found = _by_name(prim, rigs, placement, head)
-            notes += _floats(prim, found, placement)
+            notes += [] if found.far else floats(prim, found.rig, placement)
     name = rig_joint(found)
     if head and name.split("/")[-1] != head.split("/")[-1]:
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
@@ -124,22 +126,11 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     points = seat.points
     shares = _shares(rig, mesh.indices[points], mesh.weights[points])
     joint, why = _carrier(rig, shares)
-    notes += _spread(rig, str(prim.GetPath()), joint, shares)
+    path = str(prim.GetPath())
+    notes += _spread(rig, path, joint, shares) + moved_away(path, rig, seat.roots)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
     return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
-
-
-def _floats(prim: Usd.Prim, found: Attachment, placement: Placement) -> list[str]:
-    """What to say of hair that lies off the skin of what carries it."""
-    seat = None if found.far else find_seat(prim, found.rig, placement)
-    if seat is None:
-        return []
-    return [
-        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {found.rig.path}"
-        f"{found.rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
-        "check that it was made for this pose"
-    ]
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -149,7 +140,7 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         raise NeuralocksError(
             f"{path}: no joint of {rigs[0].path} is named like a head; name the joint that carries it with --head JOINT"
         )
-    roots = some_roots(prim)
+    roots = some_ends(prim)
 
     def away(rig: StageRig, to_bind: np.ndarray) -> float:
         head_at = rig.character.canonical_to_bind[:3, 3]

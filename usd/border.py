@@ -148,8 +148,15 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
     Raises:
         NeuralocksError: `out` is one of them, by whatever name.
     """
-    if out.exists() and any(os.path.exists(path) and os.path.samefile(out, path) for path in used_files(stage)):
+    if any(one_file(out, path) for path in used_files(stage)):
         raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
+
+
+def one_file(out: Path, path: str | Path) -> bool:
+    """Whether a file that will be written is one that there is; folders on the way to it may still be missing."""
+    if not os.path.exists(path):
+        return False
+    return os.path.realpath(out) == os.path.realpath(path) or (out.exists() and os.path.samefile(out, path))
 
 
 def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:

@@ -157,12 +157,16 @@ def export_onnx(
     """Write the network as ONNX with a batch axis, for crowds."""
     from neuralocks_core import model as model_file
     from neuralocks_core.files import atomic_write
+    from neuralocks_core.rig import RigModel
+    from neuralocks_core.runtime import graph_session
 
     if out.suffix.lower() != ".onnx":
         raise NeuralocksError(f"{out}: a graph ends in .onnx; choose such a name")
-    data = model_file.read(model or model_file.shipped("rig"), "rig").graphs["rig.onnx"]
+    RigModel.load(model)  # says what is wrong with the file
+    file = model_file.read(model or model_file.shipped("rig"), "rig")
+    graph_session(file, "rig.onnx")
     with atomic_write(out) as part:
-        part.write_bytes(data)
+        part.write_bytes(file.graphs["rig.onnx"])
     typer.echo(
         f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz; neuralocks export writes a description "
         "of both and the joints' names beside it, neuralocks rig export-c the code that makes the features"

@@ -2,7 +2,7 @@
 """BasisCurves as a groom: rest points, counts, widths and root attributes."""
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
@@ -70,12 +70,17 @@ def moment(prim: Usd.Prim) -> float | None:
 
 def left_as_they_are(prim: Usd.Prim) -> list[str]:
     """What to say of values that belong to the points at rest and that a bake does not carry."""
-    if not UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
-        return []
-    return [
-        f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
-        "remove them, so that it is drawn as tubes or towards the camera"
-    ]
+    notes = []
+    if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
+        notes.append(
+            f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
+            "remove them, so that it is drawn as tubes or towards the camera"
+        )
+    if UsdSkel.BindingAPI(prim).GetBlendShapeTargetsRel().GetTargets():
+        notes.append(
+            f"{prim.GetPath()}: has blend shapes of its own, which a bake leaves out; put them into its points"
+        )
+    return notes
 
 
 def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:

@@ -53,7 +53,8 @@ SLIDERS = {
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     "it, scaled to the rest edge's length",
-    "a cut": "steps of `history` that reach back over it count as 0; a bake of strands looks for none",
+    "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
+    "goes on in a straight line and does not turn. A bake finds cuts, or is told them (`--cuts`)",
     "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
 }
 """What an artist or a game changes, and what it does to what is above."""

@@ -29,6 +29,7 @@ from .notes import (
     out_of_range,
     partial_body,
     rig_notes,
+    without_turn,
 )
 from .placement import Placement
 from .recorded import recorded, recorded_cuts
@@ -89,6 +90,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     for rig in rigs:
+        stops += without_turn(rig)
         spoils += rig.notes + rig_notes(rig) + partial_body(rig, rigs) + ([] if told else rig.cut_notes())
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
@@ -178,7 +180,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
             stops.append(str(error))
     groom = read_groom(prim, to_bind, spoils)
     if joint:
-        spoils += groom_notes(facts["path"], groom)
+        spoils += groom_notes(prim, groom, border)
     made = recorded(prim)
     return facts | joint | groom_facts(groom) | ({"baked with": made} if made else {})
 

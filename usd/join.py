@@ -12,7 +12,7 @@ from pxr import Sdf, Tf, Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 
-from .border import Border, check_layer_name, check_not_input, first_line, open_stage
+from .border import Border, check_layer_name, check_not_input, first_line, one_file, open_stage
 from .notes import composition_notes, out_of_place
 from .override import deliver, relative, repeat_metadata
 from .recorded import KEY
@@ -60,7 +60,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     stage = open_stage(first.path)
     for part in every:
         part.check_alike(first)
-        if out.exists() and os.path.samefile(out, part.path):
+        if one_file(out, part.path):
             raise NeuralocksError(f"{out}: is one of the parts; choose another name")
     check_not_input(out, stage)
     frame = Border.of(stage).frame

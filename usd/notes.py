@@ -159,11 +159,30 @@ def rig_notes(rig: StageRig) -> list[str]:
         )
     width = rig.character.head_width
     if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
-        notes.append(
-            f"{rig.path}: the head is {width:.3g} m wide; "
-            f"check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
-        )
+        foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"))
+        remedy = foreign or f"; check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
+        notes.append(f"{rig.path}: the head is {width:.3g} m wide{remedy}")
     return notes
+
+
+def without_turn(rig: StageRig) -> list[str]:
+    """What stops a bake of strands: joints that the network reads and that have no rotation, hidden by a scale of zero or
+    mirrored.
+    """
+    humanoid, found = rig.character.humanoid, []
+    if "head" not in humanoid:
+        return []
+    for joint in dict.fromkeys(humanoid.nearest(name) for name in ("head", "upper_chest", *POSE_JOINTS)):
+        linear = rig.clip.joints[:, joint, :3, :3]
+        flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
+        for fact, bad, remedy in (
+            ("has zero scale", flat, "give it a scale above zero; 0.0001 hides what it moves, too"),
+            ("is mirrored or flat", ~flat & (np.linalg.det(linear) <= 0), "apply or remove the negative or zero scale"),
+        ):
+            if bad.any():
+                code = rig.time_codes[bad.argmax()]
+                found.append(f"{rig.path}: joint '{rig.source.names[joint]}' {fact} at time code {code:g}; {remedy}")
+    return found
 
 
 def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
@@ -204,8 +223,9 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
     ]
 
 
-def groom_notes(path: str, groom: Groom) -> list[str]:
-    """The notes on strands without length and on lengths that no hair has; `path` is the groom's prim."""
+def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
+    """The notes on strands without length and on lengths that no hair has."""
+    path = str(prim.GetPath())
     notes = []
     filled = np.flatnonzero(groom.counts > 0)
     spread = np.zeros(groom.strand_count, np.float32)
@@ -219,5 +239,6 @@ def groom_notes(path: str, groom: Groom) -> list[str]:
         )
     longest = float(spread.max())
     if longest > 2.5 or longest < 0.002:
-        notes.append(f"{path}: the longest strand reaches {longest:.3g} m; check the stage's metersPerUnit")
+        remedy = border.foreign(prim.GetAttribute("points")) or "; check the stage's metersPerUnit"
+        notes.append(f"{path}: the longest strand reaches {longest:.3g} m{remedy}")
     return notes

@@ -44,7 +44,7 @@ def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:
     except NeuralocksError as error:
         no_strands = error
     try:
-        rigged = read_rigged_hair(path, skeleton=skeleton, head=head)
+        rigged = read_rigged_hair(path, skeleton=skeleton, head=head, baked_first=True)
     except NeuralocksError as error:
         raise (no_strands if find_curves(open_stage(path), grooms) else error) from None
     return rigged_scene(rigged), rigged.border

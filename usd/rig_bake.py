@@ -21,6 +21,9 @@ from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
 from .stage import check_cuts
 from .time_codes import given_cuts, time_codes
 
+STILL = 1e-4
+"""A rotation that differs by less from none is none."""
+
 
 @dataclass(frozen=True)
 class RigBakeResult:
@@ -87,14 +90,15 @@ def bake_rig(
     hair = _read(shot, skeleton, head, model, cuts)
     source = hair.source.source
     check_not_input(out, hair.stage)
-    _check_moves(hair)
+    _check_heard(hair)
     codes = _codes(hair, frames, subframes)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
-    animation = write_rig_layer(hair, model.chains.match(source.names), shot, out, codes, turns)
-    notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source)]
-    notes += hair.source.loop_notes() if loop else []
+    notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source), *_held(hair, turns)]
+    joints = _joints(model, hair)
+    animation = write_rig_layer(hair, joints, shot, out, codes, turns)
+    notes += hair.source.loop_notes(joints) if loop else []
     if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
@@ -110,25 +114,43 @@ def _read(shot, skeleton, head, model, cuts) -> RiggedHair:
             f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
             "give a model trained for this rig (neuralocks rig train)"
         ) from None
-    model.chains.match(hair.source.character.skeleton.names)
+    _joints(model, hair)
     model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
     return hair
 
 
-def _check_moves(hair: RiggedHair) -> None:
-    head = hair.source.character.head
-    moved = np.ptp(hair.source.clip.joints[:, head], axis=0).max()
-    if moved < 1e-7:
-        prim = hair.source.source.animation
-        ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
-        if ignored and not hair.source.source.moves_joints:
-            raise NeuralocksError(ignored[0])
-        name = hair.source.character.skeleton.names[head].rsplit("/", 1)[-1]
+def _joints(model: RigModel, hair: RiggedHair) -> np.ndarray:
+    """Indices (N,) of the model's joints in the skeleton."""
+    character = hair.source.character
+    return model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
+
+
+def _check_heard(hair: RiggedHair) -> None:
+    """Refuse an animation that UsdSkel ignores."""
+    prim = hair.source.source.animation
+    ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
+    if ignored and not hair.source.source.moves_joints:
+        raise NeuralocksError(ignored[0])
+
+
+def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
+    """The note on a head that is held still.
+
+    Raises:
+        NeuralocksError: it is held as it was bound, so that no hair would move.
+    """
+    character, joints = hair.source.character, hair.source.clip.joints
+    if np.ptp(joints[:, character.head], axis=0).max() >= 1e-7:
+        return []
+    name = character.skeleton.names[character.head].rsplit("/", 1)[-1]
+    turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
+    if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
         raise NeuralocksError(
             f"{hair.source.path}: its head joint '{name}' is not animated, so the hair would not move; "
             "animate the skeleton, or name the joint that carries the hair with --head JOINT"
         )
+    return [f"{hair.source.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
 
 
 def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
@@ -150,14 +172,21 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
 
 
 def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
-    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes."""
+    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes.
+
+    Raises:
+        NeuralocksError: the model's weights are beyond what can be computed with.
+    """
     turns = np.empty((len(codes), len(model.chains), 4))
     for row, code in enumerate(codes):
         # One at a time: a matrix product may round otherwise for other batches.
         second = hair.border.seconds([code])
         wrapped = clip.loop and not clip.start <= second[0] <= clip.end
         shown = clip.at(second) if wrapped else hair.source.joints_at(code)[None]
-        turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
+        with np.errstate(over="ignore", invalid="ignore"):
+            turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
+        if not np.isfinite(turns[row]).all():
+            raise NeuralocksError("model: its weights are too large to compute with; get an undamaged copy")
         if progress:
             progress(row + 1, len(codes), "hair joints")
     return turns

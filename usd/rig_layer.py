@@ -12,10 +12,7 @@ from neuralocks_core.rotation import quaternion_product, rotation_part, to_quate
 
 from .joints import JointSource
 from .override import write_header
-from .rig_stage import RiggedHair
-
-NAME = "NeuralocksHair"
-"""The SkelAnimation, a child of the skeleton."""
+from .rig_stage import BAKED, RiggedHair
 
 
 def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path, codes: list[float], turns) -> str:
@@ -40,7 +37,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     prim = _animation_spec(layer, hair)
     source = hair.source.source
     own = _usable_animation(source)
-    order = [str(name) for name in own.GetJointsAttr().Get()] if own else list(source.names)
+    order = [str(name) for name in own.GetJointsAttr().Get()] if own else []
     order += [source.names[j] for j in joints if source.names[j] not in order]
     names = Sdf.ValueTypeNames
     Sdf.AttributeSpec(prim, "joints", names.TokenArray, Sdf.VariabilityUniform).default = Vt.TokenArray(order)
@@ -84,8 +81,8 @@ def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:
     if not source.prim.HasAPI(UsdSkel.BindingAPI):
         over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
     relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)
-    relation.targetPathList.explicitItems = [path.AppendChild(NAME)]
-    return Sdf.PrimSpec(over, NAME, Sdf.SpecifierDef, "SkelAnimation")
+    relation.targetPathList.explicitItems = [path.AppendChild(BAKED)]
+    return Sdf.PrimSpec(over, BAKED, Sdf.SpecifierDef, "SkelAnimation")
 
 
 def _usable_animation(source: JointSource) -> UsdSkel.Animation | None:

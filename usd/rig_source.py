@@ -56,11 +56,14 @@ class StageRig:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
 
-    def loop_notes(self) -> list[str]:
-        """What is wrong with the motion as a loop: its last sample must show the pose of its first."""
+    def loop_notes(self, replaced=()) -> list[str]:
+        """What is wrong with the motion as a loop: its last sample must show the pose of its first; joints that a bake
+        replaces are left out.
+        """
         ends = self.clip.joints[[0, -1], :, :3, :3]
         first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
         turn = np.degrees(np.arccos(np.clip((np.einsum("jab,jab->j", first, last) - 1) / 2, -1, 1)))
+        turn[list(replaced)] = 0
         if turn.max() <= LOOP_GAP:
             return []
         name, (start, end) = self.source.names[int(turn.argmax())], self.time_codes[[0, -1]]

@@ -18,6 +18,9 @@ from .notes import has_hair_joints, nothing_found
 from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import find_skins, rest_primvar
 
+BAKED = "NeuralocksHair"
+"""Name of the SkelAnimation that a bake writes."""
+
 
 @dataclass(frozen=True)
 class RiggedHair:
@@ -45,6 +48,7 @@ def read_rigged_hair(
     chains: list[str] | None = None,
     all_shapes: bool = False,
     cuts: list[float] | None = None,
+    baked_first: bool = False,
 ) -> RiggedHair:
     """Read the rigged mesh hair of a stage.
 
@@ -55,6 +59,7 @@ def read_rigged_hair(
         chains: name patterns of the chains' first joints, instead of finding them.
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
+        baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
 
     Raises:
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
@@ -84,11 +89,20 @@ def read_rigged_hair(
         # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
         hairy = [has_hair_joints(prim) for prim in prims]
         raise errors[hairy.index(True) if any(hairy) else 0]
+    if baked_first:
+        found.sort(key=lambda hair: not is_baked(hair.source))
+        del found[1:]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
     check_orients(found[0].source, found[0].rig.chains)
     return found[0]
+
+
+def is_baked(source: StageRig) -> bool:
+    """Whether the animation of a skeleton is one that `rig bake` wrote."""
+    animation = source.source.animation
+    return animation is not None and animation.GetName() == BAKED
 
 
 def core_meshes(source: StageRig) -> list[SkinnedMesh]:

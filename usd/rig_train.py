@@ -81,6 +81,8 @@ def train_rig(
 
 def _check_writable(out: Path) -> None:
     """Before minutes of training, not after them."""
+    if out.is_dir():
+        raise NeuralocksError(f"{out}: is a folder; give a file name")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out.parent):

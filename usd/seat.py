@@ -54,7 +54,7 @@ class Seat:
 
 def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf) -> Seat | None:
     """A groom on a rig's nearest skin; None where the rig has no skin, or none `within` so far [m]."""
-    roots, when, best = some_roots(prim), moment(prim), None
+    roots, when, best = some_ends(prim), moment(prim), None
 
     def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
@@ -114,21 +114,21 @@ def kinship(prim: Usd.Prim, rig: StageRig) -> int:
     return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
 
 
-def some_roots(prim: Usd.Prim, most: int = 1000) -> np.ndarray:
-    """Up to `most` finite roots (n, 3) in the prim's own space.
+def some_ends(prim: Usd.Prim, most: int = 1000, *, last: bool = False) -> np.ndarray:
+    """Up to `most` finite roots (n, 3) in the prim's own space; or the last points of these strands.
 
     Raises:
-        NeuralocksError: no root is finite.
+        NeuralocksError: none is finite.
     """
     points = rest_points(prim)
     counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
-    starts = np.cumsum(counts) - counts
-    starts = starts[(counts > 0) & (starts >= 0) & (starts < len(points))]
-    roots = points[starts[:: max(1, len(starts) // most)]] if len(starts) else points[:1]
-    roots = roots[np.isfinite(roots).all(axis=1)]
-    if not len(roots):
+    ends = np.cumsum(counts) - (1 if last else counts)
+    ends = ends[(counts > 0) & (ends >= 0) & (ends < len(points))]
+    found = points[ends[:: max(1, len(ends) // most)]] if len(ends) else points[:1]
+    found = found[np.isfinite(found).all(axis=1)]
+    if not len(found):
         raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
-    return roots
+    return found
 
 
 def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:

@@ -27,6 +27,7 @@ from .notes import (
     partial_body,
     rig_notes,
     stands_still,
+    without_turn,
 )
 from .placement import Placement
 from .rig_source import StageRig, find_skeletons, read_each_rig
@@ -123,7 +124,10 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         _check_animated([rig])
         notes += rig.notes + partial_body(rig, every)
     for item in found:
-        notes += rig_notes(replace(item.attachment.rig, character=item.attachment.character))
+        carrying = replace(item.attachment.rig, character=item.attachment.character)
+        for stops in without_turn(carrying):
+            raise NeuralocksError(stops)
+        notes += rig_notes(carrying)
     first, last = frame_range(stage, used)
     return Shot(
         path=path,
@@ -180,9 +184,9 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
         placement = Placement(prim)
         attachment = search.attachment(prim, placement)
         if attachment is not None:
-            path, groom = str(prim.GetPath()), read_groom(prim, attachment.to_bind, notes)
-            found.append(StageGroom(path, prim, groom, attachment, placement))
-            notes += groom_notes(path, groom)
+            groom = read_groom(prim, attachment.to_bind, notes)
+            found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
+            notes += groom_notes(prim, groom, attachment.rig.border)
     return found
 
 

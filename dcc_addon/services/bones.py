@@ -61,7 +61,7 @@ class LiveBones:
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
-        joints = model.chains.match(rig.paths)
+        joints = model.chains.match(rig.paths, character.skeleton.below(character.head))
         model.chains.check_same(chains_of(character, patterns))
         return cls(model, tuple(rig.bones[j] for j in joints), joints)
 

@@ -100,19 +100,23 @@ class HairChains:
             depth[joint] = depth[parent] + 1 if parent >= 0 else 0
         return [np.flatnonzero(depth == level) for level in range(depth.max() + 1)]
 
-    def match(self, names) -> np.ndarray:
-        """Indices (N,) of these joints among `names`, joint paths or their last parts.
+    def match(self, names, below: np.ndarray) -> np.ndarray:
+        """Indices (N,) of these joints among `names`, joint paths or their last parts, those for which `below` (J,) says
+        that they hang from the head: what a tail or a coat calls its joints is its own matter.
 
         Raises:
             NeuralocksError: one is missing or ambiguous, that is, the model was trained for other chains.
         """
         places: dict[str, list[int]] = {}
-        for index, name in enumerate(names):
-            places.setdefault(name.rsplit("/", 1)[-1], []).append(index)
-        missing = [name for name in self.names if len(places.get(name, ())) != 1]
+        for index in np.flatnonzero(below):
+            places.setdefault(names[index].rsplit("/", 1)[-1], []).append(int(index))
+        double = next((name for name in self.names if len(places.get(name, ())) > 1), None)
+        if double:
+            raise NeuralocksError(f"model: several joints below the head are named '{double}'; rename all but one")
+        missing = [name for name in self.names if name not in places]
         if missing:
             raise NeuralocksError(
-                f"model: it moves {len(self)} joints in {len(self.roots)} chains, but this skeleton has no single joint "
+                f"model: it moves {len(self)} joints in {len(self.roots)} chains, but below this head there is no joint "
                 f"'{missing[0]}' ({len(missing)} of them missing); train a model for this rig (neuralocks rig train)"
             )
         return np.array([places[name][0] for name in self.names], int)

@@ -68,12 +68,13 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"
         )
     below = character.skeleton.below(character.head)
-    outside = [joint for joint in hits if not below[joint] or joint == character.head]
-    if outside:
+    inside = [joint for joint in hits if below[joint] and joint != character.head]
+    if not inside:
         raise NeuralocksError(
-            f"--chains: joint '{leaf(names[outside[0]])}' does not hang below the head joint "
-            f"'{leaf(names[character.head])}'; use a narrower pattern or another --head"
+            f"--chains: joint '{leaf(names[hits[0]])}' does not hang below the head joint "
+            f"'{leaf(names[character.head])}'; use another pattern or another --head"
         )
+    hits = inside  # what a tail or a coat calls its joints is its own matter
     inner = np.zeros(len(names), bool)
     for joint, parent in enumerate(parents):
         inner[joint] = parent >= 0 and (inner[parent] or parent in hits)

@@ -66,6 +66,10 @@ class RigModel:
         object.__setattr__(self, "layers", layers)
         object.__setattr__(self, "limits", np.asarray(self.limits, np.float32))
         size = self.inputs
+        if not layers:
+            raise NeuralocksError("model: it has no layers; get an undamaged copy")
+        if not isinstance(self.training, dict) or not isinstance(self.report, dict):
+            raise NeuralocksError("model: its card is damaged; get an undamaged copy")
         if self.limits.shape != (size,) or not np.isfinite(self.limits).all() or not 0 < self.max_angle < 3.1:
             raise NeuralocksError("model: its input limits do not fit its inputs; get an undamaged copy")
         for weight, bias in layers:

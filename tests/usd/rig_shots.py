@@ -8,7 +8,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.network import feature_columns, input_limits
-from usd.rig_layer import NAME
+from usd.rig_stage import BAKED
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
 
@@ -82,6 +82,6 @@ def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True,
 def hair_turns(path, codes):
     """Rotations (T, 3, 4) of the three moving joints as UsdSkel has them."""
     stage = Usd.Stage.Open(str(path))
-    animation = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{NAME}"))
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{BAKED}"))
     rotations = animation.GetRotationsAttr()
     return np.array([[[q.GetReal(), *q.GetImaginary()] for q in list(rotations.Get(c))[2:5]] for c in codes])

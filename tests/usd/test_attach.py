@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.inspect import inspect
@@ -171,3 +171,53 @@ def test_a_groom_of_another_unit_than_the_stage_is_told_so(tmp_path):
         NeuralocksError, match=r"groom.usda counts in 1 m, the stage in 0.01 m and has Z up, the stage Y"
     ):
         read_shot(path)
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_strands_from_tip_to_root_are_told(tmp_path, bound):
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    assert not any("from tip to root" in note for note in read_shot(path).notes)
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    strands = np.array(points.Get()).reshape(40, -1, 3)
+    points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands[:, ::-1].reshape(-1, 3))))
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        assert sum("from tip to root" in note for note in notes) == 1
+
+
+def test_blend_shapes_under_and_on_a_groom_are_told(tmp_path):
+    """Skin that a face moves away below the roots, and shapes of the groom's own, which a bake leaves out."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    mesh = next(prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    hair, count = stage.GetPrimAtPath("/Hero/Hair"), len(UsdGeom.Mesh(mesh).GetPointsAttr().Get())
+    shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild("Lift"))
+    shape.CreateOffsetsAttr([(0, 0.008, 0)] * count)
+    for prim in (mesh, hair):
+        binding = UsdSkel.BindingAPI.Apply(prim)
+        binding.CreateBlendShapesAttr(["lift"])
+        binding.CreateBlendShapeTargetsRel().SetTargets([shape.GetPath()])
+    animation = UsdSkel.Animation(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)))
+    animation.CreateBlendShapesAttr(["lift"])
+    for code, weight in ((1, 0.0), (9, 1.0)):
+        animation.CreateBlendShapeWeightsAttr().Set([weight], code)
+    stage.Save()
+    notes = read_shot(path).notes
+    assert any("'lift' moves the skin below it by up to 8 mm" in note for note in notes), notes
+    assert any("has blend shapes of its own" in note for note in notes), notes
+
+
+@pytest.mark.parametrize(("scale", "words"), [((0, 0, 0), "zero scale"), ((-1, 1, 1), "mirrored")])
+def test_a_joint_without_a_turn_is_named(tmp_path, scale, words):
+    """By a bake, and by `inspect`, which is asked before."""
+    path = write_shot(tmp_path, Recipe())
+    stage = Usd.Stage.Open(str(path))
+    animation = UsdSkel.Animation(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)))
+    scales = [Gf.Vec3h(1)] * len(animation.GetJointsAttr().Get())
+    scales[[str(name).rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()].index("arm_L")] = Gf.Vec3h(*scale)
+    animation.GetScalesAttr().Set(scales, 1)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match=f"joint '.*arm_L' .*{words}.* at time code "):
+        read_shot(path)
+    assert any("arm_L" in line for line in inspect(path)["stops"])

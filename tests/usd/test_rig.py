@@ -16,8 +16,7 @@ from neuralocks_core.rotation import from_vector
 from usd.evaluate import evaluate
 from usd.inspect import as_text, inspect
 from usd.rig_bake import bake_rig
-from usd.rig_layer import NAME
-from usd.rig_stage import describe_chains, read_rigged_hair, weight_notes
+from usd.rig_stage import BAKED, describe_chains, read_rigged_hair, weight_notes
 from usd.stage import read_shot
 
 from ..blenders import installed
@@ -29,7 +28,7 @@ def test_the_body_stays_sample_for_sample(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))
     stage, own = Usd.Stage.Open(str(tmp_path / "out.usda")), Usd.Stage.Open(str(shot))
-    baked = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{NAME}"))
+    baked = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{BAKED}"))
     before = UsdSkel.Animation(own.GetPrimAtPath("/Who/Motion"))
     assert list(baked.GetJointsAttr().Get()) == list(before.GetJointsAttr().Get())
     assert baked.GetRotationsAttr().GetTimeSamples() == before.GetRotationsAttr().GetTimeSamples()
@@ -46,7 +45,7 @@ def test_the_body_stays_sample_for_sample(tmp_path):
         pair = [s.GetPrimAtPath("/Who/Rig").GetAttribute(attribute).Get() for s in (stage, own)]
         assert pair[0] == pair[1]
     target = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Rig")).GetInheritedAnimationSource()
-    assert str(target.GetPath()) == f"/Who/Rig/{NAME}"
+    assert str(target.GetPath()) == f"/Who/Rig/{BAKED}"
     assert stage.GetRootLayer().subLayerPaths[0] == "./shot.usda"
 
 
@@ -147,6 +146,67 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     with pytest.raises(NeuralocksError, match=words):
         bake_rig(shot, tmp_path / "out.usda", model)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
+
+
+def test_a_held_head_is_that_of_a_held_pose(tmp_path):
+    """Reading, or in a still: the hair hangs from the bent head as it does in a shot that passes through the pose."""
+    moving = small_shot(tmp_path / "moving.usda")
+    model = model_for(read_rigged_hair(moving))
+    stage = Usd.Stage.Open(str(small_shot(tmp_path / "held.usda")))
+    rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+    bent = rotations.Get(5)
+    rotations.Clear()
+    rotations.Set(bent, 1)
+    stage.Save()
+    bake_rig(moving, tmp_path / "moving_hair.usda", model)
+    result = bake_rig(tmp_path / "held.usda", tmp_path / "held_hair.usda", model, frames="1:3")
+    assert any("held pose" in note for note in result.notes)
+    there = hair_turns(tmp_path / "moving_hair.usda", [5])
+    assert np.abs(there[..., 1:]).max() > 0.01
+    for code in (1, 3):
+        assert np.abs(hair_turns(result.path, [code]) - there).max() < 1e-6
+
+
+def test_joints_elsewhere_may_have_the_names_of_hair_joints(tmp_path):
+    """A tail's are no hair's: rigs name every chain hair_0, joint1."""
+    plain = small_shot(tmp_path / "plain.usda")
+    model = model_for(read_rigged_hair(plain))
+    text = small_shot(tmp_path / "tailed.usda").read_text()
+    stage = Usd.Stage.Open(str(tmp_path / "tailed.usda"))
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig"))
+    extra = ["hips/hair_0", "hips/hair_0/hair_1"]
+    skeleton.GetJointsAttr().Set([*skeleton.GetJointsAttr().Get(), *extra])
+    for attribute in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()):
+        matrices = list(attribute.Get())
+        attribute.Set(Vt.Matrix4dArray([*matrices, *[Gf.Matrix4d().SetTranslate((0, 0.9, -0.1))] * 2]))
+    stage.Save()
+    assert (tmp_path / "tailed.usda").read_text() != text
+    for name in ("plain", "tailed"):
+        bake_rig(tmp_path / f"{name}.usda", tmp_path / f"{name}_hair.usda", model)
+    turns = [hair_turns(tmp_path / f"{name}_hair.usda", range(1, 26)) for name in ("plain", "tailed")]
+    assert np.array_equal(*turns)
+
+
+def test_a_body_that_nothing_animates_stays_where_it_rests(tmp_path):
+    """Where a parent moves the character, the bake's animation lists hair joints alone: rest scales have more digits than
+    an animation's.
+    """
+    shot = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(shot))
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig"))
+    UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel().ClearTargets(True)
+    rest = list(skeleton.GetRestTransformsAttr().Get())
+    rest[0] = Gf.Matrix4d().SetScale(0.01) * rest[0]
+    rest[1] = rest[1] * Gf.Matrix4d().SetScale(100)
+    skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray(rest))
+    turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Who")).AddRotateXOp()
+    for frame in range(1, 26):
+        turn.Set(30 * float(np.sin(frame / 4)), frame)
+    stage.Save()
+    result = bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))
+    baked = Usd.Stage.Open(str(result.path))
+    animation = UsdSkel.Animation(baked.GetPrimAtPath(result.animation))
+    assert [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()] == ["hair_0", "hair_1", "hair_2"]
 
 
 def test_commands_for_strands_say_what_is_for_joints(tmp_path):

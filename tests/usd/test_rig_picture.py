@@ -10,7 +10,7 @@ from usd.rig_bake import bake_rig
 from usd.rig_picture import rigged_scene
 from usd.rig_stage import read_rigged_hair
 
-from .rig_shots import EXAMPLE, small_shot
+from .rig_shots import EXAMPLE, model_for, small_shot
 
 
 def test_a_picture_of_mesh_hair(tmp_path):
@@ -40,6 +40,21 @@ def test_a_picture_of_mesh_hair(tmp_path):
     panels = [brown[:, i * 124 : i * 124 + 120] for i in range(6)]
     assert all(panel.mean() > 0.02 for panel in panels)
     assert (panels[0] != panels[4]).mean() > 0.02
+
+
+def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
+    shot = small_shot(tmp_path / "one.usda")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("A", "B"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(shot))
+    stage.Save()
+    model = model_for(read_rigged_hair(shot))
+    baked = bake_rig(tmp_path / "two.usda", tmp_path / "out.usda", model, skeleton="/B/Rig").path
+    assert read_rigged_hair(baked, baked_first=True).source.path == "/B/Rig"
+    assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).source.path == "/A/Rig"
+    with pytest.raises(NeuralocksError, match="several skeletons"):
+        read_rigged_hair(baked)
 
 
 def test_joints_without_a_mesh_have_no_picture(tmp_path):

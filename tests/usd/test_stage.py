@@ -229,7 +229,8 @@ def test_strands_too_short_to_move_are_counted_alike_everywhere():
     points = np.array([0, 1.7, 0.1]) + np.arange(3)[None, :, None] * step[:, None]
     groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(4, 3, np.int32))
     assert (~resample(groom, 24)[1]).sum() == groom_facts(groom)["without two distinct points"] == 2
-    (said,) = groom_notes("/Hair", groom)
+    stage = Usd.Stage.CreateInMemory()
+    (said,) = groom_notes(UsdGeom.BasisCurves.Define(stage, "/Hair").GetPrim(), groom, Border.of(stage))
     assert said == "/Hair: 2 of 4 strands have no two distinct points; they follow the head rigidly"
 
 

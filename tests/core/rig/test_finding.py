@@ -159,7 +159,7 @@ def test_a_model_for_other_chains_is_refused():
     """By a missing name, and by bones of another length."""
     chains = find_chains(character(tail("hair", 3)))
     with pytest.raises(NeuralocksError, match="train a model for this rig"):
-        chains.match(["head", "head/hair_1"])
+        chains.match(["head", "head/hair_1"], np.array([False, True]))
     longer = find_chains(character(tail("hair", 3, step=(0, -0.08, 0))))
     with pytest.raises(NeuralocksError, match="elsewhere"):
         chains.check_same(longer)

@@ -124,6 +124,27 @@ def test_header_and_example_compile_without_a_warning(tmp_path, compiler, dynami
     subprocess.run([compiler[0], "-x", compiler[1], *told[2:]], cwd=tmp_path, check=True)  # as its comment says
 
 
+def test_two_models_under_one_prefix_do_not_compile(tmp_path):
+    """One would move the other's hair; the same header twice is fine, and so is another prefix."""
+    first, second = (random_model((4,) * 2, 8, seed, rig_spec()) for seed in (0, 1))
+    export_c(first, tmp_path / "first.h")
+    export_c(second, tmp_path / "second.h")
+    export_c(second, tmp_path / "other.h", prefix="other")
+    source = '#include "first.h"\n#include "first.h"\n#include "%s"\nint main(void) { return 0; }\n'
+    compiled(tmp_path, source % "other.h", ("-Wno-unused-function",))
+    (tmp_path / "both.c").write_text(source % "second.h")
+    done = subprocess.run(["gcc", "-fsyntax-only", "both.c"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode and "--prefix" in done.stderr
+
+
+def test_what_no_header_computes_is_refused(tmp_path):
+    model = random_model((4,) * 2, 8, 0, rig_spec(True))
+    with pytest.raises(NeuralocksError, match="other inputs than a header computes"):
+        export_c(replace(model, spec=replace(model.spec, linear="velocity")), tmp_path / "hair.h")
+    with pytest.raises(NeuralocksError, match="has no layers"):
+        replace(model, layers=())
+
+
 @pytest.mark.skipif(not shutil.which("cc"), reason="no cc here")
 def test_the_example_is_built_by_the_line_that_it_gives(tmp_path):
     export_c(random_model(), tmp_path / "braid.h")
