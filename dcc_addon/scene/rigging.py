@@ -26,9 +26,9 @@ def rigging(things) -> int:
     return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
 
 
-def posture(things, live: set[str]) -> int:
+def posture(things, live: dict[str, dict[str, list]]) -> int:
     """A number that changes when one of these objects, or one that it depends on, is placed or posed otherwise by values
-    that no animation writes: those count in all frames. Bones named in `live` are left out.
+    that no animation writes: those count in all frames. Of bones in `live` the channels there count, in place of theirs.
     """
     return zlib.crc32(repr([_held(thing, live) for thing in _reached(things)]).encode())
 
@@ -75,18 +75,21 @@ def _object(thing) -> list:
     return found
 
 
-def _held(thing, live: set[str]) -> list:
+def _held(thing, live: dict[str, dict[str, list]]) -> list:
     moving = animated(thing.animation_data)
     found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
     found += [_lists(thing), *(_read(data) for data in _animation(thing))]
     if thing.pose is not None:
         bones = thing.pose.bones
         starts = [f'pose.bones["{_quoted(bone)}"].' for bone in bones]
-        left_out = np.array([bone.name in live for bone in bones], bool)
         for name, size in PLACE.items():
-            values = np.empty(len(bones) * size, np.float32)
-            bones.foreach_get(name, values)
-            values.reshape(-1, size)[left_out | [start + name in moving for start in starts]] = 0
+            values = np.empty((len(bones), size), np.float32)
+            bones.foreach_get(name, values.ravel())
+            for row, bone in enumerate(bones):
+                if starts[row] + name in moving:
+                    values[row] = 0
+                elif bone.name in live:
+                    values[row] = live[bone.name].get(name, values[row])
             found.append(zlib.crc32(values))
         found += [_lists(bone) for bone in bones]
     if thing.type == "CURVE":

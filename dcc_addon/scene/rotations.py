@@ -15,21 +15,20 @@ SAME = 1e-7
 """Values that differ by less are the same turn."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
 """Rotation mode -> the property in which a bone keeps its rotation."""
+KEPT = ("rotation_mode", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
+"""What is put aside of a bone."""
 KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
 """Modes for keys, best first: the axis of a small turn is anywhere, so between two keys it swings."""
 
 
 def kept(armature, bones) -> str:
-    """Rotation modes, and the values of every mode, of the bones named, as JSON."""
+    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each."""
     found = {}
     for name in bones:
-        bone = armature.pose.bones[name]
-        found[name] = [
-            bone.rotation_mode,
-            list(bone.rotation_quaternion),
-            list(bone.rotation_euler),
-            list(bone.rotation_axis_angle),
-        ]
+        bone = armature.pose.bones.get(name)
+        if bone is not None:
+            mode, *channels = KEPT
+            found[name] = [getattr(bone, mode), *(list(getattr(bone, channel)) for channel in channels)]
     return json.dumps(found)
 
 
@@ -71,7 +70,9 @@ def check_free(armature, bones) -> None:
         NeuralocksError: one has a constraint, or does not turn with its parent.
     """
     for name in bones:
-        bone = armature.pose.bones[name]
+        bone = armature.pose.bones.get(name)
+        if bone is None:  # renamed: that is told by who reads the pose
+            continue
         acting = next((c.name for c in bone.constraints if not c.mute and c.influence), None)
         if acting is not None:
             raise NeuralocksError(

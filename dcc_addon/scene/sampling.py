@@ -89,11 +89,12 @@ def rigging_of(armature, scene) -> int:
 
 
 def posture_of(armature, scene) -> int:
-    """A number that changes when this armature, or what it depends on, is posed otherwise by what is not keyed. The hair
-    bones that the live view turns are no part of it.
+    """A number that changes when this armature, or what it depends on, is posed otherwise by what is not keyed; hair bones
+    count as they are without the live view.
     """
-    live = set(rotations.named(armature.neuralocks_character.rig_kept))
-    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], live)
+    kept = rotations.named(armature.neuralocks_character.rig_kept)
+    own = {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
+    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], own)
 
 
 def notice(armature, scene) -> None:
@@ -225,8 +226,8 @@ class _Recording:
 
 
 class stepping:
-    """While frames are stepped: the live view is off, and the current frame comes back at the end, with poses that are
-    not keyed.
+    """While frames are stepped: the live view is off, its hair bones are turned as without it, and the current frame comes
+    back at the end, with poses that are not keyed.
     """
 
     def __init__(self, scene):
@@ -235,12 +236,20 @@ class stepping:
     def __enter__(self):
         self._frame = self._scene.frame_current, self._scene.frame_subframe
         self._unkeyed = Unkeyed(self._scene)
+        self._live = {}
+        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
+            text = armature.neuralocks_character.rig_kept
+            self._live[armature.name_full] = rotations.kept(armature, rotations.named(text))
+            rotations.give_back(armature, text)
         session.paused += 1
 
     def __exit__(self, *_):
         try:
             self._scene.frame_set(self._frame[0], subframe=self._frame[1])
             self._unkeyed.put_back()
+            for name, turned in self._live.items():
+                if (armature := find(name)) is not None:
+                    rotations.give_back(armature, turned)
         finally:
             session.paused -= 1
 
