@@ -196,12 +196,11 @@ class BoundarySampler:
 
     def _measures(self, shape: np.ndarray) -> np.ndarray:
         key = shape.tobytes()
-        known = self._shape_cache.get(key)
-        if known is None:
+        if key not in self._shape_cache:
             if len(self._shape_cache) > 64:
                 self._shape_cache.clear()
-            known = self._shape_cache[key] = body_measures(self.character, shape)
-        return known
+            self._shape_cache[key] = body_measures(self.character, shape)
+        return self._shape_cache[key]
 
     def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) and so long before them (L,), as if

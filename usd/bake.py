@@ -109,11 +109,7 @@ def bake(
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
     facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
-    # Two frames at a time: what numpy does between the network's turns runs in one thread.
-    at_once = min(2, strand_model.threads)
-    resumed = write_samples(
-        shot, out, codes, poser, inputs | options, facts, velocities=velocities, at_once=at_once, progress=progress
-    )
+    resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
     if cuts is None and strand_model.spec.bins:

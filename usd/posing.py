@@ -17,7 +17,7 @@ from .stage import StageGroom
 
 
 class GroomPoser:
-    """Deforms one groom of a shot with a model. Several threads may ask for points at a time.
+    """Deforms one groom of a shot with a model.
 
     Args:
         item: the groom.

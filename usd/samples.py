@@ -7,10 +7,7 @@ the file.
 
 import math
 import shutil
-from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from pathlib import Path
 from typing import Protocol
 
@@ -31,8 +28,6 @@ from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
 """Points that are read back and written at a time."""
-LARGE = 1 << 20
-"""Points of a groom whose frames are computed one by one: its chunks occupy all cores, and a frame takes much memory."""
 
 
 class Poser(Protocol):
@@ -52,7 +47,6 @@ def write_samples(
     facts: dict,
     *,
     velocities: bool = True,
-    at_once: int = 1,
     progress: Progress | None = None,
 ) -> int:
     """Write an override layer.
@@ -65,7 +59,6 @@ def write_samples(
         inputs: plain values that, with the shot's files and this program's, determine every sample.
         facts: what the file tells of how it was made, see `recorded`.
         velocities: write velocities.
-        at_once: frames of a groom that is not LARGE to compute at a time, by as many threads.
         progress: called with (done, total, message).
 
     Returns:
@@ -80,7 +73,7 @@ def write_samples(
     inputs = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
-        return _write(shot, codes, poser, spool, facts, velocities, at_once, progress or silent)
+        return _write(shot, codes, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) or stopped():
             spool.close()
@@ -89,7 +82,7 @@ def write_samples(
         raise
 
 
-def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, at_once: int, say) -> int:
+def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
     plans = [Stencils(item, codes, velocities) for item in shot.grooms]
     total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
@@ -97,35 +90,21 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
     with WriteBehind() as behind:
         for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
             behind.put(writer.groom, item, velocities, facts)
-            store, count = _Store(spool, writer, item, number, plan), len(item.groom.points)
-            missing = dict.fromkeys(code for code in plan.codes if not spool.holds(number, code, count))
-            resumed += len(plan.wanted.keys() - missing.keys())
-            with closing(_computed(poser, item, missing, at_once if count < LARGE else 1)) as computed:
-                for code in plan.codes:
-                    behind.put(store.frame, code, [next(computed)] if code in missing else [])
-                    done += 1
-                    say(done, total, item.path)
+            store, made = _Store(spool, writer, item, number, plan), None
+            for code in plan.codes:
+                held = []
+                if spool.holds(number, code, len(item.groom.points)):
+                    resumed += code in plan.wanted
+                else:
+                    made = made or poser(item)
+                    held.append(made.points(code))
+                behind.put(store.frame, code, held)
+                done += 1
+                say(done, total, item.path)
             behind.put(store.finish)
         behind.put(writer.close)
     deliver(spool)
     return resumed
-
-
-def _computed(poser, item: StageGroom, codes, at_once: int) -> Iterator[np.ndarray]:
-    """The groom's points at each of the codes, the next ones computed meanwhile; nothing is kept of what was given."""
-    if not codes:
-        return
-    points, waiting = poser(item).points, deque()
-    if at_once < 2:
-        yield from map(points, codes)
-        return
-    with ThreadPoolExecutor(at_once) as pool:
-        for code in codes:
-            waiting.append(pool.submit(points, code))
-            if len(waiting) == at_once:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
 
 
 class _Store:
