@@ -90,7 +90,6 @@ def bake_rig(
     hair = _read(shot, skeleton, head, model, cuts)
     source = hair.source.source
     check_not_input(out, hair.stage)
-    _check_heard(hair)
     codes = _codes(hair, frames, subframes)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     sampler = RigSampler(model.spec, hair.source.character, clip)
@@ -126,23 +125,19 @@ def _joints(model: RigModel, hair: RiggedHair) -> np.ndarray:
     return model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
 
 
-def _check_heard(hair: RiggedHair) -> None:
-    """Refuse an animation that UsdSkel ignores."""
-    prim = hair.source.source.animation
-    ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
-    if ignored and not hair.source.source.moves_joints:
-        raise NeuralocksError(ignored[0])
-
-
 def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
     """The note on a head that is held still.
 
     Raises:
-        NeuralocksError: it is held as it was bound, so that no hair would move.
+        NeuralocksError: it is held as it was bound, so that no hair would move; or USD ignores its animation.
     """
-    character, joints = hair.source.character, hair.source.clip.joints
+    source, character, joints = hair.source.source, hair.source.character, hair.source.clip.joints
     if np.ptp(joints[:, character.head], axis=0).max() >= 1e-7:
         return []
+    prim = source.animation
+    ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
+    if ignored and not source.moves_joints:
+        raise NeuralocksError(ignored[0])
     name = character.skeleton.names[character.head].rsplit("/", 1)[-1]
     turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
     if min(turned, np.abs(turns[..., 1:]).max()) < STILL:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from .animated import animated, strips_of
-from .unkeyed import PLACE
+from .unkeyed import PLACE, value_of
 
 REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, "use_deform": 1}
 IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
@@ -107,13 +107,8 @@ def _read(data) -> list:
     found = []
     for target in (t for curve in data.drivers for v in curve.driver.variables for t in v.targets):
         path, owner = target.data_path, target.id
-        if not path or owner is None or path in animated(getattr(owner, "animation_data", None)):
-            continue
-        try:
-            value = owner.path_resolve(path)
-        except ValueError:  # the driver is broken
-            continue
-        found.append(value if isinstance(value, (int, float, str)) else repr(value))
+        if path and owner is not None and path not in animated(getattr(owner, "animation_data", None)):
+            found.append(value_of(owner, path))
     return found
 
 

@@ -35,7 +35,7 @@ class Unkeyed:
         """Give what has changed since its value again."""
         for kind, name, within, path, value in self._others:
             owner = _owner(getattr(bpy.data, kind).get(name), within)
-            if owner is not None and _value(owner, path) not in (None, value):
+            if owner is not None and value_of(owner, path) not in (None, value):
                 _write(owner, path, value)
         for name, kept in self._kept.items():
             thing = find(name)
@@ -51,6 +51,17 @@ class Unkeyed:
                     _keys(thing).update_tag()
 
 
+def value_of(owner, path: str):
+    """Number, text or list of numbers; None where there is no such property any more."""
+    try:
+        value = owner.path_resolve(path)
+    except ValueError:
+        return None
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    return list(value) if hasattr(value, "__len__") else None
+
+
 def _owner(thing, within: bool):
     """A data block, or the node tree that is part of it."""
     return getattr(thing, "node_tree", None) if within else thing
@@ -62,18 +73,7 @@ def _written(owner) -> list[tuple[str, object]]:
     if data is None or not (data.action is not None or len(data.nla_tracks)):
         return []
     paths = [path for path in animated(data) if path.rpartition(".")[2] not in PLACE]
-    return [(path, value) for path in paths if (value := _value(owner, path)) is not None]
-
-
-def _value(owner, path: str):
-    """Number, text or list of numbers; None where there is no such property any more."""
-    try:
-        value = owner.path_resolve(path)
-    except ValueError:
-        return None
-    if isinstance(value, (bool, int, float, str)):
-        return value
-    return list(value) if hasattr(value, "__len__") else None
+    return [(path, value) for path in paths if (value := value_of(owner, path)) is not None]
 
 
 def _write(owner, path: str, value) -> None:
@@ -82,7 +82,10 @@ def _write(owner, path: str, value) -> None:
         (owner.path_resolve(of) if of else owner)[bpy.utils.unescape_identifier(key)] = value
     else:
         of, _, name = path.rpartition(".")
-        setattr(owner.path_resolve(of) if of else owner, name, value)
+        try:
+            setattr(owner.path_resolve(of) if of else owner, name, value)
+        except (AttributeError, TypeError, ValueError):  # something that only animation may write
+            return
     owner.update_tag()
 
 
