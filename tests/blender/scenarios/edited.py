@@ -230,7 +230,7 @@ def applied(_folder: Path) -> None:
     points_at(strands, 9)
     _choose(strands)
     bpy.ops.object.modifier_apply(modifier="Frizz")
-    bpy.context.view_layer.update()
+    points_at(strands, 10)
     assert "'Frizz' was applied" in messages()["Hair"] and not strands.neuralocks_hair.live
     assert np.array_equal([point.position for point in strands.data.points], groom)
 
