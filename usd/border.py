@@ -138,7 +138,7 @@ def check_layer_name(out: Path) -> None:
     """
     if out.suffix.lower() not in LAYERS:
         raise NeuralocksError(f"{out}: is written as a USD layer; end its name with {', '.join(LAYERS)}")
-    if out.is_dir():
+    if os.path.isdir(out):  # False of a name too long for a file, too, which is told when it is written
         raise NeuralocksError(f"{out}: is a folder; give a file name")
 
 
@@ -156,7 +156,7 @@ def one_file(out: Path, path: str | Path) -> bool:
     """Whether a file that will be written is one that there is; folders on the way to it may still be missing."""
     if not os.path.exists(path):
         return False
-    return os.path.realpath(out) == os.path.realpath(path) or (out.exists() and os.path.samefile(out, path))
+    return os.path.realpath(out) == os.path.realpath(path) or (os.path.exists(out) and os.path.samefile(out, path))
 
 
 def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:

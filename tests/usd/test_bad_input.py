@@ -294,3 +294,11 @@ def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of
         with pytest.raises(NeuralocksError, match=r"shot.usda: holds no .*groom.usda.*bring along") as caught:
             work()
         assert "\n" not in str(caught.value)
+
+
+def test_a_name_too_long_for_a_file_is_told(tmp_path):
+    """In one line, by the Python calls as by the command."""
+    shot = write_shot(tmp_path, Recipe())
+    with pytest.raises(NeuralocksError, match="File name too long"):
+        bake(shot, tmp_path / f"{'a' * 300}.usdc", frames="1:2")
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
