@@ -16,7 +16,7 @@ import numpy as np
 from neuralocks_core import rotation
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.humanoid import SEMANTIC
+from neuralocks_core.humanoid import SEMANTIC, Humanoid
 from neuralocks_core.measures import MEASURES, body_measures
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.track import Track
@@ -122,6 +122,11 @@ class BoundarySpec:
         return 0.5 + 0.5 * np.cos(np.pi * into)
 
 
+def joints_read(humanoid: Humanoid, pose_joints=POSE_JOINTS) -> list[int]:
+    """The head, the upper chest and the pose joints, or what a rig has in place of them."""
+    return [humanoid["head"], *(humanoid.nearest(name) for name in ("upper_chest", *pose_joints))]
+
+
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
@@ -143,11 +148,7 @@ class BoundarySampler:
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         self.spec, self.character, self.clip = spec, character, clip
         humanoid = character.humanoid
-        self.joints = [
-            character.head,
-            humanoid.nearest("upper_chest"),
-            *(humanoid.nearest(n) for n in spec.pose_joints),
-        ]
+        self.joints = joints_read(humanoid, spec.pose_joints)
         self.stance = np.stack([_stance(character, name) for name in spec.pose_joints])
         parts = clip.parts if spec.bins else [clip]
         self._cuts = np.array([part.start for part in parts[1:]])

@@ -145,6 +145,9 @@ def _check(meta, path: Path, kind: str | None) -> None:
         )
     if not isinstance(meta.get("kind"), str) or meta["kind"] not in KINDS:
         raise NeuralocksError(f"{path}: it holds a '{meta.get('kind')}', unknown here; update neuralocks")
+    for name in ("training", "report"):
+        if not isinstance(meta.get(name) or {}, dict):
+            raise NeuralocksError(f"{path}: its '{name}' is no table of values; get an undamaged copy of the model")
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}
         raise NeuralocksError(

@@ -137,7 +137,7 @@ class PosedSkin:
         around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
         for step in around[np.argsort(-np.abs(around).sum(axis=1), kind="stable")] @ box.strides:
             enter(own + np.int32(step))
-        np.bitwise_or(marks, entered, out=marks)
+        marks |= entered
 
     def rough(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Height [m] over the plane of some sample near by, (N,), of points (N, 3) float32 in marked cells."""

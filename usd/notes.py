@@ -9,7 +9,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.arclength import count_pointlike
-from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.boundary import POSE_JOINTS, joints_read
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
@@ -172,7 +172,7 @@ def without_turn(rig: StageRig) -> list[str]:
     humanoid, found = rig.character.humanoid, []
     if "head" not in humanoid:
         return []
-    for joint in dict.fromkeys(humanoid.nearest(name) for name in ("head", "upper_chest", *POSE_JOINTS)):
+    for joint in dict.fromkeys(joints_read(humanoid)):
         linear = rig.clip.joints[:, joint, :3, :3]
         flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
         for fact, bad, remedy in (

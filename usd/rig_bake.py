@@ -87,7 +87,7 @@ def bake_rig(
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     cuts = given_cuts(cuts, loop)
-    hair = _read(shot, skeleton, head, model, cuts)
+    hair, joints = _read(shot, skeleton, head, model, cuts)
     source = hair.source.source
     check_not_input(out, hair.stage)
     codes = _codes(hair, frames, subframes)
@@ -95,7 +95,6 @@ def bake_rig(
     sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
     notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source), *_held(hair, turns)]
-    joints = _joints(model, hair)
     animation = write_rig_layer(hair, joints, shot, out, codes, turns)
     notes += hair.source.loop_notes(joints) if loop else []
     if cuts is None and model.dynamic:
@@ -103,7 +102,8 @@ def bake_rig(
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
-def _read(shot, skeleton, head, model, cuts) -> RiggedHair:
+def _read(shot, skeleton, head, model, cuts) -> tuple[RiggedHair, np.ndarray]:
+    """The shot, and where the model's joints are in its skeleton (N,)."""
     # The model knows its joints: no guess is made about which ones are hair.
     tops = [model.chains.names[i] for i in model.chains.roots]
     try:
@@ -113,16 +113,11 @@ def _read(shot, skeleton, head, model, cuts) -> RiggedHair:
             f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
             "give a model trained for this rig (neuralocks rig train)"
         ) from None
-    _joints(model, hair)
+    character = hair.source.character
+    joints = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
     model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
-    return hair
-
-
-def _joints(model: RigModel, hair: RiggedHair) -> np.ndarray:
-    """Indices (N,) of the model's joints in the skeleton."""
-    character = hair.source.character
-    return model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
+    return hair, joints
 
 
 def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
@@ -167,21 +162,14 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
 
 
 def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
-    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes.
-
-    Raises:
-        NeuralocksError: the model's weights are beyond what can be computed with.
-    """
+    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes."""
     turns = np.empty((len(codes), len(model.chains), 4))
     for row, code in enumerate(codes):
         # One at a time: a matrix product may round otherwise for other batches.
         second = hair.border.seconds([code])
         wrapped = clip.loop and not clip.start <= second[0] <= clip.end
         shown = clip.at(second) if wrapped else hair.source.joints_at(code)[None]
-        with np.errstate(over="ignore", invalid="ignore"):
-            turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
-        if not np.isfinite(turns[row]).all():
-            raise NeuralocksError("model: its weights are too large to compute with; get an undamaged copy")
+        turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
         if progress:
             progress(row + 1, len(codes), "hair joints")
     return turns

@@ -90,8 +90,7 @@ def read_rigged_hair(
         hairy = [has_hair_joints(prim) for prim in prims]
         raise errors[hairy.index(True) if any(hairy) else 0]
     if baked_first:
-        found.sort(key=lambda hair: not is_baked(hair.source))
-        del found[1:]
+        found = [min(found, key=lambda hair: not _is_baked(hair.source))]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
@@ -99,7 +98,7 @@ def read_rigged_hair(
     return found[0]
 
 
-def is_baked(source: StageRig) -> bool:
+def _is_baked(source: StageRig) -> bool:
     """Whether the animation of a skeleton is one that `rig bake` wrote."""
     animation = source.source.animation
     return animation is not None and animation.GetName() == BAKED

@@ -30,11 +30,13 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     """What to say of strands whose last points lie on skin, and whose first ones do not."""
     if not rig.skins:
         return []
-    roots, tips = (
-        float(np.median(np.min([tree.query(transformed(ends, to_bind))[0] for tree in rig.skins], axis=0)))
-        for ends in (some_ends(prim), some_ends(prim, last=True))
-    )
-    if roots <= NEAR or tips > NEAR:
+
+    def off_skin(ends: np.ndarray) -> float:
+        far = [tree.query(transformed(ends, to_bind))[0] for tree in rig.skins]
+        return float(np.median(np.min(far, axis=0)))
+
+    roots = off_skin(some_ends(prim))
+    if roots <= NEAR or off_skin(some_ends(prim, last=True)) > NEAR:
         return []
     return [
         f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "

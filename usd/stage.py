@@ -125,8 +125,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         notes += rig.notes + partial_body(rig, every)
     for item in found:
         carrying = replace(item.attachment.rig, character=item.attachment.character)
-        for stops in without_turn(carrying):
-            raise NeuralocksError(stops)
+        if stops := without_turn(carrying):
+            raise NeuralocksError(stops[0])
         notes += rig_notes(carrying)
     first, last = frame_range(stage, used)
     return Shot(

@@ -53,6 +53,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         name = armature.name_full
         check_own(armature)
         first, last = frame_range(scene)
+        actions.check_heard(armature)  # before an earlier bake is taken off
         actions.remove(armature)
         armature.neuralocks_character.rig_live = False
         rest(armature)

@@ -31,11 +31,11 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
         the action of the hair's motion.
 
     Raises:
-        NeuralocksError: strips, or keys on some bone, would have no effect.
+        NeuralocksError: keys on some bone would have no effect.
     """
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
-    _check_heard(armature, data, bones)
+    _check_mode_left(armature, bones)
     # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
     modes = rotations.free_modes(armature, bones, rotations.KEYED)
     before = rotations.kept(armature, bones)
@@ -52,24 +52,34 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     return action
 
 
-def _check_heard(armature, data, bones) -> None:
-    name = armature.name_full
+def check_heard(armature) -> None:
+    """Refuse where baked keys would not be heard.
+
+    Raises:
+        NeuralocksError: strips are switched off, or those of another track alone play.
+    """
+    name, data = armature.name_full, armature.animation_data
+    if data is None:
+        return
     if not data.use_nla:
         raise NeuralocksError(
             f"{name}: its NLA is switched off, and with it baked keys; switch it on in the NLA editor"
         )
     for track in data.nla_tracks:
-        if track.is_solo:
+        if track.is_solo and track.name not in (TRACK, BEFORE):
             raise NeuralocksError(
                 f"{name}: NLA track '{track.name}' is solo, so that no other one plays; take its star off"
             )
-    written = animated(data)
+
+
+def _check_mode_left(armature, bones) -> None:
+    written = animated(armature.animation_data)
     for bone in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
         if all(start + rotations.CHANNELS[mode] in written for mode in rotations.KEYED):
             raise NeuralocksError(
-                f"{name}: hair bone '{bone}' has keys in every rotation mode, which play over baked ones; delete its keys of "
-                "one of them"
+                f"{armature.name_full}: hair bone '{bone}' has keys in every rotation mode, which play over baked ones; delete "
+                "its keys of one of them"
             )
 
 

@@ -16,6 +16,7 @@ IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") 
 LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axis in "xyz")
 """Settings of bones that posing does not change."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
+"""What adds to an object's own channels, PLACE."""
 NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
 """What only tells how something is shown; and, of strips, what Blender itself writes."""
 _written: dict[type, list[str]] = {}

@@ -11,8 +11,6 @@ from .lookup import find
 
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
-
-
 OTHERS = ("objects", "lights", "cameras", "armatures", "materials", "worlds", "node_groups", "curves", "scenes")
 """What else has keys, of `bpy.data`."""
 

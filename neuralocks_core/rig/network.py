@@ -24,6 +24,8 @@ DYNAMIC_BINS = (1,) * 6 + (2,) * 4 + (3,) * 4 + (4,) * 2 + (6,) * 2
 """46 steps of 1/30 s: a second and a half, finest where it is newest."""
 POSE = 15
 """Numbers of the pose and of gravity's direction; the history follows."""
+LARGEST = 1e15
+"""Numbers whose squares single precision still holds."""
 _CHUNK = 1024
 
 
@@ -68,16 +70,18 @@ class RigModel:
         size = self.inputs
         if not layers:
             raise NeuralocksError("model: it has no layers; get an undamaged copy")
-        if not isinstance(self.training, dict) or not isinstance(self.report, dict):
-            raise NeuralocksError("model: its card is damaged; get an undamaged copy")
         if self.limits.shape != (size,) or not np.isfinite(self.limits).all() or not 0 < self.max_angle < 3.1:
             raise NeuralocksError("model: its input limits do not fit its inputs; get an undamaged copy")
+        reach = self.limits.astype(float)  # the largest that each number can be
         for weight, bias in layers:
             if weight.ndim != 2 or weight.shape[1] != size or bias.shape != weight.shape[:1]:
                 raise NeuralocksError("model: its layers do not fit together; get an undamaged copy")
             if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
                 raise NeuralocksError("model: NaN or infinity in its weights; get an undamaged copy")
             size = len(weight)
+            reach = np.abs(weight.astype(float)) @ reach + np.abs(bias)
+        if reach.max() > LARGEST:
+            raise NeuralocksError("model: its weights are too large to compute with; get an undamaged copy")
         if size != 3 * len(self.chains):
             raise NeuralocksError("model: it does not give three numbers per hair joint; get an undamaged copy")
 

@@ -156,6 +156,7 @@ def rewritten(path, target, **changes):
         ({"model_json": json.dumps({"format": 1, "kind": "cloth"})}, "unknown here"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [1]}})}, "reads 305 values"),
         ({"model_json": b'{"format": 1, "kind": []}'}, "unknown here"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "training": [1]})}, "'training' is no table"),
         ({"model_json": b'{"format": ' + b"1" * 5000 + b"}"}, "damaged"),
         ({"model_json": b"\xff"}, "damaged"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": 5})}, "boundary history"),

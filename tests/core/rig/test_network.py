@@ -143,6 +143,8 @@ def test_what_no_header_computes_is_refused(tmp_path):
         export_c(replace(model, spec=replace(model.spec, linear="velocity")), tmp_path / "hair.h")
     with pytest.raises(NeuralocksError, match="has no layers"):
         replace(model, layers=())
+    with pytest.raises(NeuralocksError, match="too large to compute with"):
+        replace(model, layers=[(1e30 * weight, bias) for weight, bias in model.layers])
 
 
 @pytest.mark.skipif(not shutil.which("cc"), reason="no cc here")
