@@ -14,7 +14,8 @@ from neuralocks_core.film import Detail, Film, Scene
 from neuralocks_core.progress import Progress, silent
 
 SUFFIXES = (".png", ".mp4", ".gif")
-
+PALETTE, DITHER = 5, 6.0
+"""A .gif takes its colours from so many frames of the clip; they are dithered by so much of 255."""
 
 PICTURE = Detail(16000, 24, 2.0, 1.2, 4)
 CLIP = Detail(4000, 16, 1.5, 2.0, 0)
@@ -57,6 +58,8 @@ def render(
     else:
         clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
         frames = np.abs(scene.times[None] - clock[:, None]).argmin(axis=1)
+    if kind == ".gif":
+        frames = np.concatenate([frames[np.linspace(0, len(frames) - 1, PALETTE).astype(int)], frames])
     width, height = size or ((440, 620) if still else (480, 600))
     # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
@@ -81,11 +84,32 @@ def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: fl
 
 
 def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+    """The first PALETTE pictures give the colours that all others share: so what stands still stays still."""
     from PIL import Image
 
-    frames = (Image.fromarray(image).quantize(128, dither=Image.Dither.NONE) for image in images)
-    first = next(frames)
-    first.save(part, save_all=True, append_images=frames, duration=round(1000 / rate), loop=0, optimize=True)
+    shown = np.stack([next(images) for _ in range(PALETTE)])
+    _, height, width, _ = shown.shape
+    pixels = Image.fromarray(shown[:, ::2, ::2].reshape(1, -1, 3))
+    palette = pixels.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3)
+    # Ordered dithering keeps the backdrop smooth, and still; what is diffused would crawl.
+    pattern = np.tile(DITHER * (_bayer(8)[..., None] - 63 / 128), (height // 8 + 1, width // 8 + 1, 1))
+
+    def reduced(image: np.ndarray):
+        dithered = image + pattern[:height, :width]
+        return Image.fromarray(dithered.clip(0, 255).astype(np.uint8)).quantize(palette=palette, dither=0)
+
+    ends = np.round(np.arange(1, len(times) - PALETTE + 1) * 100 / rate)  # a file counts hundredths of a second
+    durations = (10 * np.diff(ends, prepend=0)).astype(int).tolist()
+    frames = map(reduced, images)
+    next(frames).save(part, save_all=True, append_images=frames, duration=durations, loop=0, optimize=True)
+
+
+def _bayer(size: int) -> np.ndarray:
+    """Thresholds (size, size), from 0 to less than 1, of ordered dithering (Bayer 1973); the size is a power of two."""
+    if size == 1:
+        return np.zeros((1, 1))
+    finer = _bayer(size // 2)
+    return np.block([[finer, finer + 2 / size**2], [finer + 3 / size**2, finer + 1 / size**2]])
 
 
 def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
