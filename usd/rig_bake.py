@@ -162,7 +162,7 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
 
 
 def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
-    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes."""
+    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes, those of the shot's rig."""
     turns = np.empty((len(codes), len(model.chains), 4))
     for row, code in enumerate(codes):
         # One at a time: a matrix product may round otherwise for other batches.
@@ -172,7 +172,7 @@ def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
         turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
         if progress:
             progress(row + 1, len(codes), "hair joints")
-    return turns
+    return model.chains.turns_on(hair.rig.chains, turns)
 
 
 def _name_notes(source) -> list[str]:

@@ -12,11 +12,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
-
-try:
-    import fcntl
-except ImportError:  # Windows: two bakes of one output at a time are then not told apart
-    fcntl = None
+from neuralocks_core.lock_file import locked
 
 
 class Spool:
@@ -39,18 +35,15 @@ class Spool:
         try:
             out.parent.mkdir(parents=True, exist_ok=True)
             self.folder.mkdir(exist_ok=True)
-            self._lock = open(self.folder / "lock", "a+")
-        except OSError as error:
-            raise cannot_write(out, error) from None
-        try:
-            if fcntl is not None:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._forget_others(fingerprint.encode())
+            self._lock = locked(self.folder / "lock")
         except BlockingIOError:
-            self._lock.close()
             raise NeuralocksError(
                 f"{out}: another bake is writing it; wait for that one or choose another name"
             ) from None
+        except OSError as error:
+            raise cannot_write(out, error) from None
+        try:
+            self._forget_others(fingerprint.encode())
         except OSError as error:
             self.close()
             raise cannot_write(out, error) from None
@@ -114,7 +107,7 @@ class Spool:
 
     def discard(self) -> None:
         """Remove the folder."""
-        if fcntl is None:
+        if os.name == "nt":
             self._lock.close()  # Windows removes no open file
         # Before the lock is given up: another bake that takes it would lose its own frames.
         shutil.rmtree(self.folder, ignore_errors=True)

@@ -80,7 +80,7 @@ def train(
     from neuralocks_core.training.regression import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands
-    from neuralocks_core.training.work import work_folder
+    from neuralocks_core.training.work import BEGINNING, work_folder
 
     from .training import training_scene
 
@@ -94,7 +94,9 @@ def train(
     except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     history = {"spec": paper_boundary()} if paper else {}
-    work_folder(out, resume=resume)
+    work = work_folder(out, resume=resume)
+    if begin == NOTHING and resume and (work / BEGINNING).exists():
+        raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
     begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, **history

@@ -48,6 +48,7 @@ class LiveBones:
         model: the rig model.
         bones: names of the hair bones, (N), as in Blender.
         joints: their places in the skeleton, (N,).
+        chains: this rig's, which have every joint of the model's.
         modes: by bone, the rotation mode in which it is turned.
         file: whatever tells its maker that the model file was replaced.
     """
@@ -55,6 +56,7 @@ class LiveBones:
     model: RigModel
     bones: tuple[str, ...]
     joints: np.ndarray
+    chains: HairChains
     modes: dict[str, str] = field(default_factory=dict)
     file: object = None
 
@@ -62,8 +64,9 @@ class LiveBones:
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
         joints = model.chains.match(rig.paths, character.skeleton.below(character.head))
-        model.chains.check_same(chains_of(character, patterns))
-        return cls(model, tuple(rig.bones[j] for j in joints), joints)
+        chains = chains_of(character, patterns)
+        model.chains.check_same(chains)
+        return cls(model, tuple(rig.bones[j] for j in joints), joints, chains)
 
     def follow(self, character: Character, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
@@ -74,4 +77,5 @@ class LiveBones:
         """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are
         the poses drawn.
         """
-        return self.model.evaluate(self._sampler.features(times, strength, joints))
+        turns = self.model.evaluate(self._sampler.features(times, strength, joints))
+        return self.model.chains.turns_on(self.chains, turns)

@@ -11,6 +11,9 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+SAME_AXES = 1e-5
+"""Axes that differ by less are the same: one rig read in two programs."""
+
 
 @dataclass(frozen=True)
 class HairChains:
@@ -147,6 +150,24 @@ class HairChains:
                     f"model: joint '{name}' lies {1e3 * np.linalg.norm(way - way_there):.1f} mm elsewhere than in the rig "
                     "that the model was trained for; train a model for this rig"
                 )
+
+    def turns_on(self, other: "HairChains", turns: np.ndarray) -> np.ndarray:
+        """Turns of these joints in the bind axes that they have in `other`, a rig that `check_same` let pass: the same
+        rotation in space is other numbers there once the rig went through another exporter.
+
+        Args:
+            turns: (..., N, 4) wxyz in these chains' own bind axes.
+
+        Returns:
+            (..., N, 4) wxyz, bit for bit the same where the axes are the same.
+        """
+        order = {name: index for index, name in enumerate(other.names)}
+        there = other.axes[[order[name] for name in self.names]]
+        between = np.swapaxes(there, 1, 2) @ self.axes
+        changed = np.abs(between - np.eye(3)).max(axis=(1, 2)) > SAME_AXES
+        result = np.array(turns)
+        result[..., changed, 1:] = np.einsum("nij,...nj->...ni", between[changed], result[..., changed, 1:])
+        return result
 
     def to_json(self) -> dict:
         """Plain values for the model file."""

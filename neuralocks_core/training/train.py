@@ -29,7 +29,15 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.work import CODES, beginning_of, discard, keep_beginning, work_folder
+from neuralocks_core.training.work import (
+    CODES,
+    beginning_of,
+    claimed,
+    discard,
+    keep_beginning,
+    keep_inputs,
+    work_folder,
+)
 
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
@@ -78,18 +86,33 @@ def train_strands(
     """
     options = options or RegressionOptions()
     out, work = Path(out), work_folder(out, work, resume)
-    saved = work / "checkpoint.npz"
     start = beginning_of(work, begin, resume)
     beginning = Beginning(start) if start else None
     if beginning:
         beginning.check(scene.spec, options)
     if not any(groom.valid.any() for groom in scene.grooms):
         raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
-    if not resume:
-        discard(work)
-        if start:
-            keep_beginning(start, work)
     report = _Reporter(progress)
+    with claimed(work):
+        if not resume:
+            discard(work)
+            if start:
+                keep_beginning(start, work)
+        keep_inputs(scene, work, resume)
+        description, graphs = _trained(scene, work, options, rollouts, processes, beginning, resume, report)
+        description["training"] = {"command": command, **description["training"]}
+        description["credits"] = list(dict.fromkeys([*description["credits"], *credits]))
+        path = model.write(out, description, graphs)
+        if not keep_work:
+            discard(work)
+    return path
+
+
+def _trained(
+    scene, work: Path, options, rollouts: int, processes: int, beginning: Beginning | None, resume: bool, report
+) -> tuple[dict, dict]:
+    """The trained model's description and graphs; see `train_strands`."""
+    saved = work / "checkpoint.npz"
     scene_out = replace(scene, held_out=True)
     count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
     processes = processes if count else 0
@@ -103,12 +126,7 @@ def train_strands(
         method = method_of(scene, codes, options, farm, report)
         run = _Run(scene, method, RolloutBank(scene_out, codes), saved, beginning, resume and saved.exists())
         gauge = run.train(farm, held_farm, report)
-    card = {
-        "command": command,
-        **run.card(),
-        **_inputs_of(scene, coder, beginning),
-        "options": asdict(options, dict_factory=_plain),
-    }
+    card = {**run.card(), **_inputs_of(scene, coder, beginning), "options": asdict(options, dict_factory=_plain)}
     description = {
         "kind": "strands",
         "boundary": scene.spec.to_json(),
@@ -117,12 +135,9 @@ def train_strands(
         "static": options.static,
         "training": {**card, "curve": run.meta["curve"]},
         "report": {"held out": gauge.to_json()},
-        "credits": list(dict.fromkeys([*(beginning.credits if beginning else ()), *credits])),
+        "credits": list(beginning.credits) if beginning else [],
     }
-    path = model.write(out, description, strand_graphs(coder, run.net, options.output))
-    if not keep_work:
-        discard(work)
-    return path
+    return description, strand_graphs(coder, run.net, options.output)
 
 
 class _Run:

@@ -1,17 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder beside a model in which its training keeps what it goes on from after a kill."""
 
+from __future__ import annotations
+
 import filecmp
+import hashlib
+import json
+import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import atomic_write, cannot_write
+from neuralocks_core.lock_file import locked
+from neuralocks_core.training.rollouts import TrainingScene
 
 BEGINNING = "begin.neuralocks"
 """In the work folder: the model that a training begins with."""
 CODES = "codes.npz"
 """In the work folder: the strand autoencoder, where a training makes its own."""
+INPUTS, LOCK = "inputs.json", "lock"
+"""In the work folder: what its simulations were made of, and what the process holds that trains in it."""
 
 
 def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
@@ -24,7 +37,7 @@ def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = 
     if out.suffix != ".neuralocks":
         raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
     work = Path(work) if work else out.with_name(out.name + ".training")
-    if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING)):
+    if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work
 
@@ -49,13 +62,85 @@ def keep_beginning(model_file: Path, work: Path) -> None:
         shutil.copyfile(model_file, part)
 
 
+@contextmanager
+def claimed(work: Path) -> Iterator[None]:
+    """The folder for one training: two would learn from each other's simulations.
+
+    Raises:
+        NeuralocksError: another training is at work in it, or it cannot be made.
+    """
+    try:
+        work.mkdir(parents=True, exist_ok=True)
+        lock = locked(work / LOCK)
+    except BlockingIOError:
+        raise NeuralocksError(
+            f"{work}: another training is at work there; wait for that one, or choose another name"
+        ) from None
+    except OSError as error:
+        raise cannot_write(work, error) from None
+    try:
+        yield
+    finally:
+        if os.name == "nt":
+            lock.close()  # Windows removes no open file
+        if work.is_dir() and [path.name for path in work.iterdir()] == [LOCK]:
+            shutil.rmtree(work, ignore_errors=True)
+        lock.close()
+
+
+def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
+    """Note what simulations are made of; go on with those of the same scene only, whose strands and motion they tell of.
+
+    Raises:
+        NeuralocksError: those in the folder were made of something else.
+    """
+    file, now = work / INPUTS, _inputs(scene)
+    if resume and file.exists():
+        try:
+            before = json.loads(file.read_text())
+            changed = [name for name in now if before[name] != now[name]]
+        except (OSError, ValueError, KeyError, TypeError):
+            raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
+        if "seed" in changed:
+            raise NeuralocksError(
+                f"{work}: the training there was begun with --seed {before['seed']}; resume with that"
+            )
+        if changed:
+            raise NeuralocksError(
+                f"{work}: the training there was begun with another {changed[0]}; resume with the same, or train "
+                "without --resume"
+            )
+    with atomic_write(file) as part:
+        part.write_text(json.dumps(now))
+
+
+def _inputs(scene: TrainingScene) -> dict:
+    body, clips = scene.character.body, scene.clips
+    own = [] if body is None else [body.points, body.triangles, body.joint_weights, *body.shapes.values()]
+    facts = {
+        "seed": scene.seed,
+        "character": _digest([scene.character.skeleton.bind, *own]),
+        "groom": _digest([groom.rest for groom in scene.grooms]),
+        "motion": _digest([array for clip in clips for array in (clip.times, clip.joints)]),
+        "history": scene.spec.to_json(),
+    }
+    return json.loads(json.dumps(facts))  # tuples become lists, as in the file
+
+
+def _digest(arrays: list[np.ndarray]) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(f"{array.shape} {array.dtype}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
 def discard(work: Path) -> None:
-    """Remove what trainings leave in a folder, and the folder where nothing else is in it."""
+    """Remove what trainings leave in a folder; `claimed` removes the folder where nothing else is in it."""
     for name in ("rollouts", "held_out"):
         shutil.rmtree(work / name, ignore_errors=True)
     for name in ("checkpoint", "codes"):
         for suffix in (".npz", ".tmp"):
             (work / name).with_suffix(suffix).unlink(missing_ok=True)
-    (work / BEGINNING).unlink(missing_ok=True)
-    if work.is_dir() and not any(work.iterdir()):
-        work.rmdir()
+    for name in (BEGINNING, INPUTS):
+        (work / name).unlink(missing_ok=True)

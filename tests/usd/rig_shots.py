@@ -24,8 +24,10 @@ def model_for(hair, dynamic=False) -> RigModel:
     return RigModel(hair.rig.chains, spec, tuple(layers), input_limits(spec))
 
 
-def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0) -> Path:
-    """A head with one tail of three joints and an end, nodding; in any unit and up axis."""
+def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None) -> Path:
+    """A head with one tail of three joints and an end, nodding; in any unit and up axis, with the hair's axes turned by
+    `orient` (3, 3).
+    """
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)
     UsdGeom.SetStageUpAxis(stage, "Z" if z_up else "Y")
@@ -40,6 +42,8 @@ def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True,
         places.append((0, 1.55 - 0.07 * i, -0.1 - 0.02 * i))
     turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if z_up else np.eye(3)
     world = [np.block([[turn, (scale * turn @ np.array(p))[:, None]], [np.zeros(3), 1]]) for p in places]
+    for hair in world[2:]:
+        hair[:3, :3] = hair[:3, :3] @ (np.eye(3) if orient is None else orient)
 
     def rows(matrices):
         return Vt.Matrix4dArray([Gf.Matrix4d(*np.asarray(m).T.ravel().tolist()) for m in matrices])

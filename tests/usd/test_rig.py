@@ -72,6 +72,21 @@ def test_units_axes_and_rates_cancel(tmp_path):
     assert np.abs(hair_turns(tmp_path / "out_fast.usda", [1, 13, 25, 39]) - wanted).max() < 1e-5
 
 
+def test_joint_orients_cancel(tmp_path):
+    """A rig that went through another exporter has other axes; a model of the first moves its hair the same in space."""
+    plain = small_shot(tmp_path / "plain.usda")
+    orient = from_vector(np.array([1.2, -0.4, 2.0]))
+    other = small_shot(tmp_path / "other.usda", orient=orient)
+    model = model_for(read_rigged_hair(plain))
+    since = []
+    for shot in (plain, other):
+        bake_rig(shot, tmp_path / f"out_{shot.name}", model)
+        source = read_rigged_hair(tmp_path / f"out_{shot.name}").source.source
+        posed = source.posed([1, 7, 13, 20])[:, 2:5, :3, :3]
+        since.append(posed @ np.swapaxes(source.bind[2:5, :3, :3], -1, -2))
+    assert np.abs(since[0] - since[1]).max() < 1e-5 and np.abs(since[0] - np.eye(3)).max() > 0.1
+
+
 def test_a_scale_keyed_once_is_a_scale(tmp_path):
     """An FBX armature of size 0.01 leaves Blender with one time sample of it and no default value."""
     wanted = describe_chains(read_rigged_hair(small_shot(tmp_path / "plain.usda")).rig.chains)

@@ -2,6 +2,7 @@
 """Training on rollouts: repeatable material, hair that learns to move, runs that survive a kill."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.regression import RegressionOptions
 from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
 from neuralocks_core.training.train import train_strands
+from neuralocks_core.training.work import claimed
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +119,22 @@ def test_what_cannot_be_resumed_says_why(scene, tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(NeuralocksError, match="does not fit"):
         checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
+
+
+def test_a_training_has_its_folder_and_its_scene_for_itself(scene, tmp_path):
+    """Simulations tell of the strands and the motion that they were made of; two trainings would mix theirs."""
+    out, work = tmp_path / "m.neuralocks", tmp_path / "m.neuralocks.training"
+    tiny = RegressionOptions(steps=2, clips=2, strands=2)
+    train_strands(scene, out, tiny, rollouts=4, keep_work=True)
+    with pytest.raises(NeuralocksError, match=f"begun with --seed {scene.seed}; resume with that"):
+        train_strands(replace(scene, seed=scene.seed + 1), out, tiny, rollouts=4, resume=True)
+    shorter = tuple(replace(groom, rest=0.9 * groom.rest) for groom in scene.grooms)
+    with pytest.raises(NeuralocksError, match="begun with another groom; resume with the same, or train without"):
+        train_strands(replace(scene, grooms=shorter), out, tiny, rollouts=4, resume=True)
+    with claimed(work), pytest.raises(NeuralocksError, match="another training is at work there"):
+        train_strands(scene, out, tiny, rollouts=4)
+    train_strands(scene, out, tiny, rollouts=4, resume=True)
+    assert not work.exists()
 
 
 def test_a_training_is_not_resumed_with_other_settings(scene, tmp_path):
