@@ -10,6 +10,7 @@ strands lie from the bake's. The stage must be in metres, Y up, and the groom's 
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,16 @@ class Motion:
         return places, turns.reshape(len(times), -1, 3, 3)
 
 
+def check_even(stage: Usd.Stage, prim: str) -> None:
+    """End where the groom's own vertices are not the network's, so that there is nothing to compare."""
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
+    if set(curves.GetCurveVertexCountsAttr().Get()) == {24}:
+        edges = np.linalg.norm(np.diff(np.array(curves.GetPointsAttr().Get()).reshape(-1, 24, 3), axis=1), axis=2)
+        if (np.ptp(edges, axis=1) < 1e-3 * edges.mean(axis=1)).all():
+            return
+    sys.exit(f"{prim}: its strands are not 24 vertices even in arc length; an engine draws the network's own instead")
+
+
 def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str, float]) -> float:
     """How far this runtime's strands lie from a bake's in the same material at most [m]."""
     files = json.loads((folder / "description.json").read_text())["grooms"]["files"]
@@ -139,6 +150,7 @@ def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str
         runtime, motion = Runtime(folder, name, material), Motion(stage, facts["joints"])
         boundary = runtime.model["boundary"]
         curves = UsdGeom.BasisCurves(result.GetPrimAtPath(facts["prim"]))
+        check_even(stage, facts["prim"])
         for code in curves.GetPointsAttr().GetTimeSamples():
             now = code / stage.GetTimeCodesPerSecond()
             places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
@@ -157,4 +169,6 @@ if __name__ == "__main__":
     parser.add_argument("material", nargs="*", metavar="NAME=VALUE", type=lambda word: word.split("="))
     given = parser.parse_args()
     numbers = {name: float(value) for name, value in given.material}
+    if unknown := numbers.keys() - DEFAULT:
+        parser.error(f"no such material: {', '.join(unknown)}; there are {', '.join(DEFAULT)}")
     print(f"{largest_difference(given.folder, given.shot, given.baked, numbers):.2e} m at most from the bake")

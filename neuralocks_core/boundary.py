@@ -167,8 +167,13 @@ class BoundarySampler:
             strength: motion strength; scales the history and is exact at 0 (the held pose).
             joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, where they are
                 known better than by the clip.
+
+        Raises:
+            NeuralocksError: a time is not finite.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
+        if not np.isfinite(times).all():
+            raise NeuralocksError("times: hold NaN or infinity; give seconds")
         lags = spec.dt * np.arange(spec.steps + 2)
         position, turns = self._sample(times, lags)
         now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)

@@ -10,8 +10,8 @@ import typer
 
 from neuralocks_core.errors import NeuralocksError
 
-from .command import command_of, note, print_json
-from .options import AsJson, Cuts, Head, Seed, Skeleton, cut_codes
+from .command import command_of, counted, note, print_json
+from .options import AsJson, Cuts, Head, Joints, Seed, Skeleton, cut_codes, pairs
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -39,6 +39,7 @@ def train(
     chains: Chains = None,
     head: Head = None,
     skeleton: Skeleton = None,
+    joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a tiny network for the hair joints of one rig. No data is needed."""
@@ -49,7 +50,7 @@ def train(
     from .rig_train import train_rig
 
     with progress_bar("training") as progress:
-        model, notes = train_rig(
+        model = train_rig(
             character,
             out,
             dynamic=dynamic,
@@ -62,15 +63,17 @@ def train(
             chains=chains,
             head=head,
             skeleton=skeleton,
+            joints=pairs(joint, "--joint"),
             command=shlex.join(["neuralocks", *sys.argv[1:]]),
+            tell=note,
             progress=progress,
         )
-    note(notes)
     if as_json:
         print_json({"model": str(out), "training": model.training, "report": model.report})
     else:
         typer.echo(
-            f"{out}: {len(model.chains)} hair joints in {len(model.chains.roots)} chains, {model.training['steps']} steps"
+            f"{out}: {counted(len(model.chains), 'hair joint')} in {counted(len(model.chains.roots), 'chain')}, "
+            f"{model.training['steps']} steps"
         )
         for line in report_lines(model.report):
             typer.echo(line)
@@ -109,6 +112,7 @@ def bake(
     cuts: Cuts = None,
     head: Head = None,
     skeleton: Skeleton = None,
+    joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
     """Write the hair joints' animation as an override layer of the shot."""
@@ -126,13 +130,16 @@ def bake(
             loop=loop,
             strength=strength,
             cuts=cut_codes(cuts),
+            joints=pairs(joint, "--joint"),
             progress=progress,
         )
     note(result.notes)
     if as_json:
         print_json(vars(result))
     else:
-        typer.echo(f"{result.path}: {result.joints} hair joints, {result.samples} samples, in {result.animation}")
+        typer.echo(
+            f"{result.path}: {counted(result.joints, 'hair joint')}, {counted(result.samples, 'sample')}, in {result.animation}"
+        )
 
 
 @command("export-c")
@@ -179,20 +186,22 @@ def inspect(
     chains: Chains = None,
     head: Head = None,
     skeleton: Skeleton = None,
+    joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
     """List the hair chains of a rig with their lengths and joint counts."""
-    from .rig_stage import describe_chains, read_rigged_hair, weight_notes
+    from .rig_stage import check_patterns, describe_chains, read_rigged_hair, rigged_notes
 
-    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains)
-    rows = describe_chains(hair.rig.chains)
+    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"))
+    check_patterns(hair, chains)
+    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.source)
     if as_json:
-        print_json({"skeleton": hair.source.path, "chains": rows, "notes": weight_notes(hair.source)})
+        print_json({"skeleton": hair.source.path, "chains": rows, "notes": notes})
         return
-    typer.echo(f"{hair.source.path}: {len(hair.rig.chains)} hair joints in {len(rows)} chains")
+    typer.echo(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
     for row in rows:
-        typer.echo(f"  {row['name']}: {row['joints']} joints, {100 * row['length']:.1f} cm")
-    note(weight_notes(hair.source))
+        typer.echo(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length']:.1f} cm")
+    note(notes)
 
 
 def report_lines(report: dict) -> list[str]:

@@ -93,6 +93,11 @@ def note(notes) -> None:
         one_line(f"note: {text}")
 
 
+def counted(number: int, thing: str) -> str:
+    """How many there are of a thing, in words."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def print_json(value) -> None:
     """Print a plain value for a machine to read."""
     typer.echo(json.dumps(value, indent=1, default=str))

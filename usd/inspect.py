@@ -7,6 +7,7 @@ import numpy as np
 from pxr import UsdGeom
 
 from neuralocks_core.arclength import arc_lengths, count_pointlike
+from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.finding import NoHairChains
@@ -19,6 +20,7 @@ from .damage import names_damage
 from .groom import USD
 from .hair_search import HairSearch
 from .notes import (
+    another_head,
     composition_notes,
     few,
     groom_notes,
@@ -34,6 +36,7 @@ from .notes import (
 from .placement import Placement
 from .recorded import recorded, recorded_cuts
 from .rig_source import StageRig, find_skeletons, read_each_rig
+from .rig_stage import POSE_JOINTS as RIG_JOINTS
 from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
 from .stage import frame_range
 
@@ -89,9 +92,11 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     curves = find_curves(stage)
     told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
+    read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig)
-        spoils += rig.notes + rig_notes(rig) + partial_body(rig, rigs) + ([] if told else rig.cut_notes())
+        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + partial_body(rig, rigs)
+        spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))

@@ -6,12 +6,15 @@ test holds the two together.
 """
 
 import numpy as np
-from pxr import Sdf, Usd, UsdSkel
+from pxr import Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import from_quaternion
 
 from .placement import Placement
+
+STRETCH = 0.003
+"""A quaternion's length may be off by so much before a user is told: single and half precision are nearer."""
 
 
 class JointSource:
@@ -166,13 +169,16 @@ class JointSource:
         """(joint, column of the animation) pairs; None where UsdSkel would show the rest pose instead."""
         if self._animation is None:
             return None
-        missing = [a.GetName() for a in self._channels() if not a.HasValue()]
-        if missing:
-            self.notes.append(
-                f"{self.animation.GetPath()}: no {missing[0]}, so UsdSkel ignores the animation; "
-                "author all three channels"
-            )
-            return None
+        for attribute, kind in zip(self._channels(), (Vt.Vec3fArray, Vt.QuatfArray, Vt.Vec3hArray)):
+            path, name = self.animation.GetPath(), attribute.GetName()
+            if not attribute.HasValue():
+                self.notes.append(f"{path}: no {name}, so UsdSkel ignores the animation; author all three channels")
+                return None
+            values = attribute.Get(Usd.TimeCode.EarliestTime())
+            if not isinstance(values, kind | None):
+                own, wanted = (Sdf.GetValueTypeNameForValue(each) for each in (values, kind()))
+                self.notes.append(f"{path}: its {name} are {own}, so UsdSkel ignores the animation; author {wanted}")
+                return None
         order = {str(name): i for i, name in enumerate(self._animation.GetJointsAttr().Get() or ())}
         pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
         if not pairs:
@@ -201,6 +207,7 @@ class JointSource:
                     )
                 target[row] = _wxyz(values) if quaternions else np.asarray(values, float)
         self._check(time_codes, translation, turn, scale)
+        self._note_lengths(time_codes, turn[:, columns], joints)
         result[:, joints, :3, :3] = from_quaternion(turn[:, columns]) * scale[:, columns, None, :]
         result[..., :3, 3][:, joints] = translation[:, columns]
         return result
@@ -215,6 +222,17 @@ class JointSource:
         raise NeuralocksError(
             f"{self.animation.GetPath()}: joint '{name}' holds NaN, infinity or a null rotation at time code {time_codes[row]:g}; "
             "repair the animation"
+        )
+
+    def _note_lengths(self, time_codes, turns, joints) -> None:
+        """A note on rotations that UsdSkel would stretch the character by, while they are read as plain ones here."""
+        off = np.abs(np.linalg.norm(turns, axis=-1) - 1) > STRETCH
+        if not off.any() or any("of unit length" in note for note in self.notes):
+            return
+        row, column = np.argwhere(off)[0]
+        self.notes.append(
+            f"{self.animation.GetPath()}: the rotation of joint '{self.names[joints[column]]}' at time code "
+            f"{time_codes[row]:g} is not of unit length, which UsdSkel shows as a stretch; normalise the rotations"
         )
 
 

@@ -146,23 +146,45 @@ def too_far(prim: Usd.Prim, found: Attachment) -> str:
     )
 
 
-def rig_notes(rig: StageRig) -> list[str]:
+def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     """The notes on a held pose, on joints that were not recognized by name and on a head of an unlikely size."""
-    notes = []
-    if len(rig.time_codes) == 1:
-        notes.append(f"{rig.path}: the animation has one sample, so the hair is that of a held pose")
-    missing = [name for name in POSE_JOINTS if name not in rig.character.humanoid]
-    if missing:
-        notes.append(
-            f"{rig.path}: no joint found for {', '.join(missing)}; "
-            "the next one towards the trunk serves, or name it with --joint"
-        )
+    held = len(rig.time_codes) == 1
+    notes = [f"{rig.path}: the animation has one sample, so the hair is that of a held pose"] if held else []
+    return notes + unfound(rig, joints) + unlikely_head(rig)
+
+
+def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
+    """The note on joints that a network reads and that were not recognized by name."""
+    missing = [name for name in joints if name not in rig.character.humanoid]
+    if not missing:
+        return []
+    return [
+        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint"
+    ]
+
+
+def unlikely_head(rig: StageRig) -> list[str]:
+    """The note on a head of a size that no human's has."""
     width = rig.character.head_width
-    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
-        foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"))
-        remedy = foreign or f"; check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
-        notes.append(f"{rig.path}: the head is {width:.3g} m wide{remedy}")
-    return notes
+    if width is None or HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+        return []
+    foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"))
+    remedy = foreign or f"; check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
+    return [f"{rig.path}: the head is {width:.3g} m wide{remedy}"]
+
+
+def another_head(rig: StageRig) -> list[str]:
+    """The note on hair joints of a second character in the skeleton."""
+    names, head = rig.source.names, rig.character.head
+    for joint in np.flatnonzero(~rig.character.skeleton.below(head)):
+        *above, own = names[joint].split("/")
+        heads = [name for name in above if "head" in name.lower()]
+        if heads and says_hair(own):
+            return [
+                f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{names[head].rsplit('/', 1)[-1]}', so it is not moved; "
+                f"take that head with --head {heads[-1]}"
+            ]
+    return []
 
 
 def without_turn(rig: StageRig) -> list[str]:

@@ -17,7 +17,7 @@ from neuralocks_core.rig.network import RigModel, RigSampler
 from .border import check_layer_name, check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
-from .rig_stage import RiggedHair, read_rigged_hair, weight_notes
+from .rig_stage import RiggedHair, read_rigged_hair, rigged_notes
 from .stage import check_cuts
 from .time_codes import given_cuts, time_codes
 
@@ -59,6 +59,7 @@ def bake_rig(
     loop: bool = False,
     strength: float = 1.0,
     cuts=None,
+    joints: dict[str, str] | None = None,
     progress: Progress | None = None,
 ) -> RigBakeResult:
     """Bake the hair joints of a shot.
@@ -76,6 +77,7 @@ def bake_rig(
         loop: the clip repeats, its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
         cuts: time codes from which the character is elsewhere and its hair starts anew; found by itself if None.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
         progress: called with (done, total, message).
 
     Raises:
@@ -87,37 +89,37 @@ def bake_rig(
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     cuts = given_cuts(cuts, loop)
-    hair, joints = _read(shot, skeleton, head, model, cuts)
+    hair, moved = _read(shot, skeleton, head, model, cuts, joints)
     source = hair.source.source
     check_not_input(out, hair.stage)
     codes = _codes(hair, frames, subframes)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
-    notes = [*hair.source.notes, *weight_notes(hair.source), *_name_notes(source), *_held(hair, turns)]
-    animation = write_rig_layer(hair, joints, shot, out, codes, turns)
-    notes += hair.source.loop_notes(joints) if loop else []
+    notes = [*rigged_notes(hair.source, model.spec.pose_joints), *_name_notes(source), *_held(hair, turns)]
+    animation = write_rig_layer(hair, moved, shot, out, codes, turns)
+    notes += hair.source.loop_notes(moved) if loop else []
     if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
-def _read(shot, skeleton, head, model, cuts) -> tuple[RiggedHair, np.ndarray]:
+def _read(shot, skeleton, head, model, cuts, joints) -> tuple[RiggedHair, np.ndarray]:
     """The shot, and where the model's joints are in its skeleton (N,)."""
     # The model knows its joints: no guess is made about which ones are hair.
     tops = [model.chains.names[i] for i in model.chains.roots]
     try:
-        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops, cuts=cuts)
+        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops, joints=joints, cuts=cuts)
     except NoHairChains:
         raise NeuralocksError(
             f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
             "give a model trained for this rig (neuralocks rig train)"
         ) from None
     character = hair.source.character
-    joints = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
+    moved = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
     model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
-    return hair, joints
+    return hair, moved
 
 
 def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:

@@ -2,6 +2,7 @@
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +10,20 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.network import rig_spec
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from .border import Border, open_stage
 from .damage import names_damage
-from .notes import has_hair_joints, nothing_found
+from .notes import another_head, has_hair_joints, nothing_found, unfound, unlikely_head
 from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import find_skins, rest_primvar
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
+POSE_JOINTS = rig_spec().pose_joints
+"""Semantic joints that rig models read beside the head."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ def read_rigged_hair(
     skeleton: str | None = None,
     head: str | None = None,
     chains: list[str] | None = None,
+    joints: dict[str, str] | None = None,
     all_shapes: bool = False,
     cuts: list[float] | None = None,
     baked_first: bool = False,
@@ -57,6 +62,7 @@ def read_rigged_hair(
         skeleton: path of the Skeleton prim; needed where several have hair chains.
         head: joint that carries the hair, if it is not named like a head.
         chains: name patterns of the chains' first joints, instead of finding them.
+        joints: semantic joint -> joint path or its last part, where names do not tell.
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
         baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
@@ -79,7 +85,7 @@ def read_rigged_hair(
     for prim in prims:
         try:
             _check_authored(prim)
-            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, cuts=cuts, skins=skins)
+            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, joints=joints, cuts=cuts, skins=skins)
             rig = assemble_rig(source.character, core_meshes(source), chains)
         except NeuralocksError as error:
             errors.append(type(error)(_with_path(prim, error)))
@@ -110,6 +116,31 @@ def core_meshes(source: StageRig) -> list[SkinnedMesh]:
         SkinnedMesh(str(mesh.prim.GetPath()), *mesh.in_bind(source.to_bind), mesh.indices, mesh.weights)
         for mesh in source.meshes
     ]
+
+
+def rigged_notes(source: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
+    """What a user should know about a character with hair on joints.
+
+    Args:
+        source: the character.
+        pose_joints: semantic joints that the network reads beside the head.
+    """
+    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source)]
+    return [*source.notes, *weight_notes(source), *found]
+
+
+def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
+    """Refuse a pattern of `--chains` that stands for none of the chains found.
+
+    Raises:
+        NeuralocksError: names it.
+    """
+    joints = [hair.source.source.names[j] for j in hair.rig.chains.joints]
+    for pattern in patterns or ():
+        if not any(fnmatchcase(name, pattern) or fnmatchcase(name.rsplit("/", 1)[-1], pattern) for name in joints):
+            raise NeuralocksError(
+                f"--chains {pattern}: no joint of the hair has such a name; see neuralocks inspect for their names"
+            )
 
 
 def weight_notes(source: StageRig) -> list[str]:

@@ -2,13 +2,14 @@
 """`neuralocks rig train`: from a USD rig to a model file."""
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 from neuralocks_core.progress import Progress
 
-from .rig_stage import read_rigged_hair, weight_notes
+from .rig_stage import check_patterns, read_rigged_hair, rigged_notes
 
 
 def train_rig(
@@ -25,7 +26,9 @@ def train_rig(
     chains: list[str] | None = None,
     head: str | None = None,
     skeleton: str | None = None,
+    joints: dict[str, str] | None = None,
     command: str = "",
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ):
     """Train a model for the hair joints of a rig and write it.
@@ -38,12 +41,13 @@ def train_rig(
             defaults hold for what is None.
         clips: see the latter.
         material: fields of `training.rig_energy.RigMaterial`.
-        chains, head, skeleton: see `read_rigged_hair`.
+        chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
+        tell: called with notes for the user before the training, whose minutes some of them would save.
         progress: called with (done, total, message).
 
     Returns:
-        the RigModel and notes for the user.
+        the RigModel.
 
     Raises:
         NeuralocksError: the rig cannot be used, or the extra `train` is missing.
@@ -55,10 +59,13 @@ def train_rig(
     from neuralocks_core.training.rig_energy import RigMaterial
 
     _check_writable(Path(out))
-    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, all_shapes=True)
-    notes = weight_notes(hair.source)
+    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
+    check_patterns(hair, chains)
+    notes = rigged_notes(hair.source)
     if hair.rig.character.body is None:
         notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
+    if tell:
+        tell(notes)
     values = RigMaterial(**(material or {}))
     options = {"seconds": seconds, "steps": steps, "hidden": hidden}
     if dynamic:
@@ -76,7 +83,7 @@ def train_rig(
     read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
     model.training["reads"] = {name: path.rsplit("/", 1)[-1] for name, path in read.items()}
     model.save(out)
-    return model, notes
+    return model
 
 
 def _check_writable(out: Path) -> None:

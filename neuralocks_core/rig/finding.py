@@ -46,6 +46,9 @@ def find_chains(
         remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
         elsewhere = [j for j in np.flatnonzero(~skeleton.below(head)) if says_hair(skeleton.names[j])]
         carrier = skeleton.parents[elsewhere[0]] if elsewhere else -1
+        bare = [j for j in np.flatnonzero(skeleton.below(head)) if j != head and says_hair(skeleton.names[j])]
+        if meshes and bare:
+            remedy = f"'{leaf(skeleton.names[bare[0]])}' drives no vertex of a mesh: bind the hair's mesh to it"
         if carrier >= 0:
             first, above = leaf(skeleton.names[elsewhere[0]]), leaf(skeleton.names[carrier])
             remedy = f"'{first}' hangs from '{above}': name that with --head {above}"

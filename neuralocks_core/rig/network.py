@@ -105,8 +105,10 @@ class RigModel:
             unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind
             local rotation * this.
         """
-        features = np.asarray(features, np.float32)
-        if features.shape[-1:] != (self.inputs,):
+        features = np.asarray(features)
+        if features.dtype != np.float32:  # numbers that single precision has no room for are beyond the limits anyway
+            features = np.clip(features, -LARGEST, LARGEST).astype(np.float32)
+        if features.ndim not in (1, 2) or features.shape[-1] != self.inputs:
             raise NeuralocksError(f"features: shape {features.shape}; the model reads {self.inputs} numbers per avatar")
         rows = np.atleast_2d(features)
         result = np.empty((len(rows), len(self.chains), 4), np.float32)

@@ -24,7 +24,9 @@ def model_for(hair, dynamic=False) -> RigModel:
     return RigModel(hair.rig.chains, spec, tuple(layers), input_limits(spec))
 
 
-def small_shot(path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None) -> Path:
+def small_shot(
+    path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None
+) -> Path:
     """A head with one tail of three joints and an end, nodding; in any unit and up axis, with the hair's axes turned by
     `orient` (3, 3).
     """
