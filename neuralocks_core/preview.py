@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures and clips of moving hair, on machines without a display."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import closing
@@ -67,6 +68,7 @@ def render(
     with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
         with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
             _WRITERS[kind](part, images, scene.times[frames], rate)
+            say(len(frames), len(frames), f"writing {path.name}")  # the last moment at which a caller may stop it
     return path
 
 
@@ -117,9 +119,25 @@ def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: floa
 
     # The encoder's own default takes three times the cores for the same size and look.
     fast = {"codec": "libx264", "quality": 8, "ffmpeg_params": ["-preset", "veryfast"]}
-    with imageio.get_writer(part, fps=rate, macro_block_size=2, **fast) as writer:
-        for image in images:
-            writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+    try:
+        with imageio.get_writer(part, fps=rate, macro_block_size=2, ffmpeg_log_level="quiet", **fast) as writer:
+            for image in images:
+                writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+    except OSError as error:
+        if error.errno is not None:  # else the encoder has ended, and takes no more pictures
+            raise
+    if _frames_of(part) < len(times):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _frames_of(clip: Path) -> int:
+    """Pictures that can be read back from a clip: its encoder's exit status is not told."""
+    import imageio_ffmpeg
+
+    try:
+        return imageio_ffmpeg.count_frames_and_secs(clip)[0]
+    except RuntimeError:
+        return 0
 
 
 _WRITERS = {".png": _strip, ".mp4": _mp4, ".gif": _gif}

@@ -117,6 +117,21 @@ def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
+def test_a_clip_that_the_disk_cuts_short_leaves_the_earlier_one(tmp_path, capfd):
+    pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
+    resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
+    (tmp_path / "hair.mp4").write_text("earlier")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(NeuralocksError, match="no space left"):
+            preview.render(scene(), tmp_path / "hair.mp4", size=(96, 128), detail=SMALL)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["earlier"]
+    assert capfd.readouterr().err == ""
+
+
 def test_a_canvas_that_cannot_draw_is_closed(monkeypatch):
     class Broken:
         closed = 0
