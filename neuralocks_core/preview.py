@@ -66,6 +66,7 @@ def render(
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
     say = progress or silent
     with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
+        say(0, len(frames), f"drawing {path.name}")
         with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
             _WRITERS[kind](part, images, scene.times[frames], rate)
             say(len(frames), len(frames), f"writing {path.name}")  # the last moment at which a caller may stop it

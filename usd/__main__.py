@@ -2,7 +2,8 @@
 """`neuralocks`, and `python -m usd`: the command line, which Ctrl-C ends in one word while it is still being read, too."""
 
 import os
-import sys
+
+from .stopping import stoppable
 
 
 def main() -> None:
@@ -10,12 +11,10 @@ def main() -> None:
     # Strands, frames and pictures share the cores. OpenBLAS would start threads of its own for every small product, and
     # they wait for the next one by spinning: a clip takes a third longer with them. It reads this when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    try:
+    with stoppable():
         from .cli import main as run
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        sys.exit(130)
-    run()
+
+        run()
 
 
 if __name__ == "__main__":

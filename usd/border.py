@@ -14,6 +14,8 @@ from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 
+from .stopping import check
+
 LAYERS = (".usd", ".usda", ".usdc")
 SLOWEST, FASTEST = 12.0, 600.0
 """Time codes per second between which one time code is a frame, of a slow-motion camera too; other stages count
@@ -114,6 +116,7 @@ def open_stage(path) -> Usd.Stage:
         raise NeuralocksError(f"{path}: no such file; check the path")
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    check()  # USD swallows Ctrl-C while it loads its modules
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
@@ -172,6 +175,7 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
             author(stage)
             stage.GetRootLayer().Save()
             del stage
+            check()
     except Tf.ErrorException as error:
         raise NeuralocksError(f"{path}: cannot be written ({first_line(error)}); choose another folder") from None
     return path

@@ -2,20 +2,17 @@
 """What all commands share: expected errors become one line on stderr and an exit status."""
 
 import functools
+import importlib
 import inspect
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import typer
 
 from neuralocks_core.errors import NeuralocksError
 
-from .stopping import heeded, stopped
-
-INTERRUPTED = 130
+from .stopping import deferred, stoppable
 
 
 def command_of(app: typer.Typer):
@@ -27,8 +24,9 @@ def command_of(app: typer.Typer):
             @functools.wraps(function)
             def run(*args, **kwargs):
                 try:
-                    with _stoppable():
+                    with stoppable():
                         _check_words(kwargs)
+                        _load_usd()
                         return function(*args, **kwargs)
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
@@ -49,17 +47,11 @@ def command_of(app: typer.Typer):
     return command
 
 
-@contextmanager
-def _stoppable() -> Iterator[None]:
-    """Ctrl-C in this block, and whatever error it led to, ends the command in one word."""
-    with heeded():
-        try:
-            yield
-        except BaseException as error:
-            if not (stopped() or isinstance(error, KeyboardInterrupt)):
-                raise
-            one_line("stopped")
-            raise typer.Exit(INTERRUPTED) from None
+def _load_usd() -> None:
+    """Load all of USD that anything here asks for: Ctrl-C in the middle of it would be lost, and its modules half made."""
+    with deferred():
+        for name in ("Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdSkel", "UsdUtils", "Vt"):
+            importlib.import_module(f"pxr.{name}")
 
 
 def _paragraphs(text: str) -> str:

@@ -16,6 +16,7 @@ from .recorded import record
 from .sample_layer import SampleLayer, named
 from .spool import Spool
 from .stage import Shot, StageGroom
+from .stopping import check
 
 
 class OverrideWriter:
@@ -157,6 +158,7 @@ def _same(path: str, file) -> bool:
 
 def deliver(spool: Spool) -> None:
     """Put an assembled layer under its final name, as text where that asks for it; stages that this process has open see it."""
+    check()
     if spool.out.suffix.lower() == ".usda":
         text = spool.layer_path.with_suffix(".usda")
         with named(spool.out):

@@ -13,6 +13,7 @@ from .curves import find_curves
 from .damage import names_damage
 from .rig_picture import rigged_scene
 from .rig_stage import read_rigged_hair
+from .stopping import deferred
 
 
 @names_damage
@@ -33,7 +34,8 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
         scene, border = baked.scene(), baked.shot.border
     else:
         scene, border = _scene(baked, grooms, skeleton, head)
-    return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
+    with deferred():  # what draws loads its modules at any time; the progress checks after each picture
+        return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
 
 
 def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:

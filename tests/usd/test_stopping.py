@@ -5,12 +5,17 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 import typer
 
-from usd.command import INTERRUPTED, command_of
+from usd import cli
+from usd.__main__ import main
+from usd.border import write_stage
+from usd.command import command_of
 from usd.progress import progress_bar
+from usd.stopping import INTERRUPTED, deferred, stoppable
 
 
 @pytest.fixture(autouse=True)
@@ -56,14 +61,55 @@ def test_ctrl_c_ends_a_command_whatever_it_meets(work, capsys):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_ctrl_c_while_the_command_line_is_read_is_one_word():
-    code = """import sys
-class Pressed:
+def test_ctrl_c_waits_while_modules_load(capsys):
+    """They stay half made where it breaks into their loading, and what is loaded next may crash."""
+    loaded = []
+
+    def work():
+        """As a command that draws does."""
+        with deferred():
+            _press()
+            loaded.append("whole")
+        raise AssertionError("it went on")
+
+    app = typer.Typer()
+    command_of(app)("work")(work)
+    with pytest.raises(SystemExit) as caught:
+        app([])
+    assert (caught.value.code, capsys.readouterr().err, loaded) == (INTERRUPTED, "stopped\n", ["whole"])
+
+
+def test_ctrl_c_that_was_swallowed_puts_no_file_under_its_name(tmp_path, capsys):
+    def author(stage):
+        stage.DefinePrim("/Hero")
+        with suppress(KeyboardInterrupt):
+            _press()
+
+    with pytest.raises(SystemExit), stoppable():
+        write_stage(tmp_path / "a.usda", author)
+    assert not list(tmp_path.iterdir()) and capsys.readouterr().err == "stopped\n"
+
+
+def test_ctrl_c_while_the_command_line_is_read_is_one_word(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "app", lambda words: _press())
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert (caught.value.code, capsys.readouterr().err) == (INTERRUPTED, "stopped\n")
+
+
+@pytest.mark.parametrize("module", ["usd.cli", "pxr.Gf"])
+def test_ctrl_c_is_one_word_from_the_beginning(module, tmp_path):
+    """While the command line is loaded, and while USD is."""
+    code = """import importlib.abc, os, signal, sys
+class Pressed(importlib.abc.MetaPathFinder):
     def find_spec(self, name, *_):
-        if name == "usd.cli":
-            raise KeyboardInterrupt
+        if name == sys.argv[0]:
+            os.kill(os.getpid(), signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.meta_path.insert(0, Pressed())
 from usd.__main__ import main
+sys.argv = sys.argv[1:]
 main()"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    words = [module, "inspect", str(tmp_path / "none.usda")]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")
