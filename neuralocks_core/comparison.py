@@ -11,6 +11,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress
 from neuralocks_core.resolve import Resolver
+from neuralocks_core.rotation import rotation_part
 from neuralocks_core.strands import StrandSet
 
 STEP = 1 / 30
@@ -90,7 +91,7 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
     from neuralocks_core.reference import simulate
 
     clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 1)
-    joints, shapes = clip.at(clock), clip.shape_at(clock)
+    joints, shapes = _unscaled(character, clip.at(clock)), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
@@ -113,6 +114,16 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
     part = (place - low)[:, None, None, None].astype(np.float32)
     high = np.minimum(low + 1, len(clock) - 1)
     return (1 - part) * rollout.points[low] + part * rollout.points[high] - strands.rest
+
+
+def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
+    """World joint transforms (T, J, 4, 4) as seen by a head that keeps its size: the solver, like the network, answers for
+    hair as long as at rest, whatever size the animation gives the head.
+    """
+    head = character.canonical_to_world(joints)
+    rigid = head.copy()
+    rigid[:, :3, :3] = rotation_part(head, "head")
+    return (rigid @ np.linalg.inv(head))[:, None] @ joints
 
 
 def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
