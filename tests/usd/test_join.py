@@ -134,3 +134,18 @@ def test_a_stopped_join_leaves_nothing(shot, tmp_path, model):
     with pytest.raises(KeyboardInterrupt):
         join(parts, tmp_path / "hair.usdc", progress=stop)
     assert sorted(os.listdir(tmp_path)) == sorted(part.name for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("rate", "frames", "begin", "end", "parts"),
+    [(24.0, 12, 0.3, 12.8, ("1:6", "7:12")), (1000.0, 120, 1, 120, ("1:50", "84.333333:120"))],
+)
+def test_less_than_a_frame_at_the_ends_of_a_shot_is_no_gap(tmp_path, model, rate, frames, begin, end, parts):
+    path = write_shot(tmp_path, Recipe(rate=rate, frames=frames))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(begin)
+    stage.SetEndTimeCode(end)
+    stage.Save()
+    whole = bake(path, tmp_path / "whole.usdc", model)
+    joined = join(parts_of(path, tmp_path, model, parts), tmp_path / "hair.usdc")
+    assert joined.frames == whole.frames and not joined.notes
