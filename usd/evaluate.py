@@ -29,6 +29,8 @@ STRANDS = 600
 REFERENCE_STRANDS = 200
 COLLISION_FRAMES = 32
 """Frames in which distances to the body are measured, evenly over the bake."""
+COLLISION_VERTICES = 200_000
+"""Most own vertices whose distances are measured, evenly along the strands."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
 BEFORE = 10.0
@@ -121,7 +123,7 @@ class _Subject:
         self.stretch_energy = float(np.mean(taut))
 
     def _within(self, groom) -> None:
-        """Where the chosen strands' network vertices lie between own vertices, and which own vertices can move."""
+        """Where the chosen strands' network vertices lie between own vertices, and which own vertices that can move are measured."""
         arc, length = arc_lengths(groom)
         self._low = np.zeros((len(self.chosen), K), int)
         self._part = np.zeros((len(self.chosen), K, 1))
@@ -137,7 +139,8 @@ class _Subject:
             free = mine > length[strand] * (CLAMPED - 1) / (K - 1) * 1.001
             own.append(start + np.flatnonzero(free))
             edges.append(np.arange(start, start + count - 1))
-        self._own = np.concatenate(own) if own else np.zeros(0, int)
+        movable = np.concatenate(own) if own else np.zeros(0, int)
+        self._own = movable[np.linspace(0, len(movable) - 1, min(len(movable), COLLISION_VERTICES)).round().astype(int)]
         self._edges = np.concatenate(edges) if edges else np.zeros(0, int)
 
     def _edge_lengths(self, points: np.ndarray) -> np.ndarray:

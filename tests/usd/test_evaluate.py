@@ -153,3 +153,11 @@ def test_a_model_without_a_reference_is_refused(rigid, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["evaluate", str(rigid), "--model", "strands.neuralocks"])
     assert ended.value.code == 1 and "--reference" in capsys.readouterr().err
+
+
+def test_of_very_many_vertices_distances_are_measured_of_some(tmp_path, still_model, monkeypatch):
+    baked, shares = bake(write_shot(tmp_path), tmp_path / "a.usdc", still_model, frames="1").path, []
+    for most in (100_000, 120):
+        monkeypatch.setattr("usd.evaluate.COLLISION_VERTICES", most)
+        shares.append(next(iter(evaluate(baked).grooms.values()))["inside_at_rest_percent"])
+    assert shares[0] > 5 and shares[1] == pytest.approx(shares[0], abs=4) and shares[1] != shares[0]
