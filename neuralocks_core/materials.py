@@ -45,13 +45,7 @@ class Material:
 
     def __post_init__(self):
         for name, value in asdict(self).items():
-            low, high = RANGES[name]
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise NeuralocksError(f"material {name}: {value!r} is no number; give one from {low:g} to {high:g}")
-            if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # single precision's ends
-                raise NeuralocksError(
-                    f"material {name}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"
-                )
+            _check(name, value, name)
 
     def log_ratios(self) -> np.ndarray:
         """(4,) float32: logarithms of the ratios to the default material, zero for it; what the network reads."""
@@ -85,20 +79,32 @@ class Material:
         """
         material = cls()
         for setting in settings:
-            name, _, text = setting.partition("=")
-            name = ALIASES.get(name.strip(), name.strip())
+            said, _, text = (part.strip() for part in setting.partition("="))
+            name = ALIASES.get(said, said)
             if name not in RANGES:
                 known = ", ".join([*ALIASES, *RANGES])
                 raise NeuralocksError(f"material '{setting}': unknown name; use {known} as NAME=VALUE")
             try:
-                factor = text.strip().endswith("x")
-                value = float(text.strip().removesuffix("x"))
+                factor = getattr(cls(), name) if text.endswith("x") else 1.0
+                value = float(text.removesuffix("x")) * factor
             except ValueError:
                 raise NeuralocksError(
-                    f"material '{setting}': no number after '='; write for example {name}=1.5x"
+                    f"material '{setting}': no number after '='; write for example {said}=1.5x"
                 ) from None
-            material = replace(material, **{name: value * getattr(cls(), name) if factor else value})
+            _check(name, value, said)
+            material = replace(material, **{name: value})
         return material
+
+
+def _check(name: str, value, said: str) -> None:
+    """Refuse a value that a constant cannot have, called as its user calls it."""
+    low, high = RANGES[name]
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise NeuralocksError(f"material {said}: {value!r} is no number; give one from {low:g} to {high:g}")
+    if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # single precision's ends
+        raise NeuralocksError(
+            f"material {said}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"
+        )
 
 
 def constants(log_ratios: np.ndarray) -> tuple[float, float, float, float]:

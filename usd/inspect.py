@@ -62,7 +62,8 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; name the file in it")
     if not path.is_file():
-        raise NeuralocksError(f"{path}: no such file; check the path")
+        fact = "is not a file" if path.exists() else "no such file"
+        raise NeuralocksError(f"{path}: {fact}; check the path")
     if kind == ".neuralocks":
         return {"file": str(path), "kind": "model", **_model(path)}
     if kind == ".bvh":

@@ -2,12 +2,14 @@
 """The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
 
 import os
+import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
 
 from .border import Border, transformed
@@ -135,6 +137,8 @@ def relative(file, folder: Path) -> str:
     What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
     folder's own path has a link, `..` must lead to the file both from there and from behind the link.
     """
+    if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
+        raise NeuralocksError(f"{file}: its path holds a line break or the like, and no layer can name it; rename it")
     behind = os.path.realpath(folder)
     try:
         ways = [

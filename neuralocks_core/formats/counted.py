@@ -35,6 +35,8 @@ def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroo
     if not len(words):
         raise bad_file(subject, f"has {len(content)} bytes, fewer than its number of strands", "it is truncated")
     strands = int(words[0])
+    if not 0 < strands < len(words) and _fits(words[:2].byteswap(), components, len(words)):
+        raise bad_file(subject, "is written big-endian, which the format is not", "export it little-endian")
     if strands <= 0:
         raise bad_file(subject, f"says that it holds {strands} strands", "export one with hair in it")
     if strands >= len(words):
@@ -53,6 +55,11 @@ def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroo
     left = len(content) - 4 * int(ends[-1])
     notes = [f"{subject}: {left} bytes after the last strand were not read"] if left else []
     return RawGroom(values[:, :3], counts, unit=unit, notes=notes)
+
+
+def _fits(begin: np.ndarray, components: int, words: int) -> bool:
+    """Whether a file of so many words may begin with this number of strands, and of the first one's vertices."""
+    return len(begin) == 2 and 0 < int(begin[0]) < words and 0 <= int(begin[1]) * components <= words
 
 
 def _counts(words: np.ndarray, strands: int, components: int, subject: str) -> np.ndarray:

@@ -102,7 +102,7 @@ def _reader(path: Path, content: bytes):
     suffix = path.suffix.lower()
     if content[:4] == b"HAIR":
         return cemyuksel.read
-    if content[:8].lstrip().lower().startswith(b"version"):
+    if tressfx_text.recognised(content):
         return tressfx_text.read
     if suffix == ".tfx":
         return tressfx.read

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import codecs
 import io
+import re
 from array import array
 
 import numpy as np
@@ -11,6 +13,13 @@ import numpy as np
 from neuralocks_core.formats.raw import RawGroom, bad_file
 
 _HEADER_LINES = 1000
+_BEGINNING = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|#[^\n]*\n)*version", re.IGNORECASE)
+"""A version, after a byte order mark, blank lines and comments."""
+
+
+def recognised(content: bytes) -> bool:
+    """Whether a file begins as one of this format."""
+    return _BEGINNING.match(content[: 1 << 16]) is not None
 
 
 def read(content: bytes, subject: str) -> RawGroom:
@@ -23,13 +32,13 @@ def read(content: bytes, subject: str) -> RawGroom:
         subject: what messages call it.
     """
     # Line by line into plain arrays: the numbers of a hostile file never become millions of Python objects.
-    lines = enumerate(io.BytesIO(content), start=1)
+    lines = enumerate(io.BytesIO(content.removeprefix(codecs.BOM_UTF8)), start=1)
     keys, number, line = _header(lines, subject)
     points, counts, uv = array("f"), array("i"), array("f")
     left = 0
     while line:
         words = line.split(None, 6)
-        if not words:
+        if not words or words[0].startswith(b"#"):
             pass
         elif left and len(words) == 3:
             points.extend(_numbers(words, subject, number))
@@ -77,7 +86,7 @@ def _header(lines, subject: str) -> tuple[dict[bytes, list[float]], int, bytes]:
             break
         if number > _HEADER_LINES:
             raise bad_file(subject, f"no strand begins within {_HEADER_LINES} lines", "give a TressFX file")
-        if words:
+        if words and not words[0].startswith(b"#"):
             keys[bytes(words[0][:64])] = _numbers(words[1:4], subject, number)
     else:
         return keys, 0, b""

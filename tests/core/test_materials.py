@@ -33,3 +33,10 @@ def test_ends_of_a_range_are_taken_and_what_lies_beyond_is_refused(name):
 def test_what_is_no_number_is_refused_in_words(value):
     with pytest.raises(NeuralocksError, match="material bend: .* is no number; give one from 0.0002 to 0.005"):
         Material(bend=value)
+
+
+@pytest.mark.parametrize("setting", ["stiffness=0", "stiffness = 100x", "stiffness=soft"])
+def test_words_are_told_as_they_were_said(setting):
+    with pytest.raises(NeuralocksError, match="stiffness") as caught:
+        Material.parse([setting])
+    assert "bend" not in str(caught.value)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What users get wrong gives one line that names the prim, file or argument, and leaves nothing behind."""
 
+import os
+
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
@@ -302,3 +304,18 @@ def test_a_name_too_long_for_a_file_is_told(tmp_path):
     with pytest.raises(NeuralocksError, match="File name too long"):
         bake(shot, tmp_path / f"{'a' * 300}.usdc", frames="1:2")
     assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
+    shot = write_shot(tmp_path, name="line\nbreak")
+    with pytest.raises(NeuralocksError, match="line break or the like.*rename it"):
+        bake(shot, tmp_path / "a.usdc", model, frames="1")
+    with pytest.raises(NeuralocksError, match="SDF_FORMAT_ARGS: for arguments; choose another name"):
+        bake(shot, tmp_path / "a:SDF_FORMAT_ARGS:b=c.usdc", model, frames="1")
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/null"), reason="Windows has none")
+def test_what_is_no_file_is_not_called_missing():
+    with pytest.raises(NeuralocksError, match="/dev/null: is not a file"):
+        inspect("/dev/null")

@@ -59,6 +59,17 @@ def test_units_of_the_formats(folder):
         assert "does not state its unit" in notes[0]
 
 
+def test_the_text_format_may_begin_with_a_mark_and_hold_comments(folder):
+    lines = (
+        FILES["text.tfx"]
+        .replace(b"numStrands", b"# strands follow\nnumStrands")
+        .replace(b"sorted 1\n", b"sorted 1\n# here\n")
+    )
+    for beginning in (b"\xef\xbb\xbf", b"# made by hand\n\n", b"\xef\xbb\xbf# both\r\n"):
+        groom = formats.read(put(folder, "text.tfx", beginning + lines), unit="m")
+        np.testing.assert_allclose(groom.points, POINTS, atol=1e-6)
+
+
 def test_transform_of_the_text_format(folder):
     content = FILES["text.tfx"].replace(
         b"scale 1.0\nrotation 0 0 0\ntranslation 0 0 0", b"scale 2.0\nrotation 0 0 90\ntranslation 1 0 0"

@@ -63,6 +63,13 @@ def test_hostile_files_get_one_line(folder, name):
     assert "\n" not in message
 
 
+@pytest.mark.parametrize("name", ["a.data", "a.bin"])
+def test_big_endian_files_are_called_so(folder, name):
+    content = np.frombuffer(FILES[name], "<i4").byteswap().tobytes()
+    with pytest.raises(NeuralocksError, match="big-endian"):
+        formats.read(put(folder, name, content))
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_every_truncation_is_noticed(folder, name):
     content = FILES[name]
