@@ -32,6 +32,18 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         raise cannot_write(path, error) from None
 
 
+def as_path(given, name: str) -> Path:
+    """The path that a caller gives for the argument `name`.
+
+    Raises:
+        NeuralocksError: it is none.
+    """
+    try:
+        return Path(given)
+    except TypeError:
+        raise NeuralocksError(f"{name}: {given!r} is no path; give text or a pathlib.Path") from None
+
+
 def cannot_write(path: str | os.PathLike, error: OSError) -> NeuralocksError:
     """The one line for a file system that refuses."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):

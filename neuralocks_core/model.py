@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import as_path, atomic_write
 
 FORMAT = 1
 KINDS = {
@@ -78,7 +78,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
     Raises:
         NeuralocksError: it is missing, damaged, of a later format or of another kind.
     """
-    path = Path(path)
+    path = as_path(path, "model")
     try:
         with zipfile.ZipFile(path) as archive:
             entries = {info.filename: info for info in archive.infolist()}

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.film import Detail, Film, Scene
 from neuralocks_core.progress import Progress, silent
 
@@ -47,7 +47,7 @@ def render(
     Raises:
         NeuralocksError: the ending is unknown, a library is missing, or the file cannot be written.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     if path.suffix.lower() not in SUFFIXES:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(SUFFIXES)}")
     kind = path.suffix.lower()

@@ -4,10 +4,12 @@
 import hashlib
 import time
 from dataclasses import asdict, dataclass
+from numbers import Real
 from pathlib import Path
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
@@ -15,6 +17,7 @@ from neuralocks_core.runtime import StrandModel, cores
 from .border import check_layer_name
 from .notes import out_of_place, out_of_range
 from .posing import GroomPoser
+from .prim_paths import prim_path
 from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
@@ -87,11 +90,13 @@ def bake(
         NeuralocksError: what cannot be baked, in one line. Nothing is left under the output's name.
     """
     began = time.monotonic()
-    out = Path(out)
+    out, skeleton = as_path(out, "out"), prim_path(skeleton, "skeleton")
     check_layer_name(out)
     jobs = _jobs(jobs)
     strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
     look = as_material(material)
+    if isinstance(strength, bool) or not isinstance(strength, Real):
+        raise NeuralocksError(f"strength: {strength!r} is no number; 1 is what the model was trained for")
     if not 0 <= strength <= 4:
         raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
     cuts = given_cuts(cuts, loop)

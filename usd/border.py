@@ -12,7 +12,7 @@ import numpy as np
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import as_path, atomic_write
 
 from .stopping import check
 
@@ -111,7 +111,7 @@ def open_stage(path) -> Usd.Stage:
     Raises:
         NeuralocksError: it is missing, or no readable USD file.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     if not path.exists():
         raise NeuralocksError(f"{path}: no such file; check the path")
     if path.is_dir():

@@ -8,6 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 
 from .border import transformed
+from .prim_paths import prim_paths
 from .surface import rest_primvar, rest_value
 
 
@@ -23,8 +24,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     if not wanted:
         return every
     chosen = set()
-    for path in wanted:
-        text = str(path)
+    for text in prim_paths(wanted, "grooms"):
         if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
             raise NeuralocksError(f"{text}: no prim path; give an absolute one such as {_examples(every)}")
         below = [p for p in every if p.GetPath().HasPrefix(text)]

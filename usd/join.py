@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 
 from .border import Border, check_layer_name, check_not_input, first_line, one_file, open_stage
@@ -51,9 +52,9 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         NeuralocksError: a part is no bake, or of another shot or with other options than the first. Nothing is left
             under the output's name.
     """
-    out = Path(out)
+    out = as_path(out, "out")
     check_layer_name(out)
-    every = [_Part(Path(part)) for part in parts]
+    every = [_Part(as_path(part, "parts")) for part in parts]
     if not every:
         raise NeuralocksError("no parts: name the files that neuralocks bake wrote")
     first, say = every[0], progress or silent

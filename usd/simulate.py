@@ -3,13 +3,13 @@
 
 import time
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.comparison import simulated, whole_locks
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 
 from .bake import BakeResult, as_material, described
@@ -53,7 +53,7 @@ def simulate(
         NeuralocksError: as `bake`, or the solver is not installed.
     """
     began = time.monotonic()
-    out = Path(out)
+    out = as_path(out, "out")
     check_layer_name(out)
     look = as_material(material)
     count = STRANDS if strands is None else strands

@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Usd
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 
 from .attach import Attachment, rig_joint
@@ -30,6 +31,7 @@ from .notes import (
     without_turn,
 )
 from .placement import Placement
+from .prim_paths import prim_path
 from .rig_source import StageRig, find_skeletons, read_each_rig
 
 
@@ -97,7 +99,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
     """
-    path = Path(path)
+    path, skeleton = as_path(path, "shot"), prim_path(skeleton, "skeleton")
     stage = open_stage(path)
     border = Border.of(stage)
     notes = composition_notes(stage, path) + layer_notes(stage, path)
@@ -153,7 +155,7 @@ def read_rigs(
         head: joint that is the head, where its name does not tell.
         joints: semantic joint -> joint, where names do not tell.
     """
-    stage = open_stage(path)
+    stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
     return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints))
 
 
@@ -200,7 +202,9 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     return moving
 
 
-def _rigs(stage, border, skeleton, head, path, **options) -> list[StageRig]:
+def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> list[StageRig]:
+    if not isinstance(joints, dict | None):
+        raise NeuralocksError(f"joints: {joints!r} is no dict; give one such as {{'left_upper_arm': 'arm_L'}}")
     prims = find_skeletons(stage)
     names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
     if skeleton is not None:
@@ -209,7 +213,7 @@ def _rigs(stage, border, skeleton, head, path, **options) -> list[StageRig]:
             raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
     if not prims:
         raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
-    rigs, errors = read_each_rig(stage, prims, border, head, **options)
+    rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)
     if errors and (not rigs or skeleton):
         raise errors[0]
     for error in errors:

@@ -47,7 +47,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     if isinstance(frames, str):
         frames = parse_frames(frames, frame)
     if isinstance(frames, tuple) and len(frames) == 3:
-        begin, end, step = frames
+        begin, end, step = _numbers(frames, "frames")
         count = (end - begin) / step + 1e-9  # may overflow to infinity
         if not count * subframes < MOST:
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
@@ -55,7 +55,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         # The same time is the same number in every part of a range that is baked in parts.
         whole = [round(_on_frame(begin + i * step, first, frame), 9) for i in range(count)]
     else:
-        whole = [float(code) for code in frames]
+        whole = _numbers(frames, "frames")
     if not whole or not all(math.isfinite(code) for code in whole):
         raise NeuralocksError("frames: none given, or not finite; give at least one time code")
     return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})
@@ -68,10 +68,18 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
     Raises:
         NeuralocksError: some are given for a loop.
     """
-    given = None if cuts is None else sorted({float(cut) for cut in cuts})
+    given = None if cuts is None else sorted(set(_numbers(cuts, "cuts")))
     if loop and given:
         raise NeuralocksError("--cuts: a loop has none; leave out --loop")
     return [] if loop else given
+
+
+def _numbers(codes, name: str) -> list[float]:
+    """Time codes that a caller gives for the argument `name`."""
+    try:
+        return [float(code) for code in (None if isinstance(codes, str) else codes)]
+    except (TypeError, ValueError):
+        raise NeuralocksError(f"{name}: {codes!r} holds no time codes; give a list such as [25, 49]") from None
 
 
 def _on_frame(code: float, first: float, frame: float) -> float:

@@ -163,6 +163,13 @@ WRONG = {
     "material range": ({"material": ["bend=1e9"]}, "bend"),
     "model": ({"model": "nope.neuralocks"}, "nope.neuralocks"),
     "folder as model": ({"model": "."}, "is a folder"),
+    "number as model": ({"model": 5}, "model: 5 is no path"),
+    "number as groom": ({"grooms": 5}, "grooms: 5 is no prim path"),
+    "number as skeleton": ({"skeleton": 5}, "skeleton: 5 is no prim path"),
+    "number as frames": ({"frames": 5}, "frames: 5 holds no time codes"),
+    "word as cuts": ({"cuts": "25"}, "cuts: '25' holds no time codes"),
+    "word as strength": ({"strength": "1"}, "strength: '1' is no number"),
+    "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is no dict"),
 }
 
 
@@ -304,6 +311,19 @@ def test_a_name_too_long_for_a_file_is_told(tmp_path):
     with pytest.raises(NeuralocksError, match="File name too long"):
         bake(shot, tmp_path / f"{'a' * 300}.usdc", frames="1:2")
     assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+def test_nothing_is_no_path(model):
+    with pytest.raises(NeuralocksError, match="out: None is no path"):
+        bake("shot.usda", None, model)
+    with pytest.raises(NeuralocksError, match="shot: None is no path"):
+        bake(None, "a.usdc", model)
+
+
+@pytest.mark.parametrize("kind", [str, Sdf.Path, lambda path: f"{path}/"])
+def test_a_lone_prim_path_of_any_kind_is_taken(tmp_path, kind):
+    shot = read_shot(write_shot(tmp_path), kind(HAIR), kind(RIG))
+    assert ([item.path for item in shot.grooms], [rig.path for rig in shot.rigs]) == ([HAIR], [RIG])
 
 
 def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
