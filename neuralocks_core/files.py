@@ -5,7 +5,7 @@ import errno
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -23,13 +23,31 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     """
     path = Path(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-", ignore_cleanup_errors=True) as folder:
-            part = Path(folder) / path.name
-            yield part
-            os.replace(part, path)
+        made = make_way(path)
+        try:
+            with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-", ignore_cleanup_errors=True) as folder:
+                part = Path(folder) / path.name
+                yield part
+                os.replace(part, path)
+        except BaseException:
+            remove_empty(made)
+            raise
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+def make_way(path: Path) -> list[Path]:
+    """Make what is missing of the way to a file; the folders made, the innermost first."""
+    missing = [folder for folder in path.parents if not os.path.exists(folder)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def remove_empty(folders: list[Path]) -> None:
+    """Remove those folders that nothing was put into."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def as_path(given, name: str) -> Path:

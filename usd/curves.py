@@ -130,10 +130,26 @@ def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:
     return counts
 
 
+def widest_sample(prim: Usd.Prim) -> float:
+    """The largest of a groom's widths that change over time, in the prim's own units; 0 where none do."""
+    attribute, widest = _widths_attribute(UsdGeom.BasisCurves(prim)), 0.0
+    for time in attribute.GetTimeSamples():
+        values = np.asarray(attribute.Get(time) or [], np.float32)
+        widest = max(widest, float(values[np.isfinite(values)].max(initial=0)))
+    return widest
+
+
+def _widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
+    """The widths that count: a primvar of that name hides the curves' own."""
+    primvar = UsdGeom.PrimvarsAPI(curves).GetPrimvar("widths")
+    return primvar.GetAttr() if primvar and primvar.HasValue() else curves.GetWidthsAttr()
+
+
 def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes: list[str]) -> np.ndarray | None:
     """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that can be meant."""
-    primvar = UsdGeom.PrimvarsAPI(curves).GetPrimvar("widths")
-    values = rest_primvar(primvar) if primvar and primvar.HasValue() else rest_value(curves.GetWidthsAttr())
+    attribute = _widths_attribute(curves)
+    primvar = UsdGeom.Primvar(attribute)
+    values = rest_primvar(primvar) if primvar else rest_value(attribute)
     if values is None or not len(values):
         return None
     values = np.asarray(values, np.float32) * np.float32(scale)

@@ -11,6 +11,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.measures import MEASURES
 
+from .stopping import check
+
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
 GRAPHS = {
@@ -97,15 +99,20 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         description["sliders"] = SLIDERS
     description["model"] = file.meta | {"training": training}
     tables = {}
-    if shot is not None:
-        from .groom_tables import ARRAYS, export_grooms
-
-        tables = export_grooms(shot, model, folder, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
-        description["grooms"] = {"arrays": ARRAYS, "files": tables}
-    files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
     with ExitStack() as all_or_none:
+
+        def put(name: str) -> Path:
+            return all_or_none.enter_context(atomic_write(folder / name))
+
+        if shot is not None:
+            from .groom_tables import ARRAYS, export_grooms
+
+            tables = export_grooms(shot, model, put, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
+            description["grooms"] = {"arrays": ARRAYS, "files": tables}
+        files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
         for name, data in files.items():
-            all_or_none.enter_context(atomic_write(folder / name)).write_bytes(data)
+            put(name).write_bytes(data)
+        check()
     return [folder / name for name in (*files, *tables)]
 
 

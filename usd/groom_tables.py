@@ -6,13 +6,11 @@ vector, runs two graphs a frame, and gets the very hair that a bake has.
 """
 
 import re
-from pathlib import Path
 
 import numpy as np
 
 from neuralocks_core import model as model_file
 from neuralocks_core.clumping import Locks
-from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strand_session import StrandSession, rest_edges
@@ -44,20 +42,20 @@ ARRAYS = {
 """Arrays of a groom's file -> what they are."""
 
 
-def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None, joints=None) -> dict[str, dict]:
+def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, joints=None) -> dict[str, dict]:
     """Write `NAME.npz` with ARRAYS of each groom of a shot.
 
     Args:
         shot: the USD file.
         model: path of the strand model.
-        folder: made if it does not exist.
+        put: file name -> path to write it to.
         grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
         File name -> {"prim", "strands", "joints": joint paths of head, upper chest and the pose joints}.
 
     Raises:
-        NeuralocksError: what stops a bake of the shot, or the folder cannot be written.
+        NeuralocksError: what stops a bake of the shot.
     """
     runner = StrandModel(model_file.read(model, "strands"))
     read, written = read_shot(shot, grooms, skeleton, head, joints), {}
@@ -65,8 +63,7 @@ def export_grooms(shot, model, folder, *, grooms=None, skeleton=None, head=None,
         stem = re.sub(r"\W+", "_", item.path.strip("/"))
         name = f"{stem}.npz" if f"{stem}.npz" not in written else f"{stem}_{len(written)}.npz"
         arrays, joints = tables(item, runner)
-        with atomic_write(Path(folder) / name) as part:
-            np.savez(part, **arrays)
+        np.savez(put(name), **arrays)
         written[name] = {"prim": item.path, "strands": len(arrays["rest"]), "joints": joints}
     return written
 

@@ -13,7 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes
 
 from .border import Border, transformed
-from .curves import rest_points
+from .curves import rest_points, widest_sample
 from .recorded import record
 from .sample_layer import SampleLayer, named
 from .spool import Spool
@@ -35,12 +35,16 @@ class OverrideWriter:
 
     def __init__(self, part: Path, out: Path, shot: Shot, codes: list[float]):
         self._file = SampleLayer(part, out)
+        self._reach: dict[Sdf.Path, np.float32] = {}  # how far hair reaches beyond its points, in the prim's own units
         with named(out):
             write_header(self._file.layer, shot.stage, shot.border, shot.path, out, codes)
 
     def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
         """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
         layer, path = self._file.layer, item.prim.GetPath()
+        self._reach[path] = max(
+            np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
+        )
         for above in path.GetPrefixes():
             if item.prim.GetStage().GetPrimAtPath(above).IsInstance():
                 # What lies inside an instance cannot be overridden.
@@ -85,7 +89,7 @@ class OverrideWriter:
                 corners += _corners(block)
         values = {name: array}
         if name == "points":
-            pad = np.float32(item.groom.widths.max() / 2 / _unit(item))
+            pad = self._reach[item.prim.GetPath()]
             low, high = _corners(np.array(corners))
             values = {"extent": Vt.Vec3fArray.FromNumpy(np.stack([low - pad, high + pad])), **values}
         self._file.put(item.prim.GetPath(), time_code, values)

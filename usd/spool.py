@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import cannot_write
+from neuralocks_core.files import cannot_write, make_way, remove_empty
 from neuralocks_core.lock_file import locked
 
 
@@ -33,7 +33,7 @@ class Spool:
         self.out = out
         self.folder = out.parent / f".{out.name}.baking"
         try:
-            out.parent.mkdir(parents=True, exist_ok=True)
+            self._made = make_way(out)
             self.folder.mkdir(exist_ok=True)
             self._lock = locked(self.folder / "lock")
         except BlockingIOError:
@@ -106,12 +106,13 @@ class Spool:
             self.discard()
 
     def discard(self) -> None:
-        """Remove the folder."""
+        """Remove the folder, and what was made on the way to an output that did not come."""
         if os.name == "nt":
             self._lock.close()  # Windows removes no open file
         # Before the lock is given up: another bake that takes it would lose its own frames.
         shutil.rmtree(self.folder, ignore_errors=True)
         self._lock.close()
+        remove_empty(self._made)
 
     def _path(self, groom: int, time_code: float) -> Path:
         return self.folder / f"{groom}_{float(time_code).hex()}.frame"

@@ -33,6 +33,12 @@ def test_a_failure_leaves_what_was_there_and_nothing_beside_it(tmp_path, error, 
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
+def test_folders_made_for_what_did_not_come_are_gone(tmp_path):
+    with pytest.raises(KeyboardInterrupt), atomic_write(tmp_path / "one" / "two" / "a.txt"):
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_folder_that_cannot_be_is_known_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(NeuralocksError, match="a file, not a folder"), atomic_write(tmp_path / "file" / "a.txt"):

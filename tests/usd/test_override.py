@@ -6,11 +6,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom
 
+from usd.bake import bake
 from usd.border import Border, used_files
 from usd.override import write_header
+
+from .shots import samples, write_shot
 
 SHOT = """#usda 1.0
 (
@@ -99,3 +103,16 @@ def test_a_layer_inside_a_package_is_of_the_packages_file(shot, tmp_path):
     stage = Usd.Stage.CreateInMemory()
     stage.DefinePrim("/Hero").GetReferences().AddReference(f"{package}[hero.usda]")
     assert stage.GetPrimAtPath("/Hero/Hair") and used_files(stage) == [str(package)]
+
+
+def test_the_extent_holds_hair_that_grows_wider_over_the_shot(tmp_path, still_model):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    widths = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetWidthsAttr()
+    widths.Clear()
+    widths.Set([0.001], 1)
+    widths.Set([0.5], 9)
+    stage.Save()
+    baked = bake(path, tmp_path / "a.usdc", still_model, frames="1").path
+    points, extent = samples(baked, "points", "extent", at=1)
+    np.testing.assert_allclose(extent, [points.min(axis=0) - 0.25, points.max(axis=0) + 0.25], atol=1e-5)

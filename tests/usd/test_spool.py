@@ -62,3 +62,8 @@ def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
     again = Spool(tmp_path / "bake.usdc", "a")
     assert again.holds(0, 1.0, 2)
     again.discard()
+
+
+def test_a_folder_made_for_an_output_that_did_not_come_is_gone(tmp_path):
+    Spool(tmp_path / "new" / "bake.usdc", "a").close()
+    assert not list(tmp_path.iterdir())
