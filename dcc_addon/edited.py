@@ -12,6 +12,7 @@ from neuralocks_core.rotation import inverse
 
 from .scene import curves
 from .scene.armature import matrix
+from .scene.lookup import identity
 from .session import session
 
 ROUNDING = 1e-5
@@ -22,11 +23,13 @@ class Written(NamedTuple):
     """What the live view wrote last.
 
     Attributes:
+        of: the curves that it was written to.
         points: (P, 3) float32 in the object's space.
         places: the object's transforms (4, 4) then, its own and in the world.
         modifiers: names of its modifiers.
     """
 
+    of: object
     points: np.ndarray
     places: tuple[np.ndarray, np.ndarray]
     modifiers: tuple[str, ...]
@@ -36,7 +39,9 @@ def write(hair, points: np.ndarray, world: np.ndarray) -> None:
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them."""
     curves.write(hair.data, points)
     places = matrix(hair.matrix_basis), world
-    session.written[hair.name_full] = Written(points.copy(), places, tuple(hair.modifiers.keys()))
+    session.written[hair.name_full] = Written(
+        identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys())
+    )
 
 
 def follow(hair, sampled, world: np.ndarray) -> None:
@@ -52,7 +57,9 @@ def follow(hair, sampled, world: np.ndarray) -> None:
     """
     name, data = hair.name_full, hair.data
     before = session.written.get(name)
-    if before is None or not curves.has_rest(data) or len(before.points) != len(data.points):
+    if before is None or before.of != identity(data):
+        return
+    if not curves.has_rest(data) or len(before.points) != len(data.points):
         return
     now = curves.shown(data)
     if np.array_equal(now, before.points):

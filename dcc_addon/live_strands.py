@@ -14,7 +14,7 @@ from . import edited, preparing
 from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
-from .scene.lookup import find
+from .scene.lookup import find, identity
 from .scene.placing import mute_deformers, unmute_deformers, world
 from .scene.sampling import shown_frame
 from .services import rig as rig_service
@@ -127,7 +127,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
                 preparing.start(name, make, _arrived)
                 return None
             prepared = session.hairs[name] = make(lambda done, total: None)
-        prepared.of = _which(hair.data)
+        prepared.of = _which(hair)
         session.doubtful.discard(name)
     prepared.follow(sampled.clip)
     return prepared
@@ -136,19 +136,25 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
 def known(hair) -> bool:
     """Whether what was prepared, or is being prepared, is of the curves that this hair object has now."""
     prepared = session.hairs.get(hair.name_full)
-    return hair.name_full in session.preparing if prepared is None else prepared.of == _which(hair.data)
+    return hair.name_full in session.preparing if prepared is None else prepared.of == _which(hair)
 
 
-def _which(data) -> tuple:
-    """Curves, and what tells at once that they are others: strands may be added or taken away outside of the modes."""
-    return data.name_full, len(data.points), len(data.curves)
+def _which(hair) -> tuple:
+    """Curves, their object, and what tells at once that they are others: a later groom may come under the name of one
+    that was deleted, and strands may be added or taken away outside of the modes.
+    """
+    data = hair.data
+    return identity(data), identity(hair), len(data.points), len(data.curves)
 
 
 def _let_go(of: tuple, hair) -> None:
-    """Give curves their rest shape back that a live hair object had before it was given others."""
-    left = bpy.data.hair_curves.get(of[0])
-    if left is not None and left != hair.data:
-        curves.restore_rest(left)
+    """Give curves their rest shape back that a live hair object had before it was given others, unless they are moved
+    by another one now.
+    """
+    moved = {thing.data for thing in bpy.data.objects if thing.type == "CURVES" and thing.neuralocks_hair.live}
+    for left in bpy.data.hair_curves:
+        if identity(left) == of[0] and left not in moved:
+            curves.restore_rest(left)
 
 
 def _recipe(hair, sampled, wanted: tuple):
@@ -157,7 +163,7 @@ def _recipe(hair, sampled, wanted: tuple):
     """
     name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
-    radius, of = curves.radius(data), _which(data)
+    radius, of = curves.radius(data), _which(hair)
     # The hair keeps its character, so no other one gets its id.
     file = path, stamp(path)
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(sampled.character)

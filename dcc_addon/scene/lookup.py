@@ -14,6 +14,14 @@ def find(name_full: str):
     return next((o for o in bpy.data.objects if o.name_full == name_full), None)
 
 
+def identity(thing):
+    """What tells a data block from all others that this Blender has had, also from a later one of its name; oldest
+    Blenders number none, and there an undo may change it.
+    """
+    number = getattr(thing, "session_uid", None)
+    return (bpy.data.filepath, thing.as_pointer()) if number is None else number
+
+
 def named(name_full: str):
     """The object of this full name, which longer work began with.
 

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that takes the place of other hair, by its name or by its curves."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from dcc_addon.scene import curves
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at
+
+
+def later_groom(folder: Path) -> None:
+    """A groom that is appended under the name of one that was deleted, with as many strands, is what is shown from then
+    on.
+    """
+    expected, file = [], str(folder / "groom.blend")
+    for length in (0.4, 0.2):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        strands = scenes.hair(rig, 20, length=length)
+        make_live(rig, strands)
+        expected.append(points_at(strands, 9))
+        if length == 0.4:
+            strands.parent, strands.neuralocks_hair.armature = None, None
+            bpy.ops.wm.save_as_mainfile(filepath=file)
+    data = strands.data
+    bpy.data.objects.remove(strands)
+    bpy.data.hair_curves.remove(data)
+    with bpy.data.libraries.load(file) as (_, wanted):
+        wanted.objects = ["Hair"]
+    strands = wanted.objects[0]
+    bpy.context.scene.collection.objects.link(strands)
+    strands.parent = rig
+    bpy.context.scene.neuralocks.hair = strands
+    assert strands.name == "Hair" and bpy.ops.neuralocks.assign() == {"FINISHED"}
+    shown = points_at(strands, 9)
+    assert not messages(), messages()
+    assert apart(shown, expected[0]) < SAME < apart(*expected)
+
+
+def exchanged(_folder: Path) -> None:
+    """Two live hairs exchange their names, and their curves: each goes on moving, at once, and both come to rest."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    first, second = scenes.hair(rig, 20), scenes.hair(rig, 20, length=0.4, name="Other")
+    second.neuralocks_hair.model = MODEL
+    make_live(rig, first)
+    second.neuralocks_hair.live = True
+    rest = [curves.points(hair.data) for hair in (first, second)]
+    shown = [points_at(hair, 9) for hair in (first, second)]
+
+    for things in ((first, second), (first.data, second.data)):
+        names = [thing.name for thing in things]
+        things[0].name = "Meanwhile"
+        things[1].name, things[0].name = names
+        for hair, points in zip((first, second), shown, strict=True):
+            assert apart(points_at(hair, 9), points) < SAME and not messages(), messages()
+    first.data, second.data = second.data, first.data
+    bpy.context.view_layer.update()
+    assert apart(scenes.points(first), shown[1]) < SAME and apart(scenes.points(second), shown[0]) < SAME
+    assert not messages(), messages()
+    first.neuralocks_hair.live = second.neuralocks_hair.live = False
+    assert np.array_equal(curves.shown(first.data), rest[1]) and np.array_equal(curves.shown(second.data), rest[0])
