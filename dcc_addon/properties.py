@@ -44,6 +44,11 @@ def _live_changed(hair_settings, context) -> None:
     background.request()
 
 
+def _carrier_changed(hair_settings, context) -> None:
+    _look_changed(hair_settings, context)
+    background.request()
+
+
 def _look_changed(hair_settings, context) -> None:
     live.refresh(context.scene, wait=by_script(context))
 
@@ -88,6 +93,7 @@ class HairSettings(bpy.types.PropertyGroup):
         description="The rig whose head carries this hair",
         type=bpy.types.Object,
         poll=_is_armature,
+        update=_carrier_changed,
         **SETTING,
     )
     model: StringProperty(
