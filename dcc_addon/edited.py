@@ -39,9 +39,7 @@ def write(hair, points: np.ndarray, world: np.ndarray) -> None:
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them."""
     curves.write(hair.data, points)
     places = matrix(hair.matrix_basis), world
-    session.written[hair.name_full] = Written(
-        identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys())
-    )
+    session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys()))
 
 
 def follow(hair, sampled, world: np.ndarray) -> None:

@@ -4,6 +4,7 @@
 import tempfile
 import threading
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 from bpy.props import EnumProperty
@@ -11,12 +12,15 @@ from bpy.props import EnumProperty
 from neuralocks_core.errors import NeuralocksError
 
 from ..scene.export import write_shot
-from ..scene.lookup import find
+from ..scene.lookup import find, identified, identity, named
 from ..scene.redraw import redraw
 from ..services.threaded import Threaded
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
 from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
+
+LONGEST = 100
+"""Bytes of an object's name that a file is named with; names may be as long as no file system takes them."""
 
 _jobs: list = []
 _checked: dict[str, str] = {}
@@ -80,7 +84,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         if _checked[python]:
             raise NeuralocksError(_checked[python])
         sampled = yield from sampling(context, armature)
-        armature, target = find(name), find(wanted)
+        armature, target = named(name), named(wanted)
         stop()
         folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
         character = Path(folder.name) / "character.usdc"
@@ -94,8 +98,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
         _jobs.append(TrainingJob(python, settings))
-        _jobs[0].target, _jobs[0].folder = (target.name_full, self.kind), folder
-        bpy.app.timers.register(_watch, first_interval=0.5)
+        _jobs[0].target, _jobs[0].folder = _Target.of(target, self.kind), folder
+        bpy.app.timers.register(_watch, first_interval=0.5, persistent=True)  # it goes on while other files are opened
         return f"Training a model for {target.name_full} in the background"
 
 
@@ -111,6 +115,26 @@ class NEURALOCKS_OT_cancel_training(Hardened, bpy.types.Operator):
         return "Training cancelled"
 
 
+class _Target(NamedTuple):
+    """What a training is for: the object, and the file that it is in, for one of its name in another file is not meant."""
+
+    name: str
+    kind: str
+    identity: object
+    file: str
+
+    @classmethod
+    def of(cls, thing, kind: str) -> "_Target":
+        return cls(thing.name_full, kind, identity(thing), bpy.data.filepath)
+
+    def found(self):
+        """The object, renamed perhaps or of its file opened anew; None where there is none here."""
+        thing = identified(self.identity)
+        if thing is None and self.file and self.file == bpy.data.filepath:
+            thing = find(self.name)
+        return thing
+
+
 def finish() -> str | None:
     """Take over the result of an ended training: the model goes to what it was trained for. A message for the panel, or
     None while it runs.
@@ -120,16 +144,17 @@ def finish() -> str | None:
     running = job()
     if running is None or running.running:
         return None
-    name, kind = running.target
-    target = find(name)
-    if running.succeeded and target is not None:
-        if kind == "strands":
+    name, target = running.target.name, running.target.found()
+    if not running.succeeded:
+        message = f"{name}: training failed: {running.failure()}"
+    elif target is None:
+        message = f"{name}: trained, but it is not in this file any more; choose its model by hand: {running.out}"
+    else:
+        if running.target.kind == "strands":
             target.neuralocks_hair.model = running.out
         else:
             target.neuralocks_character.rig_model = running.out
-        message = f"{name}: trained"
-    else:
-        message = f"{name}: training failed: {running.failure()}"
+        message = f"{target.name_full}: trained"
     session.messages["training"] = message
     stop()
     refresh(bpy.context.scene)
@@ -150,6 +175,7 @@ def _watch():
 def _out(name: str) -> str:
     """A new model file beside the .blend, or in the user's own folder while that is not saved."""
     label = "".join(c if c.isalnum() else "_" for c in name)
+    label = label.encode()[:LONGEST].decode(errors="ignore")
     folder = (
         Path(bpy.data.filepath).parent
         if bpy.data.filepath

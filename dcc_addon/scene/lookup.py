@@ -22,6 +22,11 @@ def identity(thing):
     return (bpy.data.filepath, thing.as_pointer()) if number is None else number
 
 
+def identified(number):
+    """The object of this identity, whatever it is called by now, or None."""
+    return next((o for o in bpy.data.objects if identity(o) == number), None)
+
+
 def named(name_full: str):
     """The object of this full name, which longer work began with.
 

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Training from the panel."""
 
+import shutil
+import sys
+import tempfile
+import time
 from pathlib import Path
 
 import bpy
@@ -13,11 +17,47 @@ def training(folder: Path) -> None:
     """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused,
     and no exported character stays behind.
     """
-    import shutil
-    import sys
-    import tempfile
-    import time
+    strands = _in_training(folder)
+    exported = Path(tempfile.tempdir)
+    assert len(list(exported.iterdir())) == 1
+    refused(bpy.ops.neuralocks.train, "one is running already")
+    assert _ended() == "Hair: trained"
+    assert not list(exported.iterdir())
+    assert Path(strands.neuralocks_hair.model).parent == folder
+    strands.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(9)
+    assert "Hair" not in messages(), messages()
 
+
+def training_meanwhile(folder: Path) -> None:
+    """What is trained for may be renamed meanwhile, or deleted, and another file opened, whose hair of the same name gets
+    nothing: then it is told where the model is. Names may be longer than those of files.
+    """
+    from dcc_addon.operators import training as operator
+
+    strands = _in_training(folder)
+    strands.name = "H" * 255
+    assert _ended() == f"{strands.name}: trained"
+    assert strands.neuralocks_hair.model == str(folder / "Hair_1.neuralocks")
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    bpy.data.objects.remove(strands)
+    assert "not in this file" in _ended() and "HHH_1.neuralocks" in messages()["training"]
+
+    _in_training(folder)
+    scenes.empty()
+    strands = scenes.hair(scenes.armature(), 20)
+    assert strands.name == "Hair" and bpy.app.timers.is_registered(operator._watch)
+    assert "Hair: trained" in _ended() and str(folder / "Hair_2.neuralocks") in messages()["training"]
+    assert not strands.neuralocks_hair.model
+
+    _in_training(folder)
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "train.blend"))
+    assert _ended() == "Hair: trained"
+    assert bpy.data.objects["Hair"].neuralocks_hair.model == str(folder / "Hair_3.neuralocks")
+
+
+def _in_training(folder: Path):
+    """Hair of a saved file for which a training of a second runs, which copies a model."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import training_job
 
@@ -33,6 +73,7 @@ def training(folder: Path) -> None:
     )
     training_job.CHILD = child
     operator.training_python = lambda: shutil.which("python3") or sys.executable
+    scenes.empty()
     rig = scenes.armature()
     scenes.body(rig)
     scenes.dance(rig)
@@ -40,26 +81,24 @@ def training(folder: Path) -> None:
     bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
     exported = folder / "exported"
-    exported.mkdir()
+    exported.mkdir(exist_ok=True)
     tempfile.tempdir = str(exported)
     assert bpy.ops.neuralocks.train() == {"FINISHED"}
-    assert len(list(exported.iterdir())) == 1
-    refused(bpy.ops.neuralocks.train, "one is running already")
+    return strands
+
+
+def _ended() -> str:
+    """What is said at the end of the training that runs."""
+    from dcc_addon.operators import training as operator
+
     end = time.monotonic() + 60
     while operator.finish() is None and time.monotonic() < end:
         time.sleep(0.1)
-    assert "trained" in messages()["training"], messages()
-    assert not list(exported.iterdir())
-    assert Path(strands.neuralocks_hair.model).parent == folder
-    strands.neuralocks_hair.live = True
-    bpy.context.scene.frame_set(9)
-    assert "Hair" not in messages(), messages()
+    return messages()["training"]
 
 
 def trained_for_real(folder: Path) -> None:
     """Train from the panel's own operator in a real second Python, with progress, cancel, and a model at the end."""
-    import time
-
     from dcc_addon.operators import training as operator
     from dcc_addon.services.training_job import problem
 
