@@ -9,11 +9,12 @@ from bpy.props import StringProperty
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
-from ..live_rig import bind, rest
+from ..live import refresh
+from ..live_rig import bind, rest, show_rest
 from ..models import model_path
 from ..scene import actions
 from ..scene.attach import check_own
-from ..scene.lookup import find
+from ..scene.lookup import find, named
 from ..scene.paths import FILE, absolute
 from ..scene.sampling import ensure
 from ..services.bones import chains_of, own_turns
@@ -53,17 +54,23 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         name = armature.name_full
         check_own(armature)
         first, last = frame_range(scene)
-        actions.check_heard(armature)  # before an earlier bake is taken off
-        actions.remove(armature)
-        armature.neuralocks_character.rig_live = False
-        rest(armature)
-        sampled = yield from sampling(context, armature)
-        armature = find(name)
-        bones, frames = bind(armature, sampled), frame_numbers(first, last, 0)
+        actions.check_heard(armature)
+        try:
+            show_rest(armature)
+            with actions.without(armature):
+                sampled = yield from sampling(context, armature)
+                armature = named(name)
+                bones = bind(armature, sampled)
+                actions.check_mode_left(armature, bones.bones)
+        finally:  # whatever keeps the new keys from being made leaves earlier ones, and Live, as they were
+            refresh(scene)
+        frames = frame_numbers(first, last, 0)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.
         stretched = frames * (context.scene.render.frame_map_old / context.scene.render.frame_map_new)
+        armature.neuralocks_character.rig_live = False
+        rest(armature)
         action = actions.bake_keys(armature, bones.bones, stretched, turns, own)
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keyframes on exactly the hair bones, in an action of their own that can be muted."""
 
+from contextlib import contextmanager
+
 import bpy
 import numpy as np
 
@@ -8,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from . import rotations
 from .animated import animated
+from .lookup import identified, identity
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
@@ -18,8 +21,8 @@ STILL = 1e-6
 
 
 def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.ndarray):
-    """Key the rotations of the hair bones and put them on a strip above all other animation; on one below it what they
-    did before, for Blender leaves at its last value what a muted strip writes no more.
+    """Key the rotations of the hair bones and put them on a strip above all other animation, in place of an earlier bake;
+    on one below it what they did before, for Blender leaves at its last value what a muted strip writes no more.
 
     Args:
         armature: the armature object.
@@ -29,13 +32,9 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
 
     Returns:
         the action of the hair's motion.
-
-    Raises:
-        NeuralocksError: keys on some bone would have no effect.
     """
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
-    _check_mode_left(armature, bones)
     # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
     modes = rotations.free_modes(armature, bones, rotations.KEYED)
     before = rotations.kept(armature, bones)
@@ -72,8 +71,13 @@ def check_heard(armature) -> None:
             )
 
 
-def _check_mode_left(armature, bones) -> None:
-    written = animated(armature.animation_data)
+def check_mode_left(armature, bones) -> None:
+    """Refuse bones on which baked keys would have no effect.
+
+    Raises:
+        NeuralocksError: one has keys in every rotation mode.
+    """
+    written = animated(armature.animation_data, without=(TRACK, BEFORE))
     for bone in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
         if all(start + rotations.CHANNELS[mode] in written for mode in rotations.KEYED):
@@ -90,9 +94,9 @@ def has_keys(armature) -> bool:
 
 def remove(armature) -> bool:
     """Take an earlier bake off and turn the bones as they were before it; whether there was one."""
-    tracks = _tracks(armature)
-    actions = [s.action for track in tracks for s in track.strips if s.action]
+    tracks, actions = _tracks(armature), _actions(armature)
     for track in tracks:
+        _unstar(track)
         armature.animation_data.nla_tracks.remove(track)
     for action in actions:
         rotations.give_back(armature, action.get(KEPT, ""))
@@ -101,9 +105,42 @@ def remove(armature) -> bool:
     return bool(tracks)
 
 
+@contextmanager
+def without(armature):
+    """Meanwhile an earlier bake is off, and the bones are turned as they were before it."""
+    number, tracks = identity(armature), {track.name: (track.mute, track.is_solo) for track in _tracks(armature)}
+    before = [action.get(KEPT, "") for action in _actions(armature)]
+    turned = rotations.kept(armature, [bone for text in before for bone in rotations.named(text)])
+    try:
+        for track in _tracks(armature):
+            _unstar(track)
+            track.mute = True
+        for text in before:
+            rotations.give_back(armature, text)
+        yield
+    finally:
+        armature = identified(number)  # found anew: an undo may have come between
+        for track in _tracks(armature) if armature is not None else ():
+            track.mute, solo = tracks.get(track.name, (track.mute, False))
+            if solo:
+                track.is_solo = True
+        if armature is not None:
+            rotations.give_back(armature, turned)
+
+
+def _unstar(track) -> None:
+    """Let a track play no longer alone: it would do so although it is muted, and leave all others silent when it is gone."""
+    if track.is_solo:  # to say so of any other one takes the star off that which has it
+        track.is_solo = False
+
+
 def _tracks(armature) -> list:
     data = armature.animation_data
     return [track for track in data.nla_tracks if track.name in (TRACK, BEFORE)] if data else []
+
+
+def _actions(armature) -> list:
+    return [strip.action for track in _tracks(armature) for strip in track.strips if strip.action]
 
 
 def _strip(data, name: str, action) -> None:

@@ -2,17 +2,19 @@
 """Which properties animation writes."""
 
 
-def animated(data) -> set[str]:
-    """Paths that actions, strips and drivers of some animation data write; none where there is no such data."""
+def animated(data, without=()) -> set[str]:
+    """Paths that actions, strips and drivers of some animation data write, but for NLA tracks of the names `without`; none
+    where there is no such data.
+    """
     if data is None:
         return set()
-    actions = {data.action, *(strip.action for strip in strips_of(data))} - {None}
+    actions = {data.action, *(strip.action for strip in strips_of(data, without))} - {None}
     return {curve.data_path for curve in [*data.drivers, *(c for action in actions for c in _curves(action))]}
 
 
-def strips_of(data) -> list:
-    """All NLA strips, those within others too."""
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
+def strips_of(data, without=()) -> list:
+    """All NLA strips, those within others too, but for those of tracks of the names `without`."""
+    strips = [strip for track in data.nla_tracks if track.name not in without for strip in track.strips]
     for strip in strips:  # grows
         strips.extend(getattr(strip, "strips", ()))
     return strips

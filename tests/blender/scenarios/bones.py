@@ -158,6 +158,54 @@ def turned_otherwise(folder: Path) -> None:
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
 
 
+def keyed_anew(folder: Path) -> None:
+    """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
+    not takes its place, and finds the bones as they were before the first.
+    """
+    from types import SimpleNamespace
+
+    from dcc_addon.operators.rig import NEURALOCKS_OT_bake_keys
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    scene, own, bone = bpy.context.scene, rig.neuralocks_character, rig.pose.bones["hair.01"]
+    bone.rotation_euler = (0.1, 0.2, -0.1)
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    model = own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def turns(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+
+    still = turns(5)
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    keyed = turns(5)
+    assert apart(still, keyed) > 0.01
+
+    def same() -> bool:
+        tracks = rig.animation_data.nla_tracks
+        names = [track.name for track in tracks if not track.mute]
+        return names == ["Neuralocks Before Hair", "Neuralocks Hair"] and apart(turns(5), keyed) < SAME
+
+    own.rig_model = "/nowhere.neuralocks"
+    refused(bpy.ops.neuralocks.bake_keys, "no such model")
+    assert same()
+    own.rig_model = model
+    own.rig_live = True
+    steps = NEURALOCKS_OT_bake_keys.steps(SimpleNamespace(), bpy.context)
+    next(steps)
+    assert not same()
+    steps.close()
+    assert same() and own.rig_live and not messages(), messages()
+    own.rig_live = False
+    assert same()
+    rig.animation_data.nla_tracks["Neuralocks Hair"].is_solo = own.rig_live = True
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and same() and not own.rig_live
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    assert bone.rotation_mode == "XYZ" and apart(turns(5), still) < 1e-6
+
+
 def renamed_bones(folder: Path) -> None:
     """A bone that gets another name is noticed as one more bone would be."""
     from dcc_addon import live
