@@ -13,6 +13,8 @@ from .animated import animated
 
 SAME = 1e-7
 """Values that differ by less are the same turn."""
+SAME_PLACE = 1e-5
+"""Places that differ by less, in the armature's unit, are the same."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
 """Rotation mode -> the property in which a bone keeps its rotation."""
 KEPT = ("rotation_mode", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
@@ -22,13 +24,15 @@ KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
 
 
 def kept(armature, bones) -> str:
-    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each."""
+    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each, and where it
+    is at rest, by which it is known under another name.
+    """
     found = {}
     for name in bones:
         bone = armature.pose.bones.get(name)
         if bone is not None:
             mode, *channels = KEPT
-            found[name] = [getattr(bone, mode), *(list(getattr(bone, channel)) for channel in channels)]
+            found[name] = [getattr(bone, mode), *(list(getattr(bone, channel)) for channel in channels), _place(bone)]
     return json.dumps(found)
 
 
@@ -43,14 +47,31 @@ def named(text: str) -> dict[str, list]:
 def give_back(armature, text: str) -> bool:
     """Turn bones as `kept` found them, those that are still there; whether there was anything to give back."""
     found = named(text)
-    for name, (mode, quaternion, euler, axis_angle) in found.items():
-        bone = armature.pose.bones.get(name) if armature.pose else None
+    for name, (mode, quaternion, euler, axis_angle, *place) in found.items():
+        bone = _bone(armature, name, place, found) if armature.pose else None
         if bone is not None:
             bone.rotation_mode = mode  # first, as it writes the values of its mode from those of the last one
             bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
     if found:
         armature.update_tag()
     return bool(found)
+
+
+def _place(bone) -> list[float]:
+    """Where a bone is at rest, head and tail, in its armature's space."""
+    return [*bone.bone.head_local, *bone.bone.tail_local]
+
+
+def _bone(armature, name: str, place: list, found: dict):
+    """The bone of this name; else, for it may have got another one, that of no name in `found` that is alone at `place`
+    (files of earlier versions know none).
+    """
+    bones = armature.pose.bones
+    if name in bones or not place:
+        return bones.get(name)
+    others = [bone for bone in bones if bone.name not in found]
+    there = [bone for bone in others if np.abs(np.subtract(_place(bone), place[0])).max() < SAME_PLACE]
+    return there[0] if len(there) == 1 else None
 
 
 def free_modes(armature, bones, modes=tuple(CHANNELS)) -> dict[str, str]:

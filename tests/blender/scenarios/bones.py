@@ -207,7 +207,7 @@ def keyed_anew(folder: Path) -> None:
 
 
 def renamed_bones(folder: Path) -> None:
-    """A bone that gets another name is noticed as one more bone would be."""
+    """A bone that gets another name is noticed as one more bone would be; it is turned as it was before it was live."""
     from dcc_addon import live
     from dcc_addon.panels import findings
 
@@ -217,14 +217,19 @@ def renamed_bones(folder: Path) -> None:
     scene.neuralocks.armature = rig
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    own, bone = (0.1, 0.2, -0.1), rig.pose.bones["hair.01"]
+    bone.rotation_euler = own
     rig.neuralocks_character.rig_live = True
     scene.frame_set(5)
+    assert bone.rotation_mode == "QUATERNION"
     assert not messages() and not live.needs_sampling(scene)
     assert findings(rig)[0][0] == "Head: head"
     rig.data.bones["hair.01"].name, rig.data.bones["head"].name = "hair.root", "Head"
     assert live.needs_sampling(scene) == [rig] and findings(rig)[0][0] == "Head: Head"
     scene.frame_set(6)
     assert "bones have changed" in messages()["Rig"], messages()
+    bone = rig.pose.bones["hair.root"]
+    assert bone.rotation_mode == "XYZ" and apart(np.array(bone.rotation_euler), np.array(own)) < 1e-6
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     scene.frame_set(7)
     assert "hair_01" in messages()["Rig"], messages()  # the model was made for other bones
