@@ -63,6 +63,7 @@ def convert(context, source, system, children: bool = True):
     with (
         at_rest(context, source),
         _changed(shown, show_viewport=True),
+        _changed(system, use_hair_dynamics=False),  # a simulation of its own is no groom
         _changed(settings, **_rendered(settings, children)),
     ):
         evaluated = source.evaluated_get(context.evaluated_depsgraph_get())

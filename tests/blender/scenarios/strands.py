@@ -75,6 +75,24 @@ def particle_systems(_folder: Path) -> None:
     assert convert(system="Fringe", children=False) == {"FINISHED"} and len(scene.neuralocks.hair.data.curves) == 10
 
 
+def simulated_particles(_folder: Path) -> None:
+    """Particle hair that a simulation of its own has moved is converted as it was groomed."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
+    ball, scene = bpy.context.active_object, bpy.context.scene
+    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    system = ball.particle_systems[0]
+    system.settings.type, system.settings.count, system.settings.hair_length = "HAIR", 10, 0.3
+    found = []
+    for simulated in (False, True):
+        system.use_hair_dynamics = ball.modifiers[0].show_viewport = simulated
+        for frame in range(1, 16):
+            scene.frame_set(frame)
+        assert bpy.ops.neuralocks.from_particles(system=system.name) == {"FINISHED"}
+        assert system.use_hair_dynamics == simulated
+        found.append(scenes.points(scene.neuralocks.hair))
+    assert apart(*found) < SAME
+
+
 def control_rig(folder: Path) -> None:
     """Hair on the head bone of a rig that another one copies, wherever the two stand."""
     control = scenes.armature("Control")
