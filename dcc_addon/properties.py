@@ -251,7 +251,7 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     output: StringProperty(
         name="Output",
-        description="Where the bake is written; // is the folder of this file",
+        description="Where the bake is written, with its shot beside it (NAME_shot.usdc); // is the folder of this file",
         default="//neuralocks_bake.usdc",
         **FILE,
     )

@@ -18,6 +18,18 @@ _WIDTH = 8
 """Columns of a layer are a multiple of it: what vector units take at once."""
 
 
+MADE = "Made by `neuralocks rig export-c`"
+"""What both files say in their first lines."""
+
+
+def made_here(path) -> bool:
+    """Whether a file is a header, or a worked example, that `export_c` wrote."""
+    try:
+        return MADE in Path(path).read_text(encoding="utf-8")[:1000]
+    except UnicodeDecodeError:
+        return False
+
+
 def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
     """Write `path` (ends in .h) and `<path>_example.c` beside it.
 
@@ -38,11 +50,18 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
     known = rig_spec(model.dynamic)
     if any(getattr(model.spec, name) != getattr(known, name) for name in ("pose_joints", "linear", "chest")):
         raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
-    example = path.with_name(f"{path.stem}_example.c")
-    for target, text in ((path, header_text(model, prefix)), (example, _example(model, path.name, prefix))):
+    for target, text in (
+        (path, header_text(model, prefix)),
+        (example_beside(path), _example(model, path.name, prefix)),
+    ):
         with atomic_write(target) as part:
             part.write_text(text, encoding="utf-8", newline="\n")
     return path
+
+
+def example_beside(path: Path) -> Path:
+    """The file of the worked example of a header."""
+    return path.with_name(f"{path.stem}_example.c")
 
 
 def header_text(model: RigModel, prefix: str = "nl_hair") -> str:

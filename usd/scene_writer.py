@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 from .border import quaternions, row_matrix, write_stage
 from .groom import Spline
+from .recorded import KEY
 
 ROOT = "/Character"
 
@@ -107,6 +108,7 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     stage.SetStartTimeCode(float(scene.frames[0]))
     stage.SetEndTimeCode(float(scene.frames[-1]))
     root = UsdSkel.Root.Define(stage, ROOT)
+    root.GetPrim().SetCustomDataByKey(KEY, "shot")  # by which `own_layers` knows it
     stage.SetDefaultPrim(root.GetPrim())
     skeleton = UsdSkel.Skeleton.Define(stage, f"{ROOT}/Rig")
     skeleton.CreateJointsAttr(scene.joints)

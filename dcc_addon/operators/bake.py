@@ -19,6 +19,7 @@ from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
 from ..scene.sampling import hairs_of
 from ..services.names import identifier
+from ..services.overwriting import check_ours
 from ..services.threaded import Threaded
 from ..session import session
 from .base import Stepwise, sampling, shown_armature, shown_hair
@@ -41,6 +42,11 @@ def output_path(path: str) -> str:
     return full
 
 
+def shot_beside(out: Path) -> Path:
+    """The file of the character at rest and in motion that a bake goes over."""
+    return out.with_name(f"{out.stem}_shot.usdc")
+
+
 def frame_range(scene) -> tuple[int, int]:
     """First and last frame of the bake."""
     settings = scene.neuralocks
@@ -60,6 +66,7 @@ def bake_steps(context, armature, hairs, path: str):
     The same functions that the command line calls, on a stage that holds the numbers of the live view.
     """
     from usd.bake import bake
+    from usd.own_layers import is_own
 
     scene = context.scene
     full = output_path(path)
@@ -71,17 +78,18 @@ def bake_steps(context, armature, hairs, path: str):
     looks: dict[_Look, list[str]] = {}
     for hair in hairs:
         looks.setdefault(_look(hair), []).append(hair.name_full)
+    stem = Path(full)
+    outs = [stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{n + 1}{stem.suffix}") for n in range(len(looks))]
+    check_ours([*outs, *map(shot_beside, outs)], is_own)
     character, subframes = armature.name_full, scene.neuralocks.subframes
     sampled = yield from sampling(context, armature, share=0.5)
     baked = {}
     for number, (look, names) in enumerate(sorted(looks.items())):
-        group = [named(name) for name in names]
-        stem = Path(full)
-        out = stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{number + 1}{stem.suffix}")
+        group, out = [named(name) for name in names], outs[number]
         others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
         if others:
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-        shot, model = out.with_name(f"{out.stem}_shot.usdc"), model_path(look.model)
+        shot, model = shot_beside(out), model_path(look.model)
         prims = write_shot(shot, named(character), scene, sampled, group)
         job = Threaded(
             lambda say, shot=shot, out=out, look=look, model=model: bake(
@@ -117,7 +125,7 @@ def _look(hair) -> _Look:
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
-    """Bake the moving hair of this character to a USD layer, equal to what is shown live"""
+    """Bake the moving hair of this character to a USD layer, equal to what is shown live, over its shot, which is written beside it as NAME_shot.usdc"""
 
     bl_idname = "neuralocks.bake"
     bl_label = "Bake to USD"

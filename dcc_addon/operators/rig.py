@@ -19,8 +19,9 @@ from ..scene.paths import FILE, absolute
 from ..scene.sampling import ensure
 from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
+from ..services.overwriting import check_ours
 from ..session import session
-from .bake import frame_range, output_path
+from .bake import frame_range, output_path, shot_beside
 from .base import Hardened, Stepwise, sampling, shown_armature
 
 
@@ -90,7 +91,7 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
-    """Write the rig with moving hair bones as a USD skeleton animation"""
+    """Write the rig with moving hair bones as a USD skeleton animation, over its shot, which is written beside it as NAME_shot.usdc"""
 
     bl_idname = "neuralocks.export_skel"
     bl_label = "Export USD Animation"
@@ -99,6 +100,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
 
     def steps(self, context):
+        from usd.own_layers import is_own
         from usd.rig_bake import bake_rig
 
         from ..scene.export import write_shot
@@ -108,9 +110,10 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
+        shot = shot_beside(out)
+        check_ours([out, shot], is_own)
         sampled = yield from sampling(context, armature)
         bind(find(name), sampled)  # says what is wrong before anything is written
-        shot = out.with_name(f"{out.stem}_shot.usdc")
         write_shot(shot, find(name), scene, sampled, [])
         head, model = sampled.character.skeleton.names[sampled.character.head], model_path(settings.rig_model, "rig")
         bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
@@ -118,7 +121,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
-    """Write the model of the hair bones as a C header for a game engine"""
+    """Write the model of the hair bones as a C header for a game engine, with a worked example beside it, NAME_example.c"""
 
     bl_idname = "neuralocks.export_c"
     bl_label = "Export C Header"
@@ -127,11 +130,13 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     filepath: StringProperty(name="File", description="Header to write", default="//neuralocks_hair.h", **FILE)
 
     def work(self, context):
-        from neuralocks_core.export_c import export_c
+        from neuralocks_core.export_c import example_beside, export_c, made_here
 
         armature = shown_armature(context)
         model = RigModel.load(model_path(armature.neuralocks_character.rig_model, "rig"))
-        out = export_c(model, Path(absolute(self.filepath)))
+        out = Path(absolute(self.filepath))
+        check_ours([out, example_beside(out)], made_here)
+        export_c(model, out)
         return f"C header written to {out}"
 
 

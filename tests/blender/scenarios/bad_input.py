@@ -200,3 +200,38 @@ def new_folder(folder: Path) -> None:
     elsewhere = str(folder.parent / "other" / "bake.usdc")
     for write in (bpy.ops.neuralocks.bake, bpy.ops.neuralocks.export_skel):
         refused(lambda write=write: write(filepath=elsewhere), "cannot be written")
+
+
+def not_ours(folder: Path) -> None:
+    """What an artist has made himself is not written over, be it what is written beside a bake; what was baked before
+    is.
+    """
+    from pxr import Usd
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    strands, operators = scenes.hair(rig, 10), bpy.ops.neuralocks
+    bpy.context.scene.neuralocks.armature, strands.neuralocks_hair.model = rig, MODEL
+    assert operators.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    writers = [
+        (operators.bake, "hair.usdc", "hair_shot.usdc"),
+        (operators.export_skel, "rig.usda", "rig_shot.usdc"),
+        (operators.export_c, "hair.h", "hair_example.c"),
+    ]
+    for write, *names in writers:
+        first, second = (folder / name for name in names)
+        for _ in range(2):
+            assert write(filepath=str(first)) == {"FINISHED"}
+        for own in (first, second):
+            made = own.read_bytes()
+            if own.suffix == ".c" or own.suffix == ".h":
+                own.write_bytes("Käthe's".encode("latin-1"))
+            else:
+                stage = Usd.Stage.CreateInMemory()
+                stage.DefinePrim("/Mine")
+                stage.Export(str(own))
+            mine = own.read_bytes()
+            refused(lambda write=write, first=first: write(filepath=str(first)), own.name, "not made by Neuralocks")
+            assert own.read_bytes() == mine
+            own.write_bytes(made)
