@@ -225,8 +225,8 @@ def show_all_rest() -> None:
 
 
 def show_rest(hair) -> None:
-    """Give the hair its rest shape and its modifiers back."""
-    if hair.data is not None and hair.data.library is None:
+    """Give the hair its rest shape and its modifiers back; what was converted to another type has no rest shape."""
+    if hair.type == "CURVES" and hair.data.library is None:
         curves.restore_rest(hair.data)
     unmute_deformers(hair)
 

@@ -90,6 +90,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             layout.operator("neuralocks.from_particles", icon="PARTICLES")
         if hair is None:
             return
+        if hair.type != "CURVES":
+            words(layout, f"{hair.name_full} is no hair Curves object any more; choose another one", "ERROR")
+            return
         own = hair.neuralocks_hair
         if own.armature is None or own.armature != settings.armature:
             if own.armature is not None:

@@ -164,11 +164,15 @@ def shown_hair(context, armature=None):
     """The hair object that the panel shows; of this armature, if one is given.
 
     Raises:
-        NeuralocksError: there is none, or it belongs to another character.
+        NeuralocksError: there is none, it was converted to something else, or it belongs to another character.
     """
     hair = context.scene.neuralocks.hair
     if hair is None or hair.name not in context.scene.objects:
         raise NeuralocksError("Strands: no hair chosen; choose a hair Curves object, or convert a particle system")
+    if hair.type != "CURVES":
+        raise NeuralocksError(
+            f"{hair.name_full}: it is no hair Curves object any more; choose another one in the panel"
+        )
     carrier = hair.neuralocks_hair.armature
     if armature is not None and carrier != armature:
         other = "" if carrier is None else f"choose {carrier.name_full} above, or "

@@ -36,7 +36,7 @@ def hairs_of(armature, scene) -> list:
 def bodies_of(armature, scene) -> list:
     """The body mesh chosen by the artist, else all that the armature deforms."""
     chosen = armature.neuralocks_character.body
-    if chosen is not None and chosen.name in scene.objects:
+    if chosen is not None and chosen.type == "MESH" and chosen.name in scene.objects:
         return [chosen]
     return body_reader.find(armature, scene.objects)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that takes the place of other hair, by its name or by its curves."""
+"""What takes the place of hair or body: other hair, by its name or by its curves, or the same in another type."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dcc_addon.scene import curves
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at, refused
 
 
 def later_groom(folder: Path) -> None:
@@ -63,3 +63,40 @@ def exchanged(_folder: Path) -> None:
     assert not messages(), messages()
     first.neuralocks_hair.live = second.neuralocks_hair.live = False
     assert np.array_equal(curves.shown(first.data), rest[1]) and np.array_equal(curves.shown(second.data), rest[0])
+
+
+def converted(_folder: Path) -> None:
+    """Live hair that is converted to a mesh is told to be none any more, and comes to no harm; a chosen body that is
+    converted to curves is passed over.
+    """
+    if bpy.app.version < (3, 5):
+        return  # older ones convert no hair
+    rig = scenes.armature()
+    skin, other = scenes.body(rig), scenes.body(rig)
+    scenes.dance(rig)
+    strands, operators = scenes.hair(rig, 20), bpy.ops.neuralocks
+    rig.neuralocks_character.body = skin
+    skin.data.clear_geometry()
+    skin.data.from_pydata([(0, 0, 0), (0, 0, 1)], [(0, 1)], [])
+    make_live(rig, strands)
+    for thing, kind in ((skin, "CURVE"), (strands, "MESH")):
+        for each in bpy.data.objects:
+            each.select_set(each == thing)
+        bpy.context.view_layer.objects.active = thing
+        assert bpy.ops.object.convert(target=kind) == {"FINISHED"}
+        bpy.context.scene.frame_set(9)
+        assert thing.type == kind and operators.sample_motion() == {"FINISHED"}
+    assert not messages(), messages()
+    from dcc_addon.session import session
+
+    assert session.rigs["Rig"].bodies == (other.name,)
+    for refuse in (
+        operators.bake_attach,
+        operators.detach,
+        operators.report_card,
+        operators.reset_look,
+        operators.assign,
+    ):
+        refused(refuse, "Hair: it is no hair Curves object any more")
+    strands.neuralocks_hair.live = False
+    strands.neuralocks_hair.live = True
