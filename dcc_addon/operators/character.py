@@ -7,13 +7,14 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
 from ..scene import armature as armature_reader
+from ..scene.binding import carrier
 from ..scene.sampling import sample
 from ..services import rig as rig_service
 from .base import Hardened, Stepwise, shown_armature
 
 
 class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
-    """Take the character and the hair from the selection, or the only ones in the scene"""
+    """Take the character and the hair from the selection, or those in the scene that belong together"""
 
     bl_idname = "neuralocks.find"
     bl_label = "Find Character and Hair"
@@ -22,17 +23,28 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
         settings, scene = context.scene.neuralocks, context.scene
         # An override before the linked object that it is made of, which may be in the scene too.
         local = sorted(scene.objects, key=lambda thing: thing.library is not None)
-        chosen = [*context.selected_objects, *local]
-        armature = next((o for o in chosen if o.type == "ARMATURE"), None)
-        if armature is None:
+        selected, chosen = context.selected_objects, [*context.selected_objects, *local]
+        armatures, hairs = ([o for o in chosen if o.type == kind] for kind in ("ARMATURE", "CURVES"))
+        if not armatures:
             raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
-        hair = next((o for o in chosen if o.type == "CURVES"), None)
+        armature = armatures[0]
+        if hairs and hairs[0] in selected:
+            hair = hairs[0]
+            if armature not in selected and _carrier(hair) in armatures:
+                armature = _carrier(hair)
+        else:
+            hair = next((o for o in hairs if _carrier(o) == armature), hairs[0] if hairs else None)
         settings.armature, settings.hair = armature, hair
         if hair is not None and hair.neuralocks_hair.armature is None:
-            hair.neuralocks_hair.armature = armature
+            hair.neuralocks_hair.armature = _carrier(hair) or armature
         return f"Character {armature.name_full}" + (
             f", hair {hair.name_full}" if hair else ", no hair Curves in this scene"
         )
+
+
+def _carrier(hair):
+    """The armature that a hair object belongs to, or hangs on; None where there is none."""
+    return hair.neuralocks_hair.armature or carrier(hair, None)
 
 
 class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):

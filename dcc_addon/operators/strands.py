@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..scene import particles
 from ..scene.attach import check_own
+from ..scene.binding import carrier
 from .base import Hardened, shown_armature, shown_hair
 
 
@@ -30,8 +31,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
         hair = particles.convert(context, source, system, self.children)
         settings = context.scene.neuralocks
         settings.hair = hair
-        if settings.armature is not None:
-            hair.neuralocks_hair.armature = settings.armature
+        hair.neuralocks_hair.armature = carrier(source, settings.armature)
         left = [f"'{other.name}'" for other in particles.waiting(source)]
         more = f"; {', '.join(left)} not converted yet" if left else ""
         return f"{hair.name_full}: {len(hair.data.curves)} strands from the particle hair of {source.name}{more}"

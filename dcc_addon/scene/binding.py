@@ -64,6 +64,15 @@ def at_rest(context, *things):
         context.view_layer.update()
 
 
+def carrier(thing, shown):
+    """The armature that moves an object, or deforms it: the one that is `shown`, unless that does not and another does."""
+    moving = _reached(thing, set())
+    if not moving or shown in moving:
+        return shown
+    deforming = [modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object]
+    return [*deforming, *sorted(moving, key=lambda armature: armature.name_full)][0]
+
+
 def carrying_bone(thing, armature) -> str | None:
     """The bone of an armature that an object rides on as a whole, if there is one."""
     if thing.parent == armature and thing.parent_type == "BONE":

@@ -140,9 +140,9 @@ def write(data, values: np.ndarray) -> None:
         data.add_curves([])
 
 
-def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None):
-    """A new Curves data block of polylines, of this name and material, with `strands` (S,) vertices each and points
-    `points_of` (P, 3) in the object's space.
+def create(name: str, strands: np.ndarray, points_of: np.ndarray, radii: np.ndarray | None = None, material=None):
+    """A new Curves data block of polylines, of this name and material, with `strands` (S,) vertices each, points
+    `points_of` (P, 3) and `radii` (P,) float32 in the object's space.
     """
     data = bpy.data.hair_curves.new(name)
     if hasattr(data, "add_curves"):
@@ -151,6 +151,9 @@ def create(name: str, strands: np.ndarray, points_of: np.ndarray, material=None)
     else:
         data = _by_conversion(name, strands, points_of, data)
     write(data, points_of)
+    if radii is not None:
+        attribute = data.attributes.get("radius") or data.attributes.new("radius", "FLOAT", "POINT")
+        attribute.data.foreach_set("value", radii)
     if material is not None:
         data.materials.append(material)
     return data

@@ -7,8 +7,10 @@ import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
 
 from ..services.axes import transformed
+from ..services.widths import radii
 from . import curves
 from .armature import matrix
 from .binding import at_rest
@@ -48,7 +50,7 @@ def waiting(thing) -> list:
 
 def convert(context, source, system, children: bool = True):
     """A new hair Curves object with the keys of the particle hair of `source`, and its children as they are rendered,
-    parented to it, as they are where the rig is at rest.
+    parented to it, as they are where the rig is at rest, of the same material and as thick.
 
     Blender's own conversion gives the points that are drawn (9 by default), not the keys that were groomed.
 
@@ -72,7 +74,8 @@ def convert(context, source, system, children: bool = True):
             more = _children(evaluated, system.name)
             counts = np.concatenate([counts, np.full(len(more), more.shape[1], int)])
             points = np.concatenate([points, more.reshape(-1, 3)])
-    data = curves.create(f"{system.name} Hair", counts, points)
+    thick, material = _radii(settings, counts, points), _material(source, settings)
+    data = curves.create(f"{system.name} Hair", counts, points, thick, material)
     hair = bpy.data.objects.new(data.name, data)
     (source.users_collection[0] if source.users_collection else context.scene.collection).objects.link(hair)
     hair.parent = source
@@ -82,6 +85,19 @@ def convert(context, source, system, children: bool = True):
             data.surface_uv_map = source.data.uv_layers.active.name
     shown.show_viewport = shown.show_render = False
     return hair
+
+
+def _radii(settings, counts: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Radii (P,) with which the hair is drawn; its settings are diameters."""
+    half = settings.radius_scale / 2
+    root, tip = half * settings.root_radius, half * settings.tip_radius
+    return radii(Groom(settings.name, points, counts), root, tip, settings.shape, settings.use_close_tip)
+
+
+def _material(source, settings):
+    """The material of the emitter's slot that the hair names, the last one where there are fewer."""
+    slots = source.material_slots
+    return slots[min(settings.material, len(slots)) - 1].material if slots else None
 
 
 def _rendered(settings, children: bool) -> dict[str, int]:

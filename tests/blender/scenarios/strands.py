@@ -93,6 +93,36 @@ def simulated_particles(_folder: Path) -> None:
     assert apart(*found) < SAME
 
 
+def particle_looks(_folder: Path) -> None:
+    """Converted hair has the material of its slot and is as thick as it was drawn; it belongs to the armature that moves
+    what it grows on, whoever is shown, and is found with it.
+    """
+    scene, rig, other = bpy.context.scene, scenes.armature(), scenes.armature("Other")
+    skin = scenes.body(rig)
+    for name in ("Skin", "Strands"):
+        skin.data.materials.append(bpy.data.materials.new(name))
+    skin.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = skin.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length, settings.hair_step = "HAIR", 10, 0.3, 4
+    settings.material, settings.use_close_tip = 2, False
+    settings.root_radius, settings.tip_radius, settings.radius_scale, settings.shape = 1.0, 0.5, 0.004, 0.5
+    scene.neuralocks.armature, bpy.context.view_layer.objects.active = other, skin
+    assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+    found = scene.neuralocks.hair
+    assert [material.name for material in found.data.materials] == ["Strands"]
+    radius = np.array([value.value for value in found.data.attributes["radius"].data]).reshape(10, -1)
+    expected = 0.001 + 0.001 * np.linspace(1, 0, radius.shape[1]) ** 2  # half of the diameters, 4 mm and 2 mm
+    assert apart(radius, np.tile(expected, (10, 1))) < 1e-5
+    assert found.neuralocks_hair.armature == rig
+
+    scenes.hair(other, 3, name="A")
+    for chosen, hair in ((rig, found.name), (other, "A"), (found, found.name)):
+        for thing in scene.objects:
+            thing.select_set(thing == chosen)
+        assert bpy.ops.neuralocks.find() == {"FINISHED"} and scene.neuralocks.hair.name == hair
+        assert scene.neuralocks.armature == (chosen if chosen.type == "ARMATURE" else rig)
+
+
 def control_rig(folder: Path) -> None:
     """Hair on the head bone of a rig that another one copies, wherever the two stand."""
     control = scenes.armature("Control")
