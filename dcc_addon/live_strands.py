@@ -113,7 +113,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
         return None
     prepared = session.hairs.get(name)
     if prepared is not None and not known(hair):
-        _let_go(prepared.of, hair)
+        _let_go(prepared.of)
         curves.complete_rest(hair.data)
         session.doubtful.add(name)
     path = model_path(hair.neuralocks_hair.model)
@@ -147,7 +147,7 @@ def _which(hair) -> tuple:
     return identity(data), identity(hair), len(data.points), len(data.curves)
 
 
-def _let_go(of: tuple, hair) -> None:
+def _let_go(of: tuple) -> None:
     """Give curves their rest shape back that a live hair object had before it was given others, unless they are moved
     by another one now.
     """
