@@ -11,8 +11,6 @@ from .lookup import find
 
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
-OTHERS = ("objects", "lights", "cameras", "armatures", "materials", "worlds", "node_groups", "curves", "scenes")
-"""What else has keys, of `bpy.data`."""
 
 
 class Unkeyed:
@@ -22,7 +20,7 @@ class Unkeyed:
         self._kept = {o.name_full: _channels(o) for o in scene.objects if o.library is None and _animated(o)}
         self._others = [
             (kind, thing.name, within, path, value)
-            for kind in OTHERS
+            for kind in _kinds()
             for thing in getattr(bpy.data, kind)
             if thing.library is None
             for within in (False, True)
@@ -58,6 +56,12 @@ def value_of(owner, path: str):
     if isinstance(value, (bool, int, float, str)):
         return value
     return list(value) if hasattr(value, "__len__") else None
+
+
+def _kinds() -> list[str]:
+    """What of `bpy.data` may have keys."""
+    lists = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
+    return [p.identifier for p in lists if "animation_data" in p.fixed_type.properties]
 
 
 def _owner(thing, within: bool):

@@ -117,6 +117,24 @@ def posing(folder: Path) -> None:
     assert apart(baked_points(folder / "b.usdc", "/Character/Hair_Hair", 9), after) < SAME
 
 
+def not_keyed(_folder: Path) -> None:
+    """A value that keys write, and that was changed and is not keyed yet, stays when the motion is sampled, whatever it is a
+    value of.
+    """
+    rig, lists = scenes.armature(), bpy.data
+    skin, strands = scenes.body(rig), scenes.hair(rig, 5)
+    bpy.context.scene.neuralocks.armature = rig
+    owners = [rig, rig.data, skin.data, strands.data, lists.textures.new("T", "CLOUDS")]
+    kinds = ("cameras", "lattices", "linestyles", "masks", "materials", "metaballs", "particles", "speakers", "volumes")
+    owners += [getattr(lists, kind).new("Own") for kind in kinds]
+    for owner in owners:
+        owner["value"] = 1.0
+        assert owner.keyframe_insert('["value"]', frame=1)
+        owner["value"] = 2.0
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert not (lost := [owner for owner in owners if owner["value"] != 2.0]), lost
+
+
 def moved_hair(folder: Path) -> None:
     """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
     objects that share their curves are refused, and neither is moved.
