@@ -17,9 +17,9 @@ PROBES = 500
 
 
 def find(armature, objects) -> list:
-    """The visible meshes that this armature deforms, by name."""
-    deformed = [o for o in objects if o.type == "MESH" and not o.hide_render and _deformed(o, armature)]
-    return sorted(deformed, key=lambda o: o.name_full)
+    """The visible meshes that this armature deforms, by name; without those of no faces, such as only modifiers make."""
+    meshes = [o for o in objects if o.type == "MESH" and not o.hide_render and len(o.data.polygons)]
+    return sorted((o for o in meshes if _deformed(o, armature)), key=lambda o: o.name_full)
 
 
 def read(mesh_object, armature) -> BodyArrays:

@@ -8,15 +8,15 @@ import bpy
 import numpy as np
 
 from dcc_addon.services.axes import to_core, transformed
+from dcc_addon.session import session
 from tests.blender import scenes
+from tests.blender.checks import make_live
 
 
 def body_as_drawn(_folder: Path) -> None:
     """The body that hair is kept out of is the one that Blender draws: with half of it made by a mirror modifier, shape
     keys on a vertex group only, groups named like bones that deform nothing.
     """
-    from dcc_addon.session import session
-
     scene, rig = bpy.context.scene, scenes.armature(bones=(*scenes.BONES, ("scalp", "head", (0, 0.5, 1), (0, 0.6, 1))))
     rig.data.bones["scalp"].use_deform = False
     scenes.dance(rig)
@@ -33,7 +33,7 @@ def body_as_drawn(_folder: Path) -> None:
     for point in key.data:
         point.co.x *= 1.5
     key.vertex_group, key.value = "upper", 0.8
-    _same(rig, body, session)
+    _same(rig, body)
 
     bpy.context.view_layer.objects.active = body
     half_of = bmesh.new()
@@ -46,15 +46,28 @@ def body_as_drawn(_folder: Path) -> None:
     mirror = body.modifiers.new("Mirror", "MIRROR")
     while body.modifiers[0] != mirror:
         bpy.ops.object.modifier_move_up(modifier=mirror.name)
-    assert _same(rig, body, session) > half
+    assert _same(rig, body) > half
     mirror.use_mirror_merge = False
     mirror.mirror_object = bpy.data.objects.new("Middle", None)
     scene.collection.objects.link(mirror.mirror_object)
     mirror.mirror_object.parent, mirror.mirror_object.location = rig, (0.02, 0, 0)
-    assert _same(rig, body, session) == 2 * half
+    assert _same(rig, body) == 2 * half
 
 
-def _same(rig, body, session) -> int:
+def no_faces(folder: Path) -> None:
+    """A mesh that only modifiers give faces, and that the armature deforms, keeps nobody from baking."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    body, strands = scenes.body(rig), scenes.hair(rig, 10)
+    empty = bpy.data.objects.new("Aaa", bpy.data.meshes.new("Aaa"))
+    bpy.context.scene.collection.objects.link(empty)
+    empty.modifiers.new("Armature", "ARMATURE").object = rig
+    make_live(rig, strands)
+    assert session.rigs["Rig"].bodies == (body.name,)
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
+
+
+def _same(rig, body) -> int:
     """Compares the body of the sampled character with the evaluated mesh; its number of vertices."""
     scene = bpy.context.scene
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
