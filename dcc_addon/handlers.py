@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender calls: each handler a few lines, all work in `live`."""
 
-from contextlib import nullcontext
-
 import bpy
 from bpy.app.handlers import persistent
 
@@ -11,7 +9,9 @@ from neuralocks_core.errors import NeuralocksError
 from . import background, live
 from .live_strands import EDITING, known, live_hairs, show_all_rest
 from .scene import blur
-from .scene.sampling import bodies_of, ensure
+from .scene.carried import bodies_of
+from .scene.layers import working_in
+from .scene.sampling import ensure
 from .scene.together import drawn_with
 from .session import session
 
@@ -92,7 +92,7 @@ def before_render(scene, *_):
     console, which is all that a render farm keeps, which hair will not move.
     """
     for drawn in drawn_with(scene):
-        with _in_view(drawn):
+        with working_in(drawn, _layer_of(drawn)):
             _make_ready(drawn)
         for thing in [*live_hairs(drawn), *live.carriers(drawn)]:
             if thing.name_full in session.messages:
@@ -118,11 +118,9 @@ def after_render(*_):
     blur.end()
 
 
-def _in_view(scene):
-    """Meanwhile Blender works on this scene; scripts render others than the one in view."""
-    if scene == bpy.context.scene:
-        return nullcontext()
-    return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
+def _layer_of(scene):
+    """The view layer to work in; which of them hair moves in is seen to where it is read."""
+    return bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
 
 
 def _mark_stale() -> None:

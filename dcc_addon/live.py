@@ -6,6 +6,7 @@ from dataclasses import replace
 import bpy
 
 from . import live_rig, live_strands
+from .scene.layers import elsewhere, graph_of, layer_of
 from .scene.sampling import key_of
 from .session import session
 
@@ -40,24 +41,23 @@ def refresh(scene, wait: bool = False, moved: bool = False) -> None:
     """Show the hair of the current frame, outside of a frame change; `wait` and `moved` as for `update`."""
     if session.paused or scene is None:
         return
-    graph = _graph_of(scene)
-    if graph is not None:
-        update(scene, graph, moved, wait)
+    for layer in _layers(scene):
+        update(scene, graph_of(scene, layer), moved, wait)
 
 
-def _graph_of(scene):
-    """The depsgraph of a scene, evaluated; None for one that has not been shown yet."""
-    if bpy.context.scene == scene:
-        return bpy.context.evaluated_depsgraph_get()
-    for layer in scene.view_layers:
-        if layer.depsgraph is not None:
-            layer.update()
-            return layer.depsgraph
-    return None
+def _layers(scene) -> list:
+    """The view layer in view, and others in which something live moves; none of a scene that has not been shown yet."""
+    in_view = bpy.context.scene == scene
+    found = [bpy.context.view_layer] if in_view else [layer for layer in scene.view_layers if layer.depsgraph][:1]
+    for armature in carriers(scene) if found else ():
+        layer = layer_of(armature, scene)
+        if layer is not None and layer not in found:
+            found.append(layer)
+    return found
 
 
 def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
-    """Move all live hair to the pose that `graph` has evaluated.
+    """Move live hair to the pose that `graph` has evaluated; what moves in other view layers only stays as it is.
 
     Args:
         scene: its frame says the time.
@@ -69,9 +69,11 @@ def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
     if session.paused:
         return
     for hair in live_strands.live_hairs(scene):
-        live_strands.update(hair, scene, graph, moved, wait)
+        if not elsewhere(hair.neuralocks_hair.armature, scene, graph):
+            live_strands.update(hair, scene, graph, moved, wait)
     for armature in live_rig.live_armatures(scene):
-        live_rig.update(armature, scene, graph, moved)
+        if not elsewhere(armature, scene, graph):
+            live_rig.update(armature, scene, graph, moved)
 
 
 def show_rest(scene) -> None:

@@ -14,6 +14,7 @@ from . import edited, preparing
 from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
+from .scene.layers import graph_of, layer_of
 from .scene.lookup import find, identity
 from .scene.placing import mute_deformers, unmute_deformers, world
 from .scene.sampling import shown_frame
@@ -183,7 +184,9 @@ def _arrived(name: str) -> None:
     """Show hair that has just been prepared."""
     hair, scene = find(name), bpy.context.scene
     if hair is not None and hair.neuralocks_hair.live and not session.paused:
-        update(hair, scene, bpy.context.evaluated_depsgraph_get(), False, False)
+        armature = hair.neuralocks_hair.armature
+        layer = layer_of(armature, scene) if armature is not None else None
+        update(hair, scene, graph_of(scene, layer or bpy.context.view_layer), False, False)
 
 
 def material(settings) -> np.ndarray:

@@ -14,10 +14,10 @@ from ..live import refresh
 from ..live_strands import material_words, show_rest, typed
 from ..models import model_path
 from ..scene import attach
+from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
-from ..scene.sampling import hairs_of
 from ..services.names import identifier
 from ..services.overwriting import check_ours
 from ..services.threaded import Threaded

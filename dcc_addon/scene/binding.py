@@ -3,6 +3,7 @@
 
 from contextlib import contextmanager
 
+import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
@@ -30,6 +31,7 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
     things = [find(name) for name in names]
     here = world(armature, context.evaluated_depsgraph_get())
     with at_rest(context, armature, *things):
+        _animate(context.scene)
         graph = context.evaluated_depsgraph_get()
         evaluated = armature.evaluated_get(graph)
         expected = matrix(evaluated.matrix_world) @ rest
@@ -37,7 +39,17 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
             raise hidden(armature)
         # An armature that hangs on a bone of another one has moved too.
         back = here @ np.linalg.inv(world(armature, graph))
-        return {thing.name_full: back @ world(thing, graph) for thing in things}
+        found = {thing.name_full: back @ world(thing, graph) for thing in things}
+    _animate(context.scene)
+    return found
+
+
+def _animate(scene) -> None:
+    """Evaluate the animation of the frame once more: before 4.0 an edit takes it off again in view layers that are not in
+    view.
+    """
+    if bpy.app.version < (4, 0):
+        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
 
 
 def hidden(armature) -> NeuralocksError:
@@ -52,7 +64,7 @@ def hidden(armature) -> NeuralocksError:
 @contextmanager
 def at_rest(context, *things):
     """Meanwhile all armatures that these objects depend on, and they themselves, are in their rest poses."""
-    kept = [(a.data, a.data.pose_position) for a in {a for thing in things for a in _reached(thing, set())}]
+    kept = [(a.data, a.data.pose_position) for a in {a for thing in things for a in armatures_of(thing)}]
     try:
         for data, _ in kept:
             data.pose_position = "REST"
@@ -84,8 +96,12 @@ def carrying_bone(thing, armature) -> str | None:
     return carrying_bone(thing.parent, armature) if thing.parent is not None else None
 
 
+def armatures_of(thing) -> set:
+    """Armatures on whose pose an object's place, or its shape, depends; an armature on its own."""
+    return _reached(thing, set())
+
+
 def _reached(thing, seen: set) -> set:
-    """Armatures on whose pose an object's place, or its shape, depends."""
     if thing is None or thing in seen:
         return set()
     seen.add(thing)

@@ -106,11 +106,14 @@ def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
     return known[1]
 
 
-def shape_values(mesh_object) -> np.ndarray:
-    """Values (B,) of the shape keys as they are now, in the order of `BodyArrays.shapes`."""
+def shape_values(mesh_object, graph) -> np.ndarray:
+    """Values (B,) of the shape keys as `graph` has them, in the order of `BodyArrays.shapes`; the file's own follow only
+    the view layer that is shown.
+    """
     keys = mesh_object.data.shape_keys
     if not keys or len(keys.key_blocks) < 2:
         return np.zeros(0)
+    keys = keys.evaluated_get(graph)
     return np.array([0.0 if b.mute else b.value for b in keys.key_blocks if b != keys.reference_key])
 
 

@@ -10,7 +10,7 @@ from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from . import body as body_reader
 from . import curves
-from .sampling import bodies_of, hairs_of
+from .carried import bodies_of, hairs_of
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """What strands of a type are in USD, where they are more than straight lines."""

@@ -37,7 +37,8 @@ def _left_out(thing, graph) -> bool:
     """
     if graph.mode == "RENDER" or len(thing.constraints) or thing.animation_data is not None:
         return False
-    return not thing.hide_get() and not thing.visible_get()
+    layer = graph.view_layer
+    return not thing.hide_get(view_layer=layer) and not thing.visible_get(view_layer=layer)
 
 
 def mute_deformers(hair, kept: str = "muted") -> None:

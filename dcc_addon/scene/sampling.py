@@ -19,6 +19,8 @@ from . import armature as armature_reader
 from . import body as body_reader
 from . import rotations
 from .binding import bind_places, hidden
+from .carried import bodies_of, hairs_of
+from .layers import layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .rigging import posture, rigging
@@ -26,19 +28,6 @@ from .unkeyed import Unkeyed
 
 BLOCK = 16
 """Frames whose poses are made channels together: each then costs little, and all of them less than a slice of work."""
-
-
-def hairs_of(armature, scene) -> list:
-    """Hair objects of the scene that this armature carries."""
-    return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.armature == armature]
-
-
-def bodies_of(armature, scene) -> list:
-    """The body mesh chosen by the artist, else all that the armature deforms."""
-    chosen = armature.neuralocks_character.body
-    if chosen is not None and chosen.type == "MESH" and chosen.name in scene.objects:
-        return [chosen]
-    return body_reader.find(armature, scene.objects)
 
 
 def shown_frame(scene) -> float:
@@ -149,12 +138,24 @@ class _Recording:
         self.reader = None
 
     def take(self, row: int) -> None:
-        """Step to a frame and read it; objects are found anew, since handlers may have changed them."""
+        """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
+        anew, since handlers may have changed them.
+        """
         frame = self.frames[row]
         whole = int(np.floor(frame + 1e-6))
         self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
-        graph = self._context.evaluated_depsgraph_get()
         armature = named(self.name)
+        layer = layer_of(armature, self._scene)
+        if layer is None:
+            raise hidden(armature)
+        with working_in(self._scene, layer):
+            self._read(row, armature)
+        if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
+            self._store(row - row % BLOCK, row + 1)
+
+    def _read(self, row: int, armature) -> None:
+        """Read the frame that the scene shows."""
+        graph = self._context.evaluated_depsgraph_get()
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
             raise hidden(armature)
@@ -169,10 +170,8 @@ class _Recording:
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in self._tracked:
             self._places[other][row] = world(named(other), graph)
-        values = [body_reader.shape_values(find(body)) for body in self._bodies]
+        values = [body_reader.shape_values(find(body), graph) for body in self._bodies]
         self._shapes.append(np.concatenate([np.zeros(0), *values]))
-        if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
-            self._store(row - row % BLOCK, row + 1)
 
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""

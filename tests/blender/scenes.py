@@ -118,6 +118,15 @@ def dance(rig, frames=(1, 24)) -> None:
         rig.keyframe_insert("location", frame=frame)
 
 
+def collect(name: str) -> None:
+    """Put all that is in the scene into a collection of its own."""
+    top, own = bpy.context.scene.collection, bpy.data.collections.new(name)
+    top.children.link(own)
+    for thing in list(top.objects):
+        own.objects.link(thing)
+        top.objects.unlink(thing)
+
+
 def points(thing, graph=None) -> np.ndarray:
     """Evaluated points (P, 3) of a Curves object in the world."""
     graph = graph or bpy.context.evaluated_depsgraph_get()

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, apart, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
 
 
 def rendered(folder: Path) -> None:
@@ -66,6 +66,82 @@ def rendered(folder: Path) -> None:
     for frame, (bones, points) in view.items():
         assert apart(got[frame][0], bones) < 1e-6, frame
         assert apart(got[frame][1], points) < 1e-6, frame
+
+
+def view_layers(folder: Path) -> None:
+    """A character that one of two view layers excludes: whichever is in view, it is drawn, baked and rendered the same, by
+    a farm and through another scene, too; where both exclude it, that is told.
+    """
+    from dcc_addon.scene.layers import graph_of
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    skin.shape_key_add(name="Basis")
+    wide = skin.shape_key_add(name="Wide")
+    for point in wide.data:
+        point.co.x *= 1.2
+    for frame in (1, 24):
+        wide.value = frame / 24
+        wide.keyframe_insert("value", frame=frame)
+    scenes.collect("Character")
+    make_live(rig, strands)
+    shown = {frame: points_at(strands, frame) for frame in (7, 8, 9)}
+    scene.view_layers[0].name = "Char"
+    scene.view_layers.new("Env").layer_collection.children["Character"].exclude = True
+    for frame, points in shown.items():
+        assert apart(points_at(strands, frame), points) < 1e-6, frame
+
+    prim, got = "/Character/Hair_Hair", {}
+    for name in ("Char", "Env"):
+        bpy.context.window.view_layer = scene.view_layers[name]
+        scene.frame_set(5)
+        assert bpy.ops.neuralocks.bake(filepath=str(folder / f"{name}.usdc")) == {"FINISHED"}
+        assert np.ptp(session.rigs["Rig"].motion.shape) > 0.9, name
+        for frame, points in shown.items():
+            assert apart(baked_points(folder / f"{name}.usdc", prim, frame), points) < SAME, (name, frame)
+
+    for layer in scene.view_layers:
+        layer.layer_collection.children["Character"].exclude = True
+    refused(bpy.ops.neuralocks.sample_motion, "hidden")
+    scene.view_layers["Char"].layer_collection.children["Character"].exclude = False
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for name in ("Char", "Env"):
+        bpy.context.window.view_layer = scene.view_layers[name]
+        scene.frame_set(8)
+        drawn = scenes.points(strands, graph_of(scene, scene.view_layers["Char"]))
+        assert apart(drawn, shown[8]) < 1e-6 and not messages(), (name, messages())
+
+    if bpy.app.version < (4, 0):
+        return  # as in `by_parts`
+
+    class Witness(bpy.types.RenderEngine):
+        bl_idname, bl_label = "WITNESS", "Witness"
+
+        def render(self, graph):
+            if graph.view_layer.name == "Char":
+                got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
+
+    bpy.utils.register_class(Witness)
+    main = bpy.data.scenes.new("Main")
+    for each in (scene, main):
+        each.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        each.collection.objects.link(each.camera)
+        each.render.engine, each.render.filepath = "WITNESS", str(folder / "r_")
+        each.render.resolution_x = each.render.resolution_y = 8
+    scene.neuralocks.use_scene_range, scene.neuralocks.frame_end = False, 24
+    scene.frame_start, scene.frame_end = 7, 9
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "env.blend"))
+    for in_view in ("Scene", "Main"):
+        bpy.ops.wm.open_mainfile(filepath=str(folder / "env.blend"))
+        bpy.context.window.scene = bpy.data.scenes[in_view]
+        bpy.ops.render.render(animation=True, scene="Scene")
+        assert sorted(got) == sorted(shown) and not messages(), (in_view, messages())
+        assert all(apart(got[frame], shown[frame]) < 1e-6 for frame in shown), in_view
+        got.clear()
+    bpy.utils.unregister_class(Witness)
 
 
 def motion_blur(folder: Path) -> None:

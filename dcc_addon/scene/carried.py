@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an armature carries: its hair, and the body that this is kept out of."""
+
+from . import body as body_reader
+
+
+def hairs_of(armature, scene) -> list:
+    """Hair objects of the scene that this armature carries."""
+    return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.armature == armature]
+
+
+def bodies_of(armature, scene) -> list:
+    """The body mesh chosen by the artist, else all that the armature deforms."""
+    chosen = armature.neuralocks_character.body
+    if chosen is not None and chosen.type == "MESH" and chosen.name in scene.objects:
+        return [chosen]
+    return body_reader.find(armature, scene.objects)

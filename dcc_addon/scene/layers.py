@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""View layers: Blender poses a character only in those that show it, or what it moves. Elsewhere it may be evaluated, since
+the panel points at it, and yet stand still.
+"""
+
+from contextlib import contextmanager
+
+import bpy
+
+from .binding import armatures_of
+from .carried import bodies_of, hairs_of
+
+
+def layer_of(armature, scene):
+    """The view layer in which to look at an armature: the one in view, if it moves there, else one that Blender has
+    evaluated before others; None where it moves in none.
+    """
+    seen = bpy.context.view_layer if bpy.context.scene == scene else None
+    ordered = sorted(scene.view_layers, key=lambda layer: (layer != seen, layer.depsgraph is None))
+    return next((layer for layer in ordered if _moves(armature, scene, layer, "VIEWPORT")), None)
+
+
+def elsewhere(armature, scene, graph) -> bool:
+    """Whether an armature moves in other view layers, and not in the one that `graph` is of."""
+    if armature is None or len(scene.view_layers) < 2 or _moves(armature, scene, graph.view_layer, graph.mode):
+        return False
+    return any(_moves(armature, scene, layer, graph.mode) for layer in scene.view_layers)
+
+
+@contextmanager
+def working_in(scene, layer):
+    """Meanwhile Blender works on this view layer; scripts render scenes that are not in view, with several of them."""
+    if scene == bpy.context.scene and layer == bpy.context.view_layer:
+        yield
+    else:
+        with bpy.context.temp_override(scene=scene, view_layer=layer):
+            yield
+
+
+def graph_of(scene, layer):
+    """The depsgraph of a view layer, evaluated."""
+    with working_in(scene, layer):
+        return bpy.context.evaluated_depsgraph_get()
+
+
+def _moves(armature, scene, layer, mode: str) -> bool:
+    """Whether a view layer shows an armature or something that it moves; `mode` as of a depsgraph, "VIEWPORT" or "RENDER",
+    for things may be disabled in either.
+    """
+    if _enabled(armature, layer, mode):
+        return True
+    carried = (thing for carried_by in (hairs_of, bodies_of) for thing in carried_by(armature, scene))
+    return any(_enabled(thing, layer, mode) and armature in armatures_of(thing) for thing in carried)
+
+
+def _enabled(thing, layer, mode: str) -> bool:
+    """Whether a view layer evaluates an object for itself. The eye of the outliner does not count: it hides from view
+    only.
+    """
+    if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
+        return True
+    off = "hide_render" if mode == "RENDER" else "hide_viewport"
+    return not getattr(thing, off) and _within(layer.layer_collection, set(thing.users_collection), off)
+
+
+def _within(branch, collections: set, off: str) -> bool:
+    """Whether a branch of a view layer takes in one of some collections; a child may be in though its parent is out."""
+    if getattr(branch.collection, off):
+        return False
+    own = branch.collection in collections and not branch.exclude
+    return own or any(_within(child, collections, off) for child in branch.children)
