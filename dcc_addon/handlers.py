@@ -8,10 +8,12 @@ from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
 from .live_strands import EDITING, known, live_hairs, show_all_rest
+from .models import SETTING
 from .scene import blur
 from .scene.carried import bodies_of
 from .scene.layers import working_in
 from .scene.sampling import ensure
+from .scene.save_as import Remade
 from .scene.together import drawn_with
 from .session import session
 
@@ -71,17 +73,22 @@ def on_undo(scene, *_):
 
 
 @persistent
-def before_save(*_):
-    """The saved file holds the hair at rest, so that it opens right without the add-on."""
+def before_save(target=None, *_):
+    """The saved file holds the hair at rest, so that it opens right without the add-on; and it finds its models, as far as
+    Blender tells where it will lie, which it does since 4.0.
+    """
     blur.end()
     for scene in bpy.data.scenes:
         live.show_rest(scene)
     show_all_rest()
+    session.remade = _unseen(lambda: Remade(target or bpy.data.filepath, SETTING.values()))
 
 
 @persistent
 def after_save(*_):
     """Go on as before the save, in all scenes; last in the one that is shown, for hair that is in others too."""
+    if session.remade is not None:
+        _unseen(session.remade.put_back)
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
         live.refresh(scene)
 
@@ -116,6 +123,15 @@ def _make_ready(scene) -> None:
 def after_render(*_):
     """The render has ended, or was cancelled."""
     blur.end()
+
+
+def _unseen(change):
+    """Make a change, of settings say, that the live view does not follow at once."""
+    session.paused += 1
+    try:
+        return change()
+    finally:
+        session.paused -= 1
 
 
 def _layer_of(scene):

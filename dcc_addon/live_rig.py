@@ -51,7 +51,7 @@ def _update(armature, scene, graph, moved) -> None:
 def bind(armature, sampled) -> LiveBones:
     """The rig model bound to this armature, once."""
     bones, settings = session.chains.get(armature.name_full), armature.neuralocks_character
-    path = model_path(settings.rig_model, "rig")
+    path = model_path(armature, "rig")
     file = path, stamp(path)
     if bones is None or bones.file != file:
         model = RigModel.load(path)

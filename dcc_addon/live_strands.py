@@ -117,7 +117,7 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
         _let_go(prepared.of)
         curves.complete_rest(hair.data)
         session.doubtful.add(name)
-    path = model_path(hair.neuralocks_hair.model)
+    path = model_path(hair)
     if prepared is not None and prepared.file != (path, stamp(path)):
         session.doubtful.add(name)
     if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
@@ -162,7 +162,7 @@ def _recipe(hair, sampled, wanted: tuple):
     """What the prepared hair is made of, to be compared, and a function of a progress callback that makes it without
     Blender, with all that its first frame needs.
     """
-    name, data, path = hair.name_full, hair.data, model_path(hair.neuralocks_hair.model)
+    name, data, path = hair.name_full, hair.data, model_path(hair)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(hair)
     # The hair keeps its character, so no other one gets its id.

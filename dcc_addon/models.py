@@ -6,8 +6,11 @@ import os
 from neuralocks_core import model as model_file
 from neuralocks_core.runtime import StrandModel
 
-from .scene.paths import absolute
+from .scene.paths import absolute, library_of
 from .session import session
+
+SETTING = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_model"}
+"""Where an object names its model, by its kind."""
 
 
 def load_model(found: str) -> StrandModel:
@@ -27,8 +30,11 @@ def stamp(found: str) -> tuple | None:
     return status.st_mtime_ns, status.st_size
 
 
-def model_path(path: str, kind: str = "strands") -> str:
-    """Absolute path of a model named in the panel; the shipped one where it is empty."""
+def model_path(thing, kind: str = "strands") -> str:
+    """Absolute path of the model that the panel names for a hair object, or for an armature with hair bones; the shipped
+    one where it names none.
+    """
+    path = thing.path_resolve(SETTING[kind])
     if not path.strip():
         return str(model_file.shipped(kind))
-    return absolute(path)
+    return absolute(path, library_of(thing, SETTING[kind]))

@@ -80,6 +80,8 @@ class Session:
     """First and last frame of each scene when its file was opened."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since somebody last saw to it."""
+    remade: object = None
+    """Paths that were written anew for the save that goes on; see `scene.save_as`."""
     doubtful: set[str] = field(default_factory=set)
     """Prepared hair whose groom or choices may have changed."""
 

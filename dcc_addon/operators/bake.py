@@ -89,13 +89,13 @@ def bake_steps(context, armature, hairs, path: str):
         others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
         if others:
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-        shot, model = shot_beside(out), model_path(look.model)
+        shot = shot_beside(out)
         prims = write_shot(shot, named(character), scene, sampled, group)
         job = Threaded(
-            lambda say, shot=shot, out=out, look=look, model=model: bake(
+            lambda say, shot=shot, out=out, look=look: bake(
                 shot,
                 out,
-                model,
+                look.model,
                 frames=f"{first}:{last}",
                 subframes=subframes + 1,
                 material=list(look.material),
@@ -121,7 +121,7 @@ class _Look(NamedTuple):
 
 def _look(hair) -> _Look:
     settings = hair.neuralocks_hair
-    return _Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, settings.model)
+    return _Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, model_path(hair))
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):

@@ -115,7 +115,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         sampled = yield from sampling(context, armature)
         bind(find(name), sampled)  # says what is wrong before anything is written
         write_shot(shot, find(name), scene, sampled, [])
-        head, model = sampled.character.skeleton.names[sampled.character.head], model_path(settings.rig_model, "rig")
+        head, model = sampled.character.skeleton.names[sampled.character.head], model_path(find(name), "rig")
         bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
@@ -133,7 +133,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         from neuralocks_core.export_c import example_beside, export_c, made_here
 
         armature = shown_armature(context)
-        model = RigModel.load(model_path(armature.neuralocks_character.rig_model, "rig"))
+        model = RigModel.load(model_path(armature, "rig"))
         out = Path(absolute(self.filepath))
         check_ours([out, example_beside(out)], made_here)
         export_c(model, out)

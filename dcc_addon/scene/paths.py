@@ -10,14 +10,25 @@ FILE = {"subtype": "FILE_PATH", "options": _RELATIVE}
 """How such a property is made; since 4.5 Blender warns of // where it is not told that we know what it means."""
 
 
-def absolute(path: str) -> str:
-    """The absolute path of one that may begin with //, the folder of the saved file.
+def absolute(path: str, library=None) -> str:
+    """The absolute path of one that may begin with //, the folder of the saved file, or of the library that it is from.
 
     Raises:
         NeuralocksError: the file is not saved, so that // means nothing.
     """
-    if path.startswith("//") and not bpy.data.filepath:
+    if path.startswith("//") and library is None and not bpy.data.filepath:
         raise NeuralocksError(
             f"{path}: this file is not saved yet, so there is no folder beside it; save the file or choose a full path"
         )
-    return bpy.path.abspath(path)
+    return bpy.path.abspath(path, library=library)
+
+
+def library_of(thing, setting: str):
+    """The library in whose file a setting of an object was made; None for this file. A library override has the value of
+    what it overrides until it is given another.
+    """
+    while (override := thing.override_library) is not None and override.reference is not None:
+        if override.reference.path_resolve(setting) != thing.path_resolve(setting):
+            break
+        thing = override.reference
+    return thing.library

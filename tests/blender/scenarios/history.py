@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undo, and data of other files."""
 
+import shutil
 from pathlib import Path
 
 import bpy
@@ -75,11 +76,7 @@ def linked(folder: Path) -> None:
     scenes.dance(rig)
     scenes.hair(rig, 20)
     scene = bpy.context.scene
-    character = bpy.data.collections.new("Character")
-    scene.collection.children.link(character)
-    for thing in list(scene.collection.objects):
-        character.objects.link(thing)
-        scene.collection.objects.unlink(thing)
+    scenes.collect("Character")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
     scenes.empty()
     with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
@@ -129,3 +126,44 @@ def linked(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     strands = next(o for o in bpy.data.objects if o.type == "CURVES" and not o.library)
     assert strands.neuralocks_hair.live and "neuralocks_rest" not in strands.data.attributes
+
+
+def beside_the_file(folder: Path) -> None:
+    """A model named with // is beside the file in which it was named: the library of linked and overridden hair, and where
+    this file was before it was saved in another folder; a copy there changes nothing here.
+    """
+    from dcc_addon.models import model_path
+
+    library, shots = folder / "library", folder / "shots"
+    library.mkdir()
+    shots.mkdir()
+    model = shutil.copy(MODEL, library / "mine.neuralocks")
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    bpy.ops.wm.save_as_mainfile(filepath=str(library / "library.blend"))
+    strands.neuralocks_hair.model = "//mine.neuralocks"
+    shown = points_at(strands, 9)
+    bpy.ops.wm.save_as_mainfile(filepath=str(shots / "copy.blend"), copy=True)
+    assert strands.neuralocks_hair.model == "//mine.neuralocks"
+    bpy.ops.wm.save_mainfile()
+    if bpy.app.version >= (4, 0):  # older ones do not tell where a file will be saved
+        bpy.ops.wm.save_as_mainfile(filepath=str(shots / "moved.blend"))
+        assert apart(scenes.points(strands), shown) < 1e-6 and not messages(), messages()
+        for name in ("copy", "moved"):
+            bpy.ops.wm.open_mainfile(filepath=str(shots / f"{name}.blend"))
+            strands = bpy.data.objects["Hair"]
+            assert strands.neuralocks_hair.model == "//../library/mine.neuralocks", strands.neuralocks_hair.model
+            assert Path(model_path(strands)).samefile(model)
+
+    scenes.empty()
+    bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
+    with bpy.data.libraries.load(str(library / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Hair"]
+    strands = bpy.data.objects["Hair"]
+    assert Path(model_path(strands)).samefile(model)
+    strands = strands.override_create()
+    assert Path(model_path(strands)).samefile(model)
+    strands.neuralocks_hair.model = "//other.neuralocks"
+    assert Path(model_path(strands)) == shots / "other.neuralocks"

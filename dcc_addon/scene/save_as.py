@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths when a file is saved in another folder: Blender remakes its own that begin with //, and not those of add-ons."""
+
+import os
+
+import bpy
+
+from .paths import library_of
+
+
+class Remade:
+    """Settings of this file that name a file beside it, written as they must be in another folder."""
+
+    def __init__(self, target: str, settings):
+        self._source, folder = bpy.data.filepath, os.path.dirname(target)
+        self._kept = []
+        if not self._source or folder == os.path.dirname(self._source):
+            return
+        for thing in (o for o in bpy.data.objects if o.library is None):
+            for setting in settings:
+                path = thing.path_resolve(setting)
+                if path.startswith("//") and library_of(thing, setting) is None:
+                    self._kept.append((thing.name, setting, path))
+                    _set(thing, setting, _relative(bpy.path.abspath(path), folder))
+
+    def put_back(self) -> None:
+        """Take that back if this is still the file that it was: after a copy was saved, or nothing was."""
+        if bpy.data.filepath != self._source:
+            return
+        for name, setting, path in self._kept:
+            _set(bpy.data.objects[name, None], setting, path)
+
+
+def _relative(path: str, folder: str) -> str:
+    same = os.path.splitdrive(path)[0] == os.path.splitdrive(folder)[0]
+    return bpy.path.relpath(path, start=folder) if same else path
+
+
+def _set(thing, setting: str, path: str) -> None:
+    group, _, name = setting.partition(".")
+    setattr(getattr(thing, group), name, path)
