@@ -46,10 +46,10 @@ class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
             words(layout, line, "INFO")
         if problem:
             words(layout, problem, "ERROR")
-        _motion(layout, armature)
+        _motion(layout, armature, context.scene)
 
 
-def _motion(layout, armature) -> None:
+def _motion(layout, armature, scene) -> None:
     """How up to date the sampled motion is; in few words, for a narrow sidebar cuts labels beside buttons."""
     sampled, character = session.rigs.get(armature.name_full), armature.neuralocks_character
     if sampled is not None and character.body is None and sampled.bodies:
@@ -73,6 +73,12 @@ def _motion(layout, armature) -> None:
         if gap > LOOP_GAP:
             first, last = sampled.motion.frames[[0, -1]]
             words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")
+    elif sampled is not None:
+        first, last = sampled.motion.frames[[0, -1]]
+        if not first <= scene.frame_current <= last:
+            words(
+                layout, f"Hair knows the motion of frames {first:g} to {last:g} only; widen the scene's range", "INFO"
+            )
     message(layout, armature.name_full)
 
 

@@ -50,7 +50,8 @@ def mute_deformers(hair, kept: str = "muted") -> None:
     found = _remembered(text)
     for modifier in hair.modifiers:
         if (modifier.show_viewport or modifier.show_render) and _moves(modifier):
-            found.setdefault(modifier.name, [modifier.show_viewport, modifier.show_render])
+            if modifier.name not in found:
+                found[modifier.name] = _before(hair, modifier, found)
             modifier.show_viewport = modifier.show_render = False
     if found and (now := json.dumps(found)) != text:
         setattr(settings, kept, now)
@@ -62,13 +63,28 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
     if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
         return
     found = _remembered(getattr(settings, kept))
-    hidden = [m for m in hair.modifiers if not (m.show_viewport or m.show_render) and _moves(m)]
-    renamed = iter([modifier for modifier in hidden if modifier.name not in found])
+    renamed = iter(_renamed(hair, found))
     for name, (viewport, render) in found.items():
         modifier = hair.modifiers.get(name) or next(renamed, None)
         if modifier is not None:
             modifier.show_viewport, modifier.show_render = viewport, render
     setattr(settings, kept, "")
+
+
+def _before(hair, modifier, found: dict) -> list[bool]:
+    """How to show a modifier again that is not among those remembered: as it is shown now; or, where it is one of those,
+    was renamed and then switched on by hand in one place, as that one.
+    """
+    gone = [name for name in found if name not in hair.modifiers]
+    if modifier.show_viewport != modifier.show_render and len(gone) > len(_renamed(hair, found)):
+        return found.pop(gone[-1])
+    return [modifier.show_viewport, modifier.show_render]
+
+
+def _renamed(hair, found: dict) -> list:
+    """Modifiers that are off and not among those remembered by name."""
+    off = [m for m in hair.modifiers if not (m.show_viewport or m.show_render) and _moves(m)]
+    return [modifier for modifier in off if modifier.name not in found]
 
 
 def _remembered(text: str) -> dict[str, list[bool]]:

@@ -93,7 +93,9 @@ def panel(folder: Path) -> None:
     said = _drawn()
     assert {"24 frames", f"Body: {skin.name}"} <= set(said), said
     assert said.count(attach) == 1
-    assert not any("wide" in line for line in said), said
+    assert not any("wide" in line or "range" in line for line in said), said
+    scene.frame_set(30)
+    assert "frames 1 to 24 only" in " ".join(_drawn())
     rig.neuralocks_character.loop = True
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
     scene.neuralocks.use_scene_range = False

@@ -245,5 +245,8 @@ def deformer_added(_folder: Path) -> None:
         assert not second.show_viewport and not first.show_viewport
         second.show_viewport, first.name = True, "Mine"
     points_at(strands, 10)
+    second.name = "Yours"
+    second.show_viewport = True
+    points_at(strands, 11)
     strands.neuralocks_hair.live = False
     assert all(modifier.show_viewport and modifier.show_render for modifier in strands.modifiers)
