@@ -124,7 +124,7 @@ def test_wrong_usage_is_status_two(capsys):
 
 
 def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
-    written, write = [], Path.write_bytes
+    shot, written, write = write_shot(tmp_path), [], Path.write_bytes
 
     def full(self, data):
         if len(written) == 2:
@@ -133,9 +133,9 @@ def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, 
         return write(self, data)
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    assert status("export", model, "-o", tmp_path / "onnx") == 1
+    assert status("export", model, "-o", tmp_path / "onnx", "--shot", shot) == 1
     assert "no space left" in capsys.readouterr().err
-    assert len(written) == 2 and list((tmp_path / "onnx").iterdir()) == []
+    assert len(written) == 2 and list(tmp_path.iterdir()) == [shot]
 
 
 def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
