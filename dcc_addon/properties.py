@@ -2,13 +2,7 @@
 """What is saved in the file: settings of each hair object and of each character, and what the panel shows."""
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from . import background, live
 from .scene.paths import FILE

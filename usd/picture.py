@@ -11,7 +11,6 @@ from .baked import Baked, read_baked
 from .border import Border, open_stage
 from .curves import find_curves
 from .damage import names_damage
-from .prim_paths import prim_path
 from .rig_picture import rigged_scene
 from .rig_stage import read_rigged_hair
 from .stopping import deferred
@@ -34,7 +33,7 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
     if isinstance(baked, Baked):
         scene, border = baked.scene(), baked.shot.border
     else:
-        scene, border = _scene(baked, grooms, prim_path(skeleton, "skeleton"), head)
+        scene, border = _scene(baked, grooms, skeleton, head)
     with deferred():  # what draws loads its modules at any time; the progress checks after each picture
         return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
 

@@ -17,6 +17,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from .border import Border, open_stage
 from .damage import names_damage
 from .notes import another_head, has_hair_joints, nothing_found, unfound, unlikely_head
+from .prim_paths import prim_path
 from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import find_skins, rest_primvar
 
@@ -70,7 +71,7 @@ def read_rigged_hair(
     Raises:
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
     """
-    stage = open_stage(path)
+    stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
     border = Border.of(stage)
     prims = find_skeletons(stage)
     if skeleton:

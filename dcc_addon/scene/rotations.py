@@ -63,9 +63,7 @@ def _place(bone) -> list[float]:
 
 
 def _bone(armature, name: str, place: list, found: dict):
-    """The bone of this name; else, for it may have got another one, that of no name in `found` that is alone at `place`
-    (files of earlier versions know none).
-    """
+    """The bone of this name; else, for it may have got another one, that of no name in `found` that is alone at `place`."""
     bones = armature.pose.bones
     if name in bones or not place:
         return bones.get(name)

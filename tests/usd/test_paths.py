@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths of files and prims as callers give them, and names that files or layers cannot have."""
+
+import os
+
+import pytest
+from pxr import Sdf
+
+from neuralocks_core.errors import NeuralocksError
+from usd.bake import bake
+from usd.inspect import inspect
+from usd.stage import read_shot
+
+from .shots import Recipe, write_shot
+
+HAIR, RIG = "/Hero/Hair", "/Hero/Rig"
+
+
+def test_a_name_too_long_for_a_file_is_told(tmp_path):
+    """In one line, by the Python calls as by the command."""
+    shot = write_shot(tmp_path, Recipe())
+    with pytest.raises(NeuralocksError, match="File name too long"):
+        bake(shot, tmp_path / f"{'a' * 300}.usdc", frames="1:2")
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+def test_nothing_is_no_path(model):
+    with pytest.raises(NeuralocksError, match="out: None is no path"):
+        bake("shot.usda", None, model)
+    with pytest.raises(NeuralocksError, match="shot: None is no path"):
+        bake(None, "a.usdc", model)
+
+
+@pytest.mark.parametrize("kind", [str, Sdf.Path, lambda path: f"{path}/"])
+def test_a_lone_prim_path_of_any_kind_is_taken(tmp_path, kind):
+    shot = read_shot(write_shot(tmp_path), kind(HAIR), kind(RIG))
+    assert ([item.path for item in shot.grooms], [rig.path for rig in shot.rigs]) == ([HAIR], [RIG])
+
+
+def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
+    shot = write_shot(tmp_path, name="line\nbreak")
+    with pytest.raises(NeuralocksError, match="line break or the like.*rename it"):
+        bake(shot, tmp_path / "a.usdc", model, frames="1")
+    with pytest.raises(NeuralocksError, match="SDF_FORMAT_ARGS: for arguments; choose another name"):
+        bake(shot, tmp_path / "a:SDF_FORMAT_ARGS:b=c.usdc", model, frames="1")
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/null"), reason="Windows has none")
+def test_what_is_no_file_is_not_called_missing():
+    with pytest.raises(NeuralocksError, match="/dev/null: is not a file"):
+        inspect("/dev/null")
