@@ -6,6 +6,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
+
 from ..services.mirror import mirrored
 from ..services.rig import BodyArrays
 from ..session import session
@@ -25,8 +27,15 @@ def find(armature, objects) -> list:
 def read(mesh_object, armature) -> BodyArrays:
     """Vertices of the basis shape, triangles, weights and shape keys, with what mirror modifiers add; a body that rides
     on one bone of the armature, as a whole, is weighted to it.
+
+    Raises:
+        NeuralocksError: it has no faces.
     """
     mesh = mesh_object.data
+    if not len(mesh.polygons):
+        raise NeuralocksError(
+            f"{mesh_object.name_full}: it has no faces to keep hair out of; choose a body with a surface, or none"
+        )
     points = _coordinates(mesh.vertices)
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)

@@ -10,7 +10,7 @@ import numpy as np
 from dcc_addon.services.axes import to_core, transformed
 from dcc_addon.session import session
 from tests.blender import scenes
-from tests.blender.checks import make_live
+from tests.blender.checks import make_live, refused
 
 
 def body_as_drawn(_folder: Path) -> None:
@@ -65,6 +65,8 @@ def no_faces(folder: Path) -> None:
     make_live(rig, strands)
     assert session.rigs["Rig"].bodies == (body.name,)
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
+    rig.neuralocks_character.body = empty
+    refused(bpy.ops.neuralocks.sample_motion, "Aaa: it has no faces")
 
 
 def _same(rig, body) -> int:
