@@ -76,9 +76,9 @@ def converted(_folder: Path) -> None:
     scenes.dance(rig)
     strands, operators = scenes.hair(rig, 20), bpy.ops.neuralocks
     rig.neuralocks_character.body = skin
-    skin.data.clear_geometry()
-    skin.data.from_pydata([(0, 0, 0), (0, 0, 1)], [(0, 1)], [])
     make_live(rig, strands)
+    skin.data.clear_geometry()  # of faces no curve is made
+    skin.data.from_pydata([(0, 0, 0), (0, 0, 1)], [(0, 1)], [])
     for thing, kind in ((skin, "CURVE"), (strands, "MESH")):
         for each in bpy.data.objects:
             each.select_set(each == thing)
