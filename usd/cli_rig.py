@@ -142,7 +142,7 @@ def bake(
         )
 
 
-@command("export-c")
+@command("export-c", usd=False)
 def export_c(
     model: Model = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Header to write.")] = Path("hair.h"),
@@ -156,7 +156,7 @@ def export_c(
     typer.echo(f"{path} and {path.with_name(path.stem + '_example.c')}")
 
 
-@command("export-onnx")
+@command("export-onnx", usd=False)
 def export_onnx(
     model: Model = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="ONNX file to write.")] = Path("hair.onnx"),

@@ -16,9 +16,9 @@ from .stopping import deferred, stoppable
 
 
 def command_of(app: typer.Typer):
-    """A decorator like `app.command(name)` for functions that raise NeuralocksError."""
+    """A decorator like `app.command(name)` for functions that raise NeuralocksError; `usd` says whether they need USD."""
 
-    def command(name: str):
+    def command(name: str, usd: bool = True):
         def wrap(function):
             @app.command(name, help=_paragraphs(function.__doc__))
             @functools.wraps(function)
@@ -26,7 +26,8 @@ def command_of(app: typer.Typer):
                 try:
                     with stoppable():
                         _check_words(kwargs)
-                        _load_usd()
+                        if usd:
+                            _load_usd()
                         return function(*args, **kwargs)
                 except NeuralocksError as error:
                     one_line(f"error: {error}")

@@ -36,8 +36,7 @@ from .notes import (
 from .placement import Placement
 from .recorded import recorded, recorded_cuts
 from .rig_source import StageRig, find_skeletons, read_each_rig
-from .rig_stage import POSE_JOINTS as RIG_JOINTS
-from .rig_stage import check_orients, core_meshes, describe_chains, weight_notes
+from .rig_stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from .stage import frame_range
 
 

@@ -29,6 +29,7 @@ class JointSource:
         animation: the SkelAnimation prim, or None.
         placement: where the skeleton stands.
         notes: what a user should know about it.
+        ignored: the note that says why the animation does not count; None if it does, or if there is none.
 
     Raises:
         NeuralocksError: it has no joints, or arrays that do not fit each other.
@@ -38,6 +39,7 @@ class JointSource:
         self.prim, self.path = prim, str(prim.GetPath())
         self._stage = prim.GetStage()  # a prim alone does not keep its stage open
         self.notes: list[str] = []
+        self.ignored: str | None = None
         skeleton = UsdSkel.Skeleton(prim)
         self.names = tuple(str(name) for name in skeleton.GetJointsAttr().Get() or ())
         if not self.names:
@@ -169,23 +171,29 @@ class JointSource:
         """(joint, column of the animation) pairs; None where UsdSkel would show the rest pose instead."""
         if self._animation is None:
             return None
-        for attribute, kind in zip(self._channels(), (Vt.Vec3fArray, Vt.QuatfArray, Vt.Vec3hArray)):
-            path, name = self.animation.GetPath(), attribute.GetName()
-            if not attribute.HasValue():
-                self.notes.append(f"{path}: no {name}, so UsdSkel ignores the animation; author all three channels")
-                return None
-            values = attribute.Get(Usd.TimeCode.EarliestTime())
-            if not isinstance(values, kind | None):
-                own, wanted = (Sdf.GetValueTypeNameForValue(each) for each in (values, kind()))
-                self.notes.append(f"{path}: its {name} are {own}, so UsdSkel ignores the animation; author {wanted}")
-                return None
         order = {str(name): i for i, name in enumerate(self._animation.GetJointsAttr().Get() or ())}
         pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
-        if not pairs:
-            self.notes.append(f"{self.animation.GetPath()}: animates no joint of {self.path}; check its joint paths")
+        self.ignored = self._unusable_channel()
+        if not self.ignored and not pairs:
+            self.ignored = f"{self.animation.GetPath()}: animates no joint of {self.path}; check its joint paths"
+        if self.ignored:
+            self.notes.append(self.ignored)
             return None
         self._width = len(order)
         return pairs
+
+    def _unusable_channel(self) -> str | None:
+        """What is wrong with a channel for which UsdSkel ignores the animation, None if nothing is."""
+        path = self.animation.GetPath()
+        for attribute, kind in zip(self._channels(), (Vt.Vec3fArray, Vt.QuatfArray, Vt.Vec3hArray)):
+            name = attribute.GetName()
+            if not attribute.HasValue():
+                return f"{path}: no {name}, so UsdSkel ignores the animation; author all three channels"
+            values = attribute.Get(Usd.TimeCode.EarliestTime())
+            if not isinstance(values, kind | None):
+                own, wanted = (Sdf.GetValueTypeNameForValue(each) for each in (values, kind()))
+                return f"{path}: its {name} are {own}, so UsdSkel ignores the animation; author {wanted}"
+        return None
 
     def _local(self, time_codes) -> np.ndarray:
         """Local joint transforms (T, J, 4, 4)."""

@@ -121,9 +121,8 @@ def no_points(path: str) -> str:
 
 def not_animated(rig: StageRig) -> str:
     """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with that one."""
-    animation = rig.source.animation
-    said = [] if animation is None else [note for note in rig.notes if note.startswith(f"{animation.GetPath()}: ")]
-    why = f" ({said[0].split(': ', 1)[1].split(';')[0]})" if said else ""
+    ignored = rig.source.ignored
+    why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
     return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
 
 

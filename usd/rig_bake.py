@@ -10,6 +10,7 @@ import numpy as np
 from pxr import UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
@@ -83,7 +84,7 @@ def bake_rig(
     Raises:
         NeuralocksError: shot, model or output cannot be used.
     """
-    out, shot = Path(out), Path(shot)
+    out, shot = as_path(out, "out"), as_path(shot, "shot")
     check_layer_name(out)
     if not 0 <= strength <= 2:
         raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
@@ -131,10 +132,8 @@ def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
     source, character, joints = hair.source.source, hair.source.character, hair.source.clip.joints
     if np.ptp(joints[:, character.head], axis=0).max() >= 1e-7:
         return []
-    prim = source.animation
-    ignored = [note for note in hair.source.notes if prim and note.startswith(f"{prim.GetPath()}: ")]
-    if ignored and not source.moves_joints:
-        raise NeuralocksError(ignored[0])
+    if source.ignored:
+        raise NeuralocksError(source.ignored)
     name = character.skeleton.names[character.head].rsplit("/", 1)[-1]
     turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
     if min(turned, np.abs(turns[..., 1:]).max()) < STILL:

@@ -2,7 +2,6 @@
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.finding import fits
 from neuralocks_core.rig.network import rig_spec
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
@@ -23,7 +23,7 @@ from .surface import find_skins, rest_primvar
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
-POSE_JOINTS = rig_spec().pose_joints
+RIG_JOINTS = rig_spec().pose_joints
 """Semantic joints that rig models read beside the head."""
 
 
@@ -119,7 +119,7 @@ def core_meshes(source: StageRig) -> list[SkinnedMesh]:
     ]
 
 
-def rigged_notes(source: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
+def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
     """What a user should know about a character with hair on joints.
 
     Args:
@@ -138,7 +138,7 @@ def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
     """
     joints = [hair.source.source.names[j] for j in hair.rig.chains.joints]
     for pattern in patterns or ():
-        if not any(fnmatchcase(name, pattern) or fnmatchcase(name.rsplit("/", 1)[-1], pattern) for name in joints):
+        if not any(fits(name, pattern) for name in joints):
             raise NeuralocksError(
                 f"--chains {pattern}: no joint of the hair has such a name; see neuralocks inspect for their names"
             )

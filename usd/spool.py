@@ -4,7 +4,6 @@
 import hashlib
 import json
 import os
-import shutil
 import uuid
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write, make_way, remove_empty
-from neuralocks_core.lock_file import locked
+from neuralocks_core.lock_file import FolderLock
 
 
 class Spool:
@@ -34,14 +33,11 @@ class Spool:
         self.folder = out.parent / f".{out.name}.baking"
         try:
             self._made = make_way(out)
-            self.folder.mkdir(exist_ok=True)
-            self._lock = locked(self.folder / "lock")
-        except BlockingIOError:
-            raise NeuralocksError(
-                f"{out}: another bake is writing it; wait for that one or choose another name"
-            ) from None
         except OSError as error:
             raise cannot_write(out, error) from None
+        self._lock = FolderLock(
+            self.folder, out, "another bake is writing it; wait for that one or choose another name"
+        )
         try:
             self._forget_others(fingerprint.encode())
         except OSError as error:
@@ -101,17 +97,13 @@ class Spool:
     def close(self) -> None:
         """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
         if any(self.folder.glob("*.frame")):
-            self._lock.close()
+            self._lock.release(remove=False)
         else:
             self.discard()
 
     def discard(self) -> None:
         """Remove the folder, and what was made on the way to an output that did not come."""
-        if os.name == "nt":
-            self._lock.close()  # Windows removes no open file
-        # Before the lock is given up: another bake that takes it would lose its own frames.
-        shutil.rmtree(self.folder, ignore_errors=True)
-        self._lock.close()
+        self._lock.release(remove=True)
         remove_empty(self._made)
 
     def _path(self, groom: int, time_code: float) -> Path:

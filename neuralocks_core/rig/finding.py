@@ -58,14 +58,15 @@ def find_chains(
     return measured_chains(character, sorted(tops), meshes)
 
 
+def fits(name: str, pattern: str) -> bool:
+    """Whether a joint's path, or its last part, is one that a pattern stands for."""
+    return fnmatch.fnmatchcase(name, pattern) or fnmatch.fnmatchcase(leaf(name), pattern)
+
+
 def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
     """First joints of the subtrees whose first joint matches."""
     names, parents = character.skeleton.names, character.skeleton.parents
-    hits = [
-        joint
-        for joint, name in enumerate(names)
-        if any(fnmatch.fnmatchcase(name, p) or fnmatch.fnmatchcase(leaf(name), p) for p in patterns)
-    ]
+    hits = [joint for joint, name in enumerate(names) if any(fits(name, pattern) for pattern in patterns)]
     if not hits:
         raise NoHairChains(
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"

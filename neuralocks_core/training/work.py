@@ -6,7 +6,6 @@ from __future__ import annotations
 import filecmp
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,16 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write, cannot_write
-from neuralocks_core.lock_file import locked
+from neuralocks_core.files import atomic_write
+from neuralocks_core.lock_file import FolderLock
 from neuralocks_core.training.rollouts import TrainingScene
 
 BEGINNING = "begin.neuralocks"
 """In the work folder: the model that a training begins with."""
 CODES = "codes.npz"
 """In the work folder: the strand autoencoder, where a training makes its own."""
-INPUTS, LOCK = "inputs.json", "lock"
-"""In the work folder: what its simulations were made of, and what the process holds that trains in it."""
+INPUTS = "inputs.json"
+"""In the work folder: what its simulations were made of."""
 
 
 def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
@@ -69,23 +68,11 @@ def claimed(work: Path) -> Iterator[None]:
     Raises:
         NeuralocksError: another training is at work in it, or it cannot be made.
     """
-    try:
-        work.mkdir(parents=True, exist_ok=True)
-        lock = locked(work / LOCK)
-    except BlockingIOError:
-        raise NeuralocksError(
-            f"{work}: another training is at work there; wait for that one, or choose another name"
-        ) from None
-    except OSError as error:
-        raise cannot_write(work, error) from None
+    lock = FolderLock(work, work, "another training is at work there; wait for that one, or choose another name")
     try:
         yield
     finally:
-        if os.name == "nt":
-            lock.close()  # Windows removes no open file
-        if work.is_dir() and [path.name for path in work.iterdir()] == [LOCK]:
-            shutil.rmtree(work, ignore_errors=True)
-        lock.close()
+        lock.release(remove=lock.alone)
 
 
 def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
@@ -116,12 +103,16 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
 
 def _inputs(scene: TrainingScene) -> dict:
     body, clips = scene.character.body, scene.clips
-    own = [] if body is None else [body.points, body.triangles, body.joint_weights, *body.shapes.values()]
+    own = (
+        []
+        if body is None
+        else [body.points, body.triangles, body.joint_indices, body.joint_weights, *body.shapes.values()]
+    )
     facts = {
         "seed": scene.seed,
         "character": _digest([scene.character.skeleton.bind, *own]),
         "groom": _digest([groom.rest for groom in scene.grooms]),
-        "motion": _digest([array for clip in clips for array in (clip.times, clip.joints)]),
+        "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),
     }
     return json.loads(json.dumps(facts))  # tuples become lists, as in the file
