@@ -78,7 +78,7 @@ def at_rest(context, *things):
 
 def carrier(thing, shown):
     """The armature that moves an object, or deforms it: the one that is `shown`, unless that does not and another does."""
-    moving = _reached(thing, set())
+    moving = armatures_of(thing)
     if not moving or shown in moving:
         return shown
     deforming = [modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object]
