@@ -2,6 +2,7 @@
 """What the scenarios share: hair made live, and its points as they are shown and as they are baked."""
 
 import os
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -42,6 +43,12 @@ def refused(call, *words):
         assert all(word in text for word in words), text
     else:
         raise AssertionError(f"not refused: {result}")
+
+
+def needs_usd():
+    """Ends the scenario where this Blender was built without USD, as Debian's is."""
+    if not getattr(bpy.app.build_options, "usd", False):
+        raise SkipTest("no USD in this Blender")
 
 
 def points_at(strands, frame, subframe=0.0):

@@ -1,27 +1,43 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run one scenario inside a Blender: `python tests/blender/run.py SCENARIO WORK_FOLDER`, with `bpy` importable."""
+r"""Run scenarios inside a Blender, one after another, as they come on standard input: NAME, a tab, and a work folder a line.
+
+Each begins with an empty file and the add-on enabled, and leaves it so; its outcome is then in its folder. By hand, with
+`bpy` importable: `printf 'posing\t/tmp/work' | python tests/blender/run.py; cat /tmp/work/outcome`.
+"""
 
 import importlib
 import sys
+import traceback
 from pathlib import Path
+from unittest import SkipTest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 
 def main() -> None:
-    """Raises when the scenario does not hold."""
+    """Returns at the end of standard input."""
     import bpy
 
+    import dcc_addon
     from tests.blender import scenarios, scenes
 
-    name, folder = sys.argv[-2], Path(sys.argv[-1])
-    folder.mkdir(parents=True, exist_ok=True)
-    import dcc_addon
-
     dcc_addon.register()
-    scenes.empty()
-    print(f"{name} in Blender {bpy.app.version_string}")
-    getattr(importlib.import_module(scenarios.modules()[name]), name)(folder)
+    modules = scenarios.modules()
+    print(f"Blender {bpy.app.version_string}", flush=True)
+    for line in sys.stdin:
+        name, folder = line.rstrip("\n").split("\t")
+        Path(folder).mkdir(parents=True)
+        try:
+            scenes.empty()
+            getattr(importlib.import_module(modules[name]), name)(Path(folder))
+            outcome, why = "held", ""
+        except SkipTest as reason:
+            outcome, why = "skipped", str(reason)
+        except Exception:
+            outcome, why = "failed", traceback.format_exc()
+        sys.stdout.flush()
+        (Path(folder) / "outcome.part").write_text(f"{outcome}\n{why}")
+        (Path(folder) / "outcome.part").rename(Path(folder) / "outcome")
 
 
 if __name__ == "__main__":

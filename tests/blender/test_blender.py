@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on in real Blenders, each scenario in its own process with a time limit.
+"""The add-on in real Blenders: one process for each, in which scenario follows scenario with a time limit, as an artist
+opens file after file; after one that fails comes a fresh process.
 
 The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a list, `4.5,5.0`) chooses others.
 """
@@ -7,6 +8,7 @@ The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a l
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -34,37 +36,73 @@ def _command(version: str) -> list[str]:
     if version == WINDOWED:
         if not shutil.which("blender"):
             pytest.skip("no blender program is installed")
-        return ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script, "--"]
+        return ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script]
     return [str(blenders.python_of(version)), script]
 
 
-@pytest.mark.parametrize("scenario", scenarios.modules())
+class _Blender:
+    """A running Blender that takes scenarios."""
+
+    def __init__(self, version: str, model: Path, folder: Path):
+        self.log, self.scenarios = folder / "log.txt", []
+        kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "BLENDER"))}
+        environment = kept | {
+            "NEURALOCKS_TEST_MODEL": str(model),
+            "OMP_NUM_THREADS": "1",
+            "BLENDER_USER_RESOURCES": str(folder),
+        }
+        if version == WINDOWED:
+            environment["PYTHONPATH"] = str(blenders.packages_of("4.2"))
+        with open(self.log, "wb") as log:
+            self.process = subprocess.Popen(
+                _command(version), stdin=subprocess.PIPE, stdout=log, stderr=log, env=environment, cwd=ROOT, text=True
+            )
+
+    def run(self, scenario: str, folder: Path) -> str:
+        """Empty where the scenario holds; else what went wrong. Raises pytest's skip where this Blender cannot do it."""
+        self.scenarios.append(scenario)
+        begun, limit = self.log.stat().st_size, SLOW.get(scenario, LIMIT)
+        until = time.monotonic() + limit
+        print(scenario, folder, sep="\t", file=self.process.stdin, flush=True)
+        while time.monotonic() < until:
+            gone = self.process.poll()
+            if (folder / "outcome").exists():
+                outcome, why = (folder / "outcome").read_text().split("\n", 1)
+            elif gone is not None:
+                outcome, why = "failed", f"Blender ended with status {gone}"
+            else:
+                time.sleep(0.02)
+                continue
+            if outcome == "skipped":
+                pytest.skip(why)
+            said = self.log.read_bytes()[begun:].decode(errors="replace")[-12000:]
+            return "" if outcome == "held" else f"{said}{why}\nIn this process: {', '.join(self.scenarios)}"
+        return f"did not end within {limit} s"
+
+    def leave(self) -> None:
+        """End it, whatever it does."""
+        self.process.kill()
+        self.process.communicate()
+
+
+@pytest.fixture(scope="module")
+def running():
+    """Running Blenders by version, ended when the tests are."""
+    found: dict[str, _Blender] = {}
+    yield found
+    for each in found.values():
+        each.leave()
+
+
 @pytest.mark.parametrize("version", _wanted())
-def test_scenario(version, scenario, random_model, tmp_path):
+@pytest.mark.parametrize("scenario", scenarios.modules())
+def test_scenario(version, scenario, running, random_model, tmp_path, tmp_path_factory):
     """Runs one scenario; its output is shown when it fails."""
     if scenario in SLOW and not os.environ.get("NEURALOCKS_SLOW"):
         pytest.skip("takes minutes; set NEURALOCKS_SLOW=1")
-    limit = SLOW.get(scenario, LIMIT)
-    command = _command(version)
-    resources = tmp_path / "resources"
-    resources.mkdir()
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "BLENDER"))}
-    environment = kept | {
-        "NEURALOCKS_TEST_MODEL": str(random_model),
-        "OMP_NUM_THREADS": "1",
-        "BLENDER_USER_RESOURCES": str(resources),
-    }
-    if version == WINDOWED:
-        environment["PYTHONPATH"] = str(blenders.packages_of("4.2"))
-    try:
-        done = subprocess.run(
-            [*command, scenario, str(tmp_path / "work")],
-            env=environment,
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            timeout=limit,
-        )
-    except subprocess.TimeoutExpired:
-        pytest.fail(f"{scenario} in Blender {version} did not end within {limit} s")
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
+    if version not in running:
+        running[version] = _Blender(version, random_model, tmp_path_factory.mktemp("blender"))
+    wrong = running[version].run(scenario, tmp_path / "work")
+    if wrong:
+        running.pop(version).leave()
+        pytest.fail(wrong)

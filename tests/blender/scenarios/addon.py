@@ -29,6 +29,7 @@ def lifecycle(folder: Path) -> None:
     assert len(own_handlers()) == before
     dcc_addon.unregister()
     assert not own_handlers()
+    dcc_addon.register()
 
 
 def _menu_entries() -> list:

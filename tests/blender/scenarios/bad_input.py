@@ -2,6 +2,7 @@
 """What cannot work is refused in plain words."""
 
 from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -189,17 +190,15 @@ def _deleted(rig, skin, strands, other) -> None:
 
 def new_folder(folder: Path) -> None:
     """A bake makes the folders that are missing below one that its user may write to, and no others."""
-    import os
-
     rig = scenes.armature()
     strands = scenes.hair(rig, 10)
     bpy.context.scene.neuralocks.armature, strands.neuralocks_hair.model = rig, MODEL
-    os.access = lambda path, mode: Path(path).is_relative_to(folder)  # as for anybody but root
-    assert bpy.ops.neuralocks.bake(filepath=str(folder / "new" / "deeper" / "bake.usdc")) == {"FINISHED"}
-    assert (folder / "new" / "deeper" / "bake.usdc").exists()
-    elsewhere = str(folder.parent / "other" / "bake.usdc")
-    for write in (bpy.ops.neuralocks.bake, bpy.ops.neuralocks.export_skel):
-        refused(lambda write=write: write(filepath=elsewhere), "cannot be written")
+    with patch("os.access", lambda path, mode: Path(path).is_relative_to(folder)):  # as for anybody but root
+        assert bpy.ops.neuralocks.bake(filepath=str(folder / "new" / "deeper" / "bake.usdc")) == {"FINISHED"}
+        assert (folder / "new" / "deeper" / "bake.usdc").exists()
+        elsewhere = str(folder.parent / "other" / "bake.usdc")
+        for write in (bpy.ops.neuralocks.bake, bpy.ops.neuralocks.export_skel):
+            refused(lambda write=write: write(filepath=elsewhere), "cannot be written")
 
 
 def not_ours(folder: Path) -> None:

@@ -3,6 +3,7 @@
 
 import time
 from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 
@@ -70,19 +71,26 @@ def prepared_once(_folder: Path) -> None:
 
 def prepared_beside(_folder: Path) -> None:
     """In a window a thread prepares the hair: at rest until then, as ever afterwards; Live cancels; a render waits."""
-    from dcc_addon import live, live_strands, preparing, properties
-    from dcc_addon.session import session
-
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 1500)
-    own = strands.neuralocks_hair
     make_live(rig, strands)
     shown = points_at(strands, 9)
-    own.live = False
+    strands.neuralocks_hair.live = False
     groomed = points_at(strands, 9)
-    live_strands.at_once = lambda graph: graph.mode == "RENDER"
-    properties.by_script = lambda context: False
+    with (
+        patch("dcc_addon.live_strands.at_once", lambda graph: graph.mode == "RENDER"),
+        patch("dcc_addon.properties.by_script", lambda context: False),
+    ):
+        _in_a_window(strands, shown, groomed)
+
+
+def _in_a_window(strands, shown, groomed) -> None:
+    """Live hair is switched on and off while it is prepared."""
+    from dcc_addon import live, preparing
+    from dcc_addon.session import session
+
+    own = strands.neuralocks_hair
 
     def finish():
         while preparing.look() is not None:
@@ -179,6 +187,7 @@ def prepared_together(_folder: Path) -> None:
     assert "KeyError" in messages()["Three"] and not session.preparing
 
 
+@patch("dcc_addon.background.SLICE", 0.0)
 def sampled_beside(_folder: Path) -> None:
     """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is mended."""
     from dcc_addon import background
@@ -200,10 +209,9 @@ def sampled_beside(_folder: Path) -> None:
         yield 1, 2
         raise KeyError("a bone")
 
-    working, background.sample = background.sample, broken
-    sample()
+    with patch.object(background, "sample", broken):
+        sample()
     assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
-    background.sample = working
     sample()
     assert session.rigs["Rig"].stale, "what has failed is not tried again and again"
 
@@ -222,13 +230,13 @@ def sampled_beside(_folder: Path) -> None:
         for frame in (4, 5):
             bpy.context.scene.frame_set(frame)
             bpy.ops.ed.undo_push(message="another frame")
-        background.SLICE, session.rigs["Rig"].stale = 0.0, True
+        session.rigs["Rig"].stale = True
         background.look()
         bpy.ops.ed.undo()
         sample()
         assert not messages() and not session.rigs["Rig"].stale, messages()
 
-    background.SLICE, session.rigs["Rig"].stale, scene = 0.0, True, bpy.context.scene
+    session.rigs["Rig"].stale, scene = True, bpy.context.scene
     background.look()
     assert session.sampling is not None
     bpy.context.window.scene = bpy.data.scenes.new("Other")

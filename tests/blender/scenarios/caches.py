@@ -8,16 +8,14 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, make_live, messages, points_at
+from tests.blender.checks import SAME, apart, make_live, messages, needs_usd, points_at
 
 
 def attached_again(folder: Path) -> None:
     """Attached hair is saved, opened elsewhere, attached anew with another look, when its files are gone, and freed of
     its cache.
     """
-    if not getattr(bpy.app.build_options, "usd", True):
-        print("no USD in this Blender")
-        return
+    needs_usd()
     operators, here = bpy.ops.neuralocks, folder / "here"
     rig = scenes.armature()
     scenes.dance(rig)
@@ -62,9 +60,7 @@ def taken_off(folder: Path) -> None:
     """A cache plays the frames that were baked where time is stretched, too; when it is taken off, be it while live is on,
     the hair follows its surface as before.
     """
-    if not getattr(bpy.app.build_options, "usd", True):
-        print("no USD in this Blender")
-        return
+    needs_usd()
     operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
 
 
 def one_result(folder: Path) -> None:
@@ -151,9 +151,7 @@ def other_frames(folder: Path) -> None:
 
 def blender_export(folder: Path) -> None:
     """A bake of the scene as Blender itself exports it equals the live view."""
-    if not hasattr(bpy.ops.wm, "usd_export") or not getattr(bpy.app.build_options, "usd", False):
-        print("no USD in this Blender")
-        return
+    needs_usd()
     rig = scenes.armature()
     scenes.body(rig)
     scenes.dance(rig)
@@ -181,9 +179,7 @@ def attached(folder: Path) -> None:
     """Bake and Attach: the cache on each hair object shows what was live, without the add-on."""
     import dcc_addon
 
-    if not getattr(bpy.app.build_options, "usd", False):
-        print("no USD in this Blender")
-        return
+    needs_usd()
     rig = scenes.armature()
     scenes.dance(rig)
     strands, fringe = scenes.hair(rig, 40), scenes.hair(rig, 20, name="Fringe.L")
@@ -206,6 +202,7 @@ def attached(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(folder / "farm.blend"))
     for f, points in shown.items():
         assert apart(points_at(bpy.data.objects["Hair"], f), points) < SAME
+    dcc_addon.register()
 
 
 def scaled_head(folder: Path) -> None:

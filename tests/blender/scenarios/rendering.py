@@ -4,6 +4,7 @@
 import io
 from contextlib import redirect_stdout
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -149,7 +150,7 @@ def motion_blur(folder: Path) -> None:
     is left on it afterwards, nor in a file that is saved meanwhile.
     """
     if bpy.app.version < (4, 0):
-        return
+        raise SkipTest("between frames, hair in this Blender's renders is millimetres off")
     rig = scenes.armature()
     scenes.dance(rig)
     strands, plain, scene = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Plain"), bpy.context.scene
