@@ -8,10 +8,8 @@ from pathlib import Path
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 
-try:
-    import fcntl
-except ImportError:  # Windows: two at a time are then not told apart
-    fcntl = None
+TRIES = 100
+"""How often a folder that others remove is made anew before it counts as theirs."""
 
 
 class FolderLock:
@@ -29,17 +27,16 @@ class FolderLock:
     def __init__(self, folder: Path, subject: Path, busy: str):
         self.folder, self._lock = folder, None
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = open(folder / "lock", "a+")
-            if fcntl is not None:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for _ in range(TRIES):
+                folder.mkdir(parents=True, exist_ok=True)
+                self._lock = _taken(folder / "lock")
+                if self._lock is not None:
+                    return
         except BlockingIOError:
-            self._lock.close()
-            raise NeuralocksError(f"{subject}: {busy}") from None
+            pass
         except OSError as error:
-            if self._lock is not None:
-                self._lock.close()
             raise cannot_write(subject, error) from None
+        raise NeuralocksError(f"{subject}: {busy}")
 
     @property
     def alone(self) -> bool:
@@ -54,3 +51,40 @@ class FolderLock:
             # Before the lock is given up: another process that takes it would lose what is its own.
             shutil.rmtree(self.folder, ignore_errors=True)
         self._lock.close()
+
+
+def _taken(path: Path):
+    """The locked file; None where whoever had it before has just removed it. Raises BlockingIOError where it is held."""
+    try:
+        lock = open(path, "a+")
+    except FileNotFoundError:
+        return None
+    try:
+        _lock(lock)
+        # Who opens the file before it is removed, and locks it after, holds what others no longer see.
+        if os.path.samestat(os.fstat(lock.fileno()), os.stat(path)):
+            return lock
+    except FileNotFoundError:
+        pass
+    except BaseException:
+        lock.close()
+        raise
+    lock.close()
+    return None
+
+
+if os.name == "nt":
+    import msvcrt
+
+    def _lock(file) -> None:
+        file.seek(0)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except PermissionError as error:
+            raise BlockingIOError from error
+
+else:
+    import fcntl
+
+    def _lock(file) -> None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

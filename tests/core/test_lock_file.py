@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One process at a time in a folder."""
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.lock_file import FolderLock
+
+
+def test_second_is_refused(tmp_path):
+    """While it is held, and not afterwards; what is in it stays unless it is to go."""
+    folder = tmp_path / "work"
+    first = FolderLock(folder, folder, "busy")
+    (folder / "kept").touch()
+    with pytest.raises(NeuralocksError, match="busy"):
+        FolderLock(folder, folder, "busy")
+    first.release(remove=False)
+    second = FolderLock(folder, folder, "busy")
+    assert (folder / "kept").exists() and not second.alone
+    second.release(remove=True)
+    assert not folder.exists()
+
+
+def test_removed_while_it_is_opened(tmp_path, monkeypatch):
+    """Who waits at the door while the folder is removed holds the one that is made anew, not the one that is gone."""
+    folder = tmp_path / "work"
+    first = FolderLock(folder, folder, "busy")
+    fcntl = pytest.importorskip("fcntl")
+    lock, holders = fcntl.flock, [first]
+
+    def left_in_between(*arguments):
+        if holders:
+            holders.pop().release(remove=True)
+        lock(*arguments)
+
+    monkeypatch.setattr(fcntl, "flock", left_in_between)
+    second = FolderLock(folder, folder, "busy")
+    with pytest.raises(NeuralocksError, match="busy"):
+        FolderLock(folder, folder, "busy")
+    second.release(remove=True)
+
+
+def test_no_folder_can_be_made(tmp_path):
+    """The message names what the caller is about."""
+    (tmp_path / "file").touch()
+    with pytest.raises(NeuralocksError, match="hair.usdc"):
+        FolderLock(tmp_path / "file", tmp_path / "hair.usdc", "busy")
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "lock").symlink_to(tmp_path / "nowhere" / "lock")
+    with pytest.raises(NeuralocksError, match="busy"):
+        FolderLock(tmp_path / "work", tmp_path / "work", "busy")
