@@ -8,13 +8,13 @@ import numpy as np
 from pxr import Usd, UsdSkel
 from scipy.spatial import cKDTree
 
-from neuralocks_core.character import Character, Skeleton, sizes_shown
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.cuts import find_cuts
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
-from neuralocks_core.rotation import sizes
 
+from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
 from .border import Border, transformed
 from .joints import JointSource
@@ -142,7 +142,7 @@ def read_rig(
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
     humanoid = _humanoid(source, by_hand)
-    to_bind = _to_bind(source, border, posed, humanoid)
+    to_bind = to_bind_world(source, border, posed, humanoid)
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
     knots = knot_weights([mesh.shapes for mesh in meshes])
@@ -230,38 +230,3 @@ def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
         return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
     except NeuralocksError as error:
         raise NeuralocksError(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
-
-
-def _to_bind(source: JointSource, border: Border, posed: np.ndarray, humanoid: Humanoid) -> np.ndarray:
-    """Authored bind space to bind world [m], (4, 4).
-
-    Bind transforms are meant in world space, yet skinning takes them as the skeleton's own space, and files of both
-    kinds exist. They differ where the skeleton's parents scale or turn. The size is taken from what skinning makes of
-    the head, so that the head carries the groom without scaling; the axes are those in which the character
-    stands upright.
-    """
-    placed = source.placement.reference[:3, :3]
-    if np.linalg.det(placed) < 0:
-        raise NeuralocksError(
-            f"{source.path}: its root is mirrored (negative scale); apply or remove the negative scale"
-        )
-    head = humanoid.get("head", 0)
-    shown = sizes_shown(posed[:, head], source.bind[head])
-    if (shown < 0).any():
-        raise NeuralocksError(
-            f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
-            "apply or remove the negative scale"
-        )
-    wanted, own = np.median(shown), sizes(placed)
-    ratio = wanted / own
-    if abs(ratio - 1) < 1e-4:
-        ratio = 1.0
-    result = np.eye(4)
-    result[:3, :3] = placed * ratio
-    below = humanoid.get("hips", 0)
-    up = border.to_core[:3, :3] @ result[:3, :3] @ (source.bind[head, :3, 3] - source.bind[below, :3, 3])
-    if below != head and up[1] < 0.5 * np.linalg.norm(up):
-        plain = border.to_core[:3, :3] @ (source.bind[head, :3, 3] - source.bind[below, :3, 3])
-        if plain[1] > 0.7 * np.linalg.norm(plain):
-            result[:3, :3] = np.eye(3) * wanted
-    return border.to_core @ result

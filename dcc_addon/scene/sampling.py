@@ -161,9 +161,13 @@ class _Recording:
             raise hidden(armature)
         if not row:
             self.reader = armature_reader.PoseReader(armature, self._rig.bones)
-            self._bind = armature_reader.matrix(evaluated.matrix_world) @ self._rig.rest
+            here = armature_reader.matrix(evaluated.matrix_world)
+            self._place = rig_service.stood_up(self._rig, here)
+            self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
-            self._binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
+            binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
+            up = np.eye(4) if np.array_equal(self._place, here) else self._place @ np.linalg.inv(here)
+            self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
         self._joints[row % BLOCK] = self.reader.world(evaluated)
@@ -202,8 +206,8 @@ class _Recording:
             own = rig_service.on_head(places[other], places[""], self._heads, self._bind[self._head])
             binds[other] = binds[other] if own is None else own
         arrays = [(body_reader.read(find(body), armature), binds[body]) for body in self._bodies]
-        metres = self._unit * rig_service.size_shown(rig, places[""][0], self._shown)
-        character = rig_service.character(rig, places[""][0], arrays, metres)
+        metres = self._unit * rig_service.size_shown(rig, self._place, self._shown)
+        character = rig_service.character(rig, self._place, arrays, metres)
         clip = Clip(motion.times, self._world, motion.shape, armature.neuralocks_character.loop)
         clip = replace(clip, cuts=find_cuts(clip, character.head))
         before = session.rigs.get(self.name)

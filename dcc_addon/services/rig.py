@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.humanoid import find_humanoid
 from neuralocks_core.mesh import inside_out
+from neuralocks_core.standing import standing
 
 from . import names
 from .axes import to_core, transformed
@@ -115,8 +116,8 @@ def character(
 
     Args:
         rig: the armature at rest.
-        place: world transform (4, 4) of the armature object at the first sampled frame.
-        bodies: skinned meshes, each with its world transform at that frame; together they are the body.
+        place: world transform (4, 4) of the armature object in the bind pose, as `stood_up` gives it.
+        bodies: skinned meshes, each with its world transform in the bind pose; together they are the body.
         metres: of one unit of this bind pose; see `SampledRig.bind_metres`.
     """
     core = to_core(metres)
@@ -162,6 +163,14 @@ def on_head(places: np.ndarray, objects: np.ndarray, heads: np.ndarray, bind: np
     if np.ptp(by_object, axis=0).max() <= still or np.ptp(by_head, axis=0).max() > still:
         return None
     return bind @ by_head[0]
+
+
+def stood_up(rig: RigArrays, place: np.ndarray) -> np.ndarray:
+    """Where an armature object that stands at `place` (4, 4) stands in the bind pose: there, without leaning."""
+    similar(place, rig.name)  # or what cannot be used would have no name
+    result = np.array(place, float)
+    result[:3, :3] = standing(result[:3, :3], rig.rest[:, :3, 3], rig.humanoid(), np.array([0.0, 0.0, 1.0]))
+    return result
 
 
 def bind_world(rig: RigArrays, place: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
@@ -157,20 +158,51 @@ def blender_export(folder: Path) -> None:
     scenes.dance(rig)
     strands = scenes.hair(rig, 40)
     make_live(rig, strands)
+    _equal_when_exported(folder, strands)
+
+
+def leaning(folder: Path) -> None:
+    """Whether an armature object leans or its hips do, the hair is the same, live, baked and by Blender's own export."""
+    shown = []
+    for joint in (False, True):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        if joint:
+            hips, lean = rig.pose.bones["hips"], Matrix.Rotation(0.4, 4, "X")
+            hips.matrix_basis = hips.bone.matrix_local.inverted() @ lean @ hips.bone.matrix_local
+        else:
+            rig.rotation_euler.x = 0.4
+        strands = scenes.hair(rig, 40)
+        make_live(rig, strands, resolve=False)
+        shown.append({f: points_at(strands, f) for f in (2, 13, 24)})
+        out = folder / f"baked_{joint}.usdc"
+        assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
+        for f, points in shown[-1].items():
+            assert apart(baked_points(out, "/Character/Hair_Hair", f), points) < SAME
+        if getattr(bpy.app.build_options, "usd", False):
+            _equal_when_exported(folder, strands, resolve=False)
+    for f, points in shown[0].items():
+        assert apart(points, shown[1][f]) < SAME
+    assert not messages(), messages()
+
+
+def _equal_when_exported(folder: Path, strands, **options) -> None:
+    """A bake of the scene as Blender itself exports it shows what is live."""
+    from pxr import Usd, UsdGeom
+
+    from usd.bake import bake
+
     shown = {f: points_at(strands, f) for f in (2, 13, 24)}
     strands.neuralocks_hair.live = False
     bpy.context.scene.frame_set(1)
     shot = folder / "scene.usdc"
     bpy.ops.wm.usd_export(filepath=str(shot), export_animation=True, export_armatures=True, export_materials=False)
-    from pxr import Usd, UsdGeom
-
-    from usd.bake import bake
-
-    bake(shot, folder / "baked.usdc", MODEL)
-    stage = Usd.Stage.Open(str(folder / "baked.usdc"))
+    bake(shot, folder / "exported.usdc", MODEL, **options)
+    stage = Usd.Stage.Open(str(folder / "exported.usdc"))
     prim = next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves))
     for f, points in shown.items():
-        gap = apart(baked_points(folder / "baked.usdc", str(prim.GetPath()), f), points)
+        gap = apart(baked_points(folder / "exported.usdc", str(prim.GetPath()), f), points)
         print(f, gap)
         assert gap < SAME
 
