@@ -76,14 +76,23 @@ def _words(name: str) -> list[str]:
 
 
 def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str]]:
-    """The words of each joint without those that nearly all begin with: in USD a namespace's colon is an underscore
-    (`Character1_LeftArm`).
-    """
-    while True:
-        first, count = Counter(words[0] for words in names if words).most_common(1)[0] if any(names) else ("", 0)
-        if count < max(SHARED * len(names), 4) or first in _SIDES or first in meant | _TRUNK:
-            return names
+    """The words of each joint without a namespace's, whose colon is an underscore in USD (`Character1_LeftArm`)."""
+    while any(names):
+        first, _ = Counter(words[0] for words in names if words).most_common(1)[0]
+        if first in _SIDES or first in meant | _TRUNK or not _is_namespace(first, names):
+            break
         names = [words[1:] if words[:1] == [first] else words for words in names]
+    return names
+
+
+def _is_namespace(first: str, names: list[list[str]]) -> bool:
+    """Whether nearly all joints begin with this word, or the trunk does: the only head, and with it a neck or spine."""
+    within = [words for words in names if words[:1] == [first]]
+    if len(within) < 4:
+        return False
+    heads = [words for words in names if words[-1:] == ["head"]]
+    trunk = len(heads) == 1 and heads[0] in within and any({"neck", "spine"} & set(words) for words in within)
+    return trunk or len(within) >= SHARED * len(names)
 
 
 def _side_and_key(words: list[str]) -> tuple[str, str]:

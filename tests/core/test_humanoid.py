@@ -76,6 +76,12 @@ RIGS = {
             "upper_chest": "hero_rig_Character1_Spine1",
         },
     ),
+    "a namespace, and joints of a face without it": (
+        "Character1_Hips\n Character1_Spine\n  Character1_Neck\n   Character1_Head\n    jaw\n    eye_L\n    eye_R\n"
+        "    tongue_1\n  Character1_LeftShoulder\n   Character1_LeftArm\n  Character1_RightShoulder\n"
+        "   Character1_RightArm",
+        {"head": "Character1_Head", "left_upper_arm": "Character1_LeftArm", "left_eye": "eye_L"},
+    ),
     "AutoRig Pro": (
         "root_x\n spine_01_x\n  spine_03_x\n   neck_x\n    head_x\n   shoulder_l\n    arm_stretch_l\n     forearm_stretch_l\n"
         "   shoulder_r\n    arm_stretch_r",
