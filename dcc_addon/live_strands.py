@@ -18,6 +18,7 @@ from .scene.layers import graph_of, layer_of
 from .scene.lookup import find, identity
 from .scene.placing import mute_deformers, unmute_deformers, world
 from .scene.sampling import shown_frame
+from .scene.watched import evaluated_for_itself
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
@@ -91,8 +92,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
 
 def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:
     """Whether the hair object, which is at `place`, or a body has been moved since the motion was sampled."""
-    now = {hair.name_full: place}
-    now |= {body.name_full: world(body, graph) for name in sampled.bodies if (body := find(name)) is not None}
+    things = [hair, *(body for name in sampled.bodies if (body := find(name)) is not None)]
+    now = {o.name_full: place if o == hair else world(o, graph) for o in things if evaluated_for_itself(o, graph)}
     places = sampled.motion.places
     return any(np.abs(at - places[name][row]).max() > TOLERANCE for name, at in now.items() if name in places)
 

@@ -69,6 +69,8 @@ class Session:
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""
+    watched: set[str] = field(default_factory=set)
+    """Objects that Blender evaluates although they are hidden; see `scene.watched`."""
     working: str = ""
     """Name of the operator that is at work over several slices."""
     sampling: float | None = None

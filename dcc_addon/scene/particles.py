@@ -57,7 +57,7 @@ def convert(context, source, system, children: bool = True):
     Raises:
         NeuralocksError: the system has no hair.
     """
-    settings = system.settings
+    settings, render = system.settings, context.scene.render
     if settings.type != "HAIR":
         raise NeuralocksError(f"{source.name}: '{system.name}' emits particles; choose a system of type Hair")
     shown = next(m for m in source.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
@@ -67,6 +67,7 @@ def convert(context, source, system, children: bool = True):
         _changed(shown, show_viewport=True),
         _changed(system, use_hair_dynamics=False),  # a simulation of its own is no groom
         _changed(settings, **_rendered(settings, children)),
+        _changed(render, simplify_child_particles=render.simplify_child_particles_render),
     ):
         evaluated = source.evaluated_get(context.evaluated_depsgraph_get())
         counts, points = _keys(evaluated, system.name)
@@ -101,9 +102,9 @@ def _material(source, settings):
 
 
 def _rendered(settings, children: bool) -> dict[str, int]:
-    """Settings with which the viewport has all children that a render has."""
+    """Settings with which the viewport has all hair that a render has, with its children if these are wanted."""
     if not children:
-        return {}
+        return {"display_percentage": 100}
     number = "child_percent" if hasattr(settings, "child_percent") else "child_nbr"
     return {
         number: settings.rendered_child_count,

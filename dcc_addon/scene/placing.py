@@ -6,17 +6,18 @@ import json
 import numpy as np
 
 from .armature import matrix
+from .watched import evaluated_for_itself
 
 MOVERS = {"GeometryNodeDeformCurvesOnSurface", "GeometryNodeXPBDSolver"}
 """Nodes at the heart of the modifiers that Blender puts on new hair, Surface Deform and since 5.2 Hair Dynamics."""
 
 
 def world(thing, graph) -> np.ndarray:
-    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded is not evaluated: its place
-    then comes from its parent's.
+    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded Blender may leave where it was in
+    another frame, without telling: its place then comes from its parent's, where nothing else moves it.
     """
-    evaluated = thing.evaluated_get(graph)
-    if evaluated.is_evaluated and not _left_out(thing, graph):
+    evaluated, plain = thing.evaluated_get(graph), not len(thing.constraints) and thing.animation_data is None
+    if evaluated.is_evaluated and (evaluated_for_itself(thing, graph) or not plain):
         return matrix(evaluated.matrix_world)
     own, parent = matrix(thing.matrix_basis), thing.parent
     if parent is None:
@@ -29,16 +30,6 @@ def world(thing, graph) -> np.ndarray:
         tail[1, 3] = bone.bone.length
         place = place @ matrix(bone.matrix) @ tail
     return place @ matrix(thing.matrix_parent_inverse) @ own
-
-
-def _left_out(thing, graph) -> bool:
-    """Whether an object is hidden such that Blender may leave it where it was in another frame, without telling; by the
-    eye in the outliner it is hidden from view only.
-    """
-    if graph.mode == "RENDER" or len(thing.constraints) or thing.animation_data is not None:
-        return False
-    layer = graph.view_layer
-    return not thing.hide_get(view_layer=layer) and not thing.visible_get(view_layer=layer)
 
 
 def mute_deformers(hair, kept: str = "muted") -> None:

@@ -25,6 +25,7 @@ from .lookup import find, named
 from .placing import world
 from .rigging import posture, rigging
 from .unkeyed import Unkeyed
+from .watched import watched
 
 BLOCK = 16
 """Frames whose poses are made channels together: each then costs little, and all of them less than a slice of work."""
@@ -143,13 +144,14 @@ class _Recording:
         """
         frame = self.frames[row]
         whole = int(np.floor(frame + 1e-6))
-        self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
         armature = named(self.name)
         layer = layer_of(armature, self._scene)
         if layer is None:
             raise hidden(armature)
-        with working_in(self._scene, layer):
-            self._read(row, armature)
+        with watched(self._scene, layer, [named(name) for name in self._tracked]):
+            self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+            with working_in(self._scene, layer):
+                self._read(row, named(self.name))
         if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
             self._store(row - row % BLOCK, row + 1)
 

@@ -44,8 +44,8 @@ def particles(_folder: Path) -> None:
 
 
 def particle_systems(_folder: Path) -> None:
-    """Of several particle systems one after the other is converted, with its children as they are rendered; what emits no
-    hair is passed over.
+    """Of several particle systems one after the other is converted, whole and with its children as they are rendered,
+    however few of them the viewport shows; what emits no hair is passed over.
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
     ball, scene, convert = bpy.context.active_object, bpy.context.scene, bpy.ops.neuralocks.from_particles
@@ -56,12 +56,16 @@ def particle_systems(_folder: Path) -> None:
         settings = ball.particle_systems[-1].settings
         settings.count, settings.hair_length = 10, 0.2
         settings.type = "EMITTER" if name == "Dust" else "HAIR"
+        settings.display_percentage = 20
     settings.child_type, settings.rendered_child_count, settings.display_percentage = "SIMPLE", 3, 50
+    scene.render.use_simplify, scene.render.simplify_child_particles = True, 0.3
     ball.modifiers["Long"].show_viewport = False  # to work faster; it is rendered
     ball.particle_systems.active_index = 0
     bpy.context.view_layer.update()
     assert convert() == {"FINISHED"}
     assert scene.neuralocks.hair.name == "Long Hair" and len(scene.neuralocks.hair.data.curves) == 10
+    keys = scenes.points(scene.neuralocks.hair).reshape(10, -1, 3)
+    assert np.linalg.norm(keys[:, -1] - keys[:, 0], axis=1).min() > 0.1
     assert convert() == {"FINISHED"}
     found = scene.neuralocks.hair
     points = scenes.points(found)
@@ -69,6 +73,7 @@ def particle_systems(_folder: Path) -> None:
     roots = points[[curve.points[0].index for curve in found.data.curves]]
     tips = points[[curve.points[len(curve.points) - 1].index for curve in found.data.curves]]
     assert 0.1 < np.linalg.norm(tips - roots, axis=1).min() and np.abs(points - [0, 0, 1.6]).max() < 0.6
+    assert scene.render.simplify_child_particles == np.float32(0.3)
     assert settings.display_percentage == 50 and [m.show_render for m in ball.modifiers] == [True, True, False, False]
     refused(convert, "no object of this scene", "type Hair")
     refused(lambda: convert(system="Dust"), "emits particles")

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair and bodies that are not in view while the motion is sampled."""
+
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at
+
+
+def hidden_hair(folder: Path) -> None:
+    """Hair that hangs in whatever way is baked where it would be shown, in an excluded collection or disabled."""
+    for number, hang in enumerate((_child_of, _keyed, _vertex)):
+        shown = _baked(folder / f"{number}_shown.usdc", hang, lambda strands: None)
+        for way, hide in (("disabled", _disable), ("excluded", _exclude)):
+            here = _baked(folder / f"{number}_{way}.usdc", hang, hide)
+            assert all(apart(here[f], shown[f]) < SAME for f in shown), (hang.__name__, way)
+
+
+def swapped_in(_folder: Path) -> None:
+    """Hair and body whose visibility is keyed, hidden at the first frame, move as if they were shown throughout."""
+    found = []
+    for keyed in (False, True):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        skin, strands = scenes.body(rig), scenes.hair(rig, 20)
+        skin.shape_key_add(name="Basis")
+        wide = skin.shape_key_add(name="wide")
+        for point in wide.data:
+            point.co.x *= 1.4
+        for frame, value in ((1, 0.0), (24, 1.0)):
+            wide.value = value
+            wide.keyframe_insert("value", frame=frame)
+        for thing in (skin, strands) if keyed else ():
+            for frame, off in ((1, True), (8, False)):
+                thing.hide_viewport = off
+                thing.keyframe_insert("hide_viewport", frame=frame)
+        make_live(rig, strands)
+        found.append([points_at(strands, frame) for frame in (9, 20)])
+        assert not messages(), messages()
+        assert len(bpy.data.objects) == 3
+    for one, other in zip(*found, strict=True):
+        assert apart(one, other) < SAME
+
+
+def _baked(out: Path, hang, hide) -> dict:
+    """Points by frame of hair that hangs and is hidden in some way."""
+    scenes.empty()
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    hang(rig, strands)
+    bpy.context.scene.frame_set(7)
+    hide(strands)
+    bpy.context.scene.neuralocks.armature = rig
+    make_live(rig, strands)
+    strands.neuralocks_hair.live = False
+    assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
+    return {frame: baked_points(out, "/Character/Hair_Hair", frame) for frame in (1, 9, 20)}
+
+
+def _child_of(rig, strands) -> None:
+    strands.parent = None
+    held = strands.constraints.new("CHILD_OF")
+    held.target, held.subtarget = rig, "head"
+
+
+def _keyed(_rig, strands) -> None:
+    for frame in (1, 12, 24):
+        strands.location = (0, 0.1 if frame == 12 else 0, 0)
+        strands.keyframe_insert("location", frame=frame)
+
+
+def _vertex(rig, strands) -> None:
+    strands.parent = scenes.body(rig)
+    strands.parent_type = "VERTEX"
+
+
+def _disable(strands) -> None:
+    strands.hide_viewport = True
+
+
+def _exclude(strands) -> None:
+    scene = bpy.context.scene
+    own = bpy.data.collections.new("Hair")
+    scene.collection.children.link(own)
+    own.objects.link(strands)
+    scene.collection.objects.unlink(strands)
+    bpy.context.view_layer.layer_collection.children["Hair"].exclude = True
