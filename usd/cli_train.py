@@ -41,7 +41,8 @@ def train_command(
         ),
     ] = "rollouts",
     paper: Annotated[
-        bool, typer.Option("--paper", help="With selfsupervised, the paper's choice wherever it states one.")
+        bool,
+        typer.Option("--paper", help="With selfsupervised, the paper's network, bending, adhesion and damping."),
     ] = False,
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; a wrong name lists them.")

@@ -70,7 +70,9 @@ class SelfSupervisedOptions:
 
     @classmethod
     def paper(cls, **changes) -> SelfSupervisedOptions:
-        """The paper's choices wherever it states them, `changes` on top."""
+        """The paper's choices of network, inertia, bending, adhesion, damping and materials, `changes` on top;
+        `docs/deviations.md` lists what else differs.
+        """
         settings = {
             "output": "displacement",
             "undetached": 0.0,

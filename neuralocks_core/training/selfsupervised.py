@@ -2,8 +2,8 @@
 """The paper's own training: a network that minimises the physics of random moments, without any simulation.
 
 Three consecutive frames are predicted; the last is penalised, the two before give its inertia (paper section 3.4.5).
-Every choice of the paper is there, `SelfSupervisedOptions.paper` has them together; the defaults are what keeps the
-iteration stable and the hair moving. `docs/deviations.md` says why.
+`SelfSupervisedOptions.paper` has the paper's choices of network, bending, adhesion and damping together; the defaults
+are what keeps the iteration stable and the hair moving. `docs/deviations.md` lists the other differences, and says why.
 """
 
 from __future__ import annotations
