@@ -144,6 +144,8 @@ class BoundarySampler:
     """
     SPIN_LIMIT = 25.0
     """Largest angular velocity that is passed on [rad/s]."""
+    SPEED_LIMIT = 25.0
+    """Largest velocity of the head that is passed on [m/s]."""
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         self.spec, self.character, self.clip = spec, character, clip
@@ -233,7 +235,7 @@ class BoundarySampler:
             columns.append(_limited(felt - static[:, None], self.GRAVITY_LIMIT))
         elif spec.linear == "velocity":
             velocity = (position[:, :-2] - position[:, 1:-1]) / spec.dt
-            columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, velocity), self.SPIN_LIMIT))
+            columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, velocity), self.SPEED_LIMIT))
         for joint in (0, 1)[: 1 + spec.chest]:
             step = turns[:, :-2, joint] @ np.swapaxes(turns[:, 1:-1, joint], -1, -2)
             spin = rotation.to_vector(step) / spec.dt

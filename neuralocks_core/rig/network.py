@@ -206,8 +206,9 @@ def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray)
 
 def input_limits(spec: BoundarySpec) -> np.ndarray:
     """Largest sensible magnitude of each input (F,): what a damaged caller sends beyond is cut off."""
-    history = np.tile([6.0] * 3 + [25.0] * 3, len(spec.bins))
     # The sampler lists the bins one after another, each with effective gravity [g], then angular velocity [rad/s].
+    one = [BoundarySampler.GRAVITY_LIMIT] * 3 + [BoundarySampler.SPIN_LIMIT] * 3
+    history = np.tile(one, len(spec.bins))
     return np.concatenate([np.full(POSE, 1.25), history]).astype(np.float32)
 
 
