@@ -35,18 +35,19 @@ class RolloutFarm:
         ]
 
     def __enter__(self) -> RolloutFarm:
-        # One thread each: the trainer has the other cores.
-        kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
-        os.environ.update({name: "1" for name in kept})
-        with _deaf_to_interrupts():
-            for process in self._processes:
-                process.start()
-        for name, value in kept.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+        try:
+            with _one_thread_each(), _deaf_to_interrupts():
+                for process in self._processes:
+                    process.start()
+        except BaseException:  # one that cannot start leaves none of the others at work
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_) -> None:
         for process in self._processes:
+            if process.pid is None:
+                continue
             process.terminate()
             process.join()
         for leftover in self.folder.glob("*.tmp"):
@@ -64,6 +65,18 @@ class RolloutFarm:
     def failed(self) -> bool:
         """Whether a process ended by an error."""
         return any(process.exitcode not in (None, 0) for process in self._processes)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """What is started meanwhile computes in one thread: the trainer has the other cores."""
+    kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    os.environ.update({name: "1" for name in kept})
+    try:
+        yield
+    finally:
+        for name, value in kept.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 @contextmanager

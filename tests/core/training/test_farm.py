@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes that simulate while a network trains."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -21,3 +22,36 @@ def test_ctrl_c_reaches_the_trainer_alone():
     with farm._deaf_to_interrupts():
         inside = subprocess.run(ASK, capture_output=True, text=True, check=True).stdout.strip()
     assert inside == "True" and signal.getsignal(signal.SIGINT) is before
+
+
+class _Process:
+    """Stands in for one of a farm's."""
+
+    pid = None
+
+    def __init__(self, starts=True):
+        self.starts, self.ended = starts, False
+
+    def start(self):
+        assert os.environ["OMP_NUM_THREADS"] == "1"
+        if not self.starts:
+            raise OSError("no memory")
+        self.pid = 1
+
+    def terminate(self):
+        assert self.pid
+        self.ended = True
+
+    def join(self):
+        assert self.ended
+
+
+def test_one_that_cannot_start_leaves_nothing_behind(tmp_path, monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    workers = farm.RolloutFarm(None, tmp_path, 2, processes=2)
+    workers._processes = [_Process(), _Process(starts=False)]
+    with pytest.raises(OSError, match="no memory"), workers:
+        pass
+    assert workers._processes[0].ended
+    assert "OMP_NUM_THREADS" not in os.environ and os.environ["OPENBLAS_NUM_THREADS"] == "3"
