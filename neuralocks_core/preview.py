@@ -58,7 +58,7 @@ def render(
         frames = np.unique(np.linspace(0, len(scene.times) - 1, panels + 2)[1:-1].round().astype(int))
     else:
         clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
-        frames = np.abs(scene.times[None] - clock[:, None]).argmin(axis=1)
+        frames = _nearest(scene.times, clock)
     if kind == ".gif":
         frames = np.concatenate([frames[np.linspace(0, len(frames) - 1, PALETTE).astype(int)], frames])
     width, height = size or ((440, 620) if still else (480, 600))
@@ -71,6 +71,13 @@ def render(
             _WRITERS[kind](part, images, scene.times[frames], rate)
             say(len(frames), len(frames), f"writing {path.name}")  # the last moment at which a caller may stop it
     return path
+
+
+def _nearest(times: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Numbers (n,) of the ascending times (T,) that lie nearest to those of a clock (n,); the earlier of two as near."""
+    after = np.searchsorted(times, clock).clip(max=len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(clock - times[before] <= np.abs(times[after] - clock), before, after)
 
 
 def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:

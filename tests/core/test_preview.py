@@ -53,6 +53,15 @@ def scene(frames=4, strands=300):
     )
 
 
+@pytest.mark.parametrize("samples", [1, 2, 50])
+def test_a_clip_shows_the_nearest_sample_and_of_two_as_near_the_earlier(samples):
+    rng = np.random.default_rng(samples)
+    for times in (np.sort(rng.random(samples)), np.arange(samples) / 12, np.repeat(rng.random(), samples)):
+        clock = np.arange(times[0], times[-1] + 0.02, 1 / 24)
+        nearest = np.abs(times[None] - clock[:, None]).argmin(axis=1)
+        assert np.array_equal(preview._nearest(times, clock), nearest)
+
+
 @pytest.mark.parametrize("kind", [".png", ".mp4", ".gif"])
 def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
