@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sum of all potentials, each by name (paper section 3.4, equation 1)."""
+"""The potentials, each by name, of which training minimises the sum (paper section 3.4, equation 1)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from neuralocks_core.physics.gravity import gravity
 from neuralocks_core.physics.hair_style import hair_style
 from neuralocks_core.physics.inertia import damping, inertia
 from neuralocks_core.physics.rods import Rods
-from neuralocks_core.physics.self_collision import self_collision
 from neuralocks_core.physics.stretch import stretch
 
 
@@ -28,8 +27,6 @@ class Surroundings:
         margin: (S, K) or a number [m].
         distance: (..., S, K) to the body, for the style [m].
         neighbours: (S, K, N), see `adhesion`.
-        rest_density: (S, K), see `self_collision`.
-        share: of the groom's strands that are here.
         before: (..., S, K, 3) points one step ago, in the head's frame of now [m].
         before2: (..., S, K, 3) points two steps ago, in the head's frame of now [m].
         moved_before: (..., S, K, 3) points one step ago, in the head's frame of then [m].
@@ -41,8 +38,6 @@ class Surroundings:
     margin: Tensor | float = 0.004
     distance: Tensor | None = None
     neighbours: Tensor | None = None
-    rest_density: Tensor | None = None
-    share: float = 1.0
     before: Tensor | None = None
     before2: Tensor | None = None
     moved_before: Tensor | None = None
@@ -59,7 +54,6 @@ class Stiffness:
     damping: float | Tensor = 10.0
     clumping: float | Tensor = 60.0
     collision: float | Tensor = 1e6
-    volume: float | Tensor = 0.3
     style: float | Tensor = 0.0
     inertia: float = 1.0
 
@@ -73,7 +67,7 @@ def energies(
     form: Cosserat = Cosserat.EXACT,
     paper_adhesion: bool = False,
 ) -> dict[str, Tensor]:
-    """Every potential of the strands.
+    """Every potential of the strands but self-collision, which costs more than all others and is summed over fewer poses.
 
     Args:
         x: (..., S, K, 3) points in canonical space [m].
@@ -99,8 +93,6 @@ def energies(
         terms["damping"] = stiffness.inertia * damping(x, around.moved_before, rods, around.dt, stiffness.damping)
     if around.planes is not None:
         terms["body_collision"] = body_collision(x, rods, around.planes, stiffness.collision, around.margin)
-    if around.rest_density is not None:
-        terms["self_collision"] = self_collision(x, rods, around.rest_density, stiffness.volume, share=around.share)
     if around.distance is not None:
         terms["hair_style"] = hair_style(x, rods, around.distance, stiffness.style)
     if around.neighbours is not None:

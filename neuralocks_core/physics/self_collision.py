@@ -21,8 +21,6 @@ def self_collision(
     rods: Rods,
     rest_density: Tensor,
     stiffness: float | Tensor = STIFFNESS,
-    smoothing: float = SMOOTHING,
-    share: float = 1.0,
     *,
     relative: bool = True,
 ) -> Tensor:
@@ -35,29 +33,25 @@ def self_collision(
     Args:
         x: (..., S, K, 3) points [m].
         rods: the strands at rest.
-        rest_density: (S, K) `density` of the groom at rest, with the same share [1/m^2].
+        rest_density: (S, K) `density` of the same strands at rest [1/m^2].
         stiffness: [m^2/s^2], a number or (..., S, 1).
-        smoothing: h [m].
-        share: of the groom's strands that are here; masses are scaled up by it.
         relative: see above.
 
     Returns:
         (..., S) energy per unit line density [m^3/s^2].
     """
-    rise = density(x, rods.mass, smoothing, share) - rest_density
+    rise = density(x, rods.mass) - rest_density
     if relative:
         rise = rise / rest_density.clamp_min(1e-12)
     return (stiffness * rods.mass * torch.relu(rise) ** 3).sum(-1)
 
 
-def density(x: Tensor, mass: Tensor, smoothing: float = SMOOTHING, share: float = 1.0) -> Tensor:
+def density(x: Tensor, mass: Tensor) -> Tensor:
     """`rho_i = sum_j m_j W(|x_i - x_j|)`, each vertex itself included.
 
     Args:
         x: (..., S, K, 3) points [m].
         mass: (..., S, K) [m], per unit line density.
-        smoothing: h [m].
-        share: of the groom's strands that are here.
 
     Returns:
         (..., S, K) density per unit line density [1/m^2].
@@ -66,8 +60,8 @@ def density(x: Tensor, mass: Tensor, smoothing: float = SMOOTHING, share: float 
     square = (flat[..., :, None, :] - flat[..., None, :, :]).square().sum(-1)
     # The root of zero has no gradient; a vertex and itself have none to give.
     distance = square.clamp_min(1e-16).sqrt()
-    masses = mass.flatten(-2, -1)[..., None, :] / share
-    return (masses * kernel(distance, smoothing)).sum(-1).reshape(x.shape[:-1])
+    masses = mass.flatten(-2, -1)[..., None, :]
+    return (masses * kernel(distance, SMOOTHING)).sum(-1).reshape(x.shape[:-1])
 
 
 def kernel(distance: Tensor, smoothing: float) -> Tensor:

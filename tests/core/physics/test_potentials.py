@@ -200,17 +200,6 @@ def test_the_kernel_is_normalised_and_ends_smoothly_at_twice_h():
     assert (volume.kernel(radius, 0.015).diff() <= 0).all()
 
 
-def test_a_subset_with_its_share_has_the_density_of_the_whole():
-    generator = torch.Generator().manual_seed(0)
-    many = torch.rand(2000, 1, 3, generator=generator, dtype=torch.float64) * 0.1
-    mass = torch.full((2000, 1), 0.01, dtype=torch.float64)
-    whole = volume.density(many, mass).mean()
-    part = volume.density(many[:500], mass[:500], share=0.25)
-    own = mass[0, 0] / 0.25 * volume.kernel(torch.tensor(0.0), volume.SMOOTHING)
-    alone = mass[0, 0] * volume.kernel(torch.tensor(0.0), volume.SMOOTHING)
-    assert (part - own).mean().item() == pytest.approx((whole - alone).item(), rel=0.1)
-
-
 def test_the_sum_names_only_what_acts(curls):
     assert set(energies(curls, rods(curls), Surroundings())) == {"stretch", "bend_twist"}
     around = Surroundings(
@@ -218,10 +207,9 @@ def test_the_sum_names_only_what_acts(curls):
         planes=torch.zeros(4, 12, 4, dtype=torch.float64),
         distance=torch.zeros(4, 12, dtype=torch.float64),
         neighbours=neighbours(),
-        rest_density=torch.ones(4, 12, dtype=torch.float64),
         before=curls,
         before2=curls,
         moved_before=curls,
     )
     terms = energies(curls, rods(curls), around, Stiffness(style=10.0))
-    assert len(terms) == 9 and all(term.shape == (4,) for term in terms.values())
+    assert len(terms) == 8 and all(term.shape == (4,) for term in terms.values())
