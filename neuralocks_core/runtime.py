@@ -67,9 +67,9 @@ class StrandModel:
         values = session.run(None, {"frame": np.asarray(vector, np.float32).reshape(1, -1)})
         return {output.name: value for output, value in zip(session.get_outputs(), values)}
 
-    def by_chunk(self, function: Callable[[slice], None], count: int, start: int = 0) -> None:
-        """Call `function` with the slice of every chunk of `count` strands, from the chunk that holds `start` on."""
-        todo = chunks(count, start)
+    def by_chunk(self, function: Callable[[slice], None], count: int) -> None:
+        """Call `function` with the slice of every chunk of `count` strands."""
+        todo = chunks(count)
         left = iter(todo)
 
         def work() -> None:
@@ -95,9 +95,11 @@ def cores() -> int:
     return min(os.cpu_count() or 1, 8)
 
 
-def chunks(count: int, start: int = 0) -> list[slice]:
-    """The chunks of `count` strands, from the one that holds `start` on."""
-    return [slice(low, min(low + CHUNK, count)) for low in range(start - start % CHUNK, count, CHUNK)]
+def chunks(count: int) -> list[slice]:
+    """The chunks of `count` strands. They lie the same in every frame and on any number of threads: the sums in a matrix
+    product may depend on its height.
+    """
+    return [slice(low, min(low + CHUNK, count)) for low in range(0, count, CHUNK)]
 
 
 def graph_session(file: model_file.ModelFile, name: str):

@@ -11,7 +11,7 @@ import numpy as np
 
 from neuralocks_core.clumping import COLUMN, Locks
 from neuralocks_core.locks import lock_codes
-from neuralocks_core.runtime import CHUNK, StrandModel
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands import K, StrandSet, scalp_local
 
 
@@ -50,16 +50,14 @@ class StrandSession:
         self.anchor_offsets[:] = self._tail("offsets", self.model.frame(vector))
         self._anchored_at = vector
 
-    def displacement(
-        self, vector: np.ndarray, strands: slice = slice(None), out: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Displacement (n, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
+    def displacement(self, vector: np.ndarray) -> np.ndarray:
+        """Displacement (S, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
 
         Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
         """
         frame, gather = self._frame(vector)
-        result = self._tail("displacement", frame, strands, out, gather)
-        still = ~self.strands.valid[strands]
+        result = self._tail("displacement", frame, gather)
+        still = ~self.strands.valid
         if still.any():
             result[still] = 0
         return result.reshape(len(result), K, 3)
@@ -88,22 +86,17 @@ class StrandSession:
         locks = Locks.of(self.strands)
         return locks, StrandSession(self.model, locks.strands)
 
-    def _tail(self, output, frame, strands: slice = slice(None), out=None, gather=None) -> np.ndarray:
-        start, stop, _ = strands.indices(len(self.strands.rest))
-        result = np.empty((stop - start, 3 * K), np.float32) if out is None else out.reshape(stop - start, 3 * K)
+    def _tail(self, output: str, frame: dict[str, np.ndarray], gather: Callable | None = None) -> np.ndarray:
+        """(S, 72) of all strands."""
 
-        # Chunks begin at fixed strands whatever slice is asked for, and are never cut short but at the groom's end: the
-        # sums in a matrix product may depend on its height, and a bake must not depend on its split.
-        def work(chunk: slice) -> None:
-            values = self._chunk(output, chunk, frame)
+        def values(chunk: slice) -> np.ndarray:
+            found = self._chunk(output, chunk, frame)
             if gather is not None:
                 with self._turn:
-                    gather(values, chunk)
-            a, b = max(chunk.start, start), min(chunk.stop, stop)
-            result[a - start : b - start] = values[a - chunk.start : b - chunk.start]
+                    gather(found, chunk)
+            return found
 
-        self.model.by_chunk(work, min(-(-stop // CHUNK) * CHUNK, len(self.strands.rest)), start)
-        return result
+        return self._by_chunk(values, 3 * K)
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
