@@ -23,7 +23,6 @@ def random_clip(
     character: Character,
     rng: np.random.Generator,
     seconds: float,
-    kinds: tuple[str, ...] | None = None,
     rate: float = 30.0,
     shape: np.ndarray | None = None,
 ) -> Clip:
@@ -33,16 +32,12 @@ def random_clip(
         character: who moves.
         rng: source of all chance; the same state gives the same clip.
         seconds: length.
-        kinds: gestures to draw from, of KINDS; all where left out.
         rate: samples a second.
         shape: blend shape weights (B,).
     """
-    unknown = set(kinds or ()) - set(KINDS)
-    if unknown:
-        raise NeuralocksError(f"motion '{sorted(unknown)[0]}': unknown kind; use {', '.join(KINDS)}")
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
-    chosen = rng.choice(kinds or KINDS, size=int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2])))
+    chosen = rng.choice(KINDS, size=int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2])))
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
@@ -52,7 +47,11 @@ def random_clip(
 
 
 def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: float = 30.0) -> Clip:
-    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still."""
+    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
+
+    Raises:
+        NeuralocksError: the kind is none of KINDS.
+    """
     if kind not in KINDS:
         raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(KINDS)}")
     times = np.arange(round(seconds * rate) + 1) / rate

@@ -215,9 +215,8 @@ class RolloutMaker:
             start = rng.uniform(source.start, max(source.start, source.end - span))
             clip, first = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1))), PREROLL
         else:
-            source = random_clip(scene.character, rng, span)
-            start, first = source.start, 1
-            clip = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1)))
+            clip = random_clip(scene.character, rng, span, shape=shape)
+            start, first = clip.start, 1
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 
     def fitted(self, rest: np.ndarray, shape: np.ndarray) -> np.ndarray:
