@@ -49,7 +49,6 @@ def simulated(
     times: np.ndarray,
     material: Material | None = None,
     *,
-    substeps: int = 1,
     volume: float = 0.0,
     progress: Progress | None = None,
 ) -> np.ndarray:
@@ -63,7 +62,6 @@ def simulated(
         clip: the motion.
         times: (T,) [s].
         material: of the hair.
-        substeps: of each step; more mean less numerical damping than models are trained with.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
         progress: called with (done, total, message).
 
@@ -78,7 +76,7 @@ def simulated(
         )
     parts = clip.parts
     part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
-    options = {"substeps": substeps, "volume": volume, "progress": progress}
+    options = {"volume": volume, "progress": progress}
     result = np.empty((len(times), *strands.rest.shape), np.float32)
     for i in np.unique(part):
         start = times[0] if i == part[0] else parts[i].start
@@ -126,12 +124,12 @@ def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
     return (rigid @ np.linalg.inv(head))[:, None] @ joints
 
 
-def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
-    """Indices of about `count` valid strands in whole locks, spread over the scalp by chance."""
+def whole_locks(strands: StrandSet, count: int) -> np.ndarray:
+    """Indices of about `count` valid strands in whole locks, spread over the scalp by chance, the same each time."""
     usable = np.flatnonzero(strands.valid)
     if len(usable) <= count:
         return usable
-    order = np.random.default_rng(seed).permutation(int(strands.lock.max()) + 1)
+    order = np.random.default_rng(0).permutation(int(strands.lock.max()) + 1)
     rank = np.empty(len(order), int)
     rank[order] = np.arange(len(order))
     by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]

@@ -13,26 +13,28 @@ LOCK_SPACING = 0.012
 """Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands,
 so that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
 
+MATES, MATE_RADIUS = 5, 0.02
+"""So many strands at most are tied to each, within so many metres."""
+
 _SAMPLE = 20_000
 _ITERATIONS = 12
 
 
-def lock_of_roots(roots: np.ndarray, locks: int | None = None, seed: int = 0) -> np.ndarray:
+def lock_of_roots(roots: np.ndarray, locks: int | None = None) -> np.ndarray:
     """Cluster strands by their roots (k-means; the paper, section 3.3, leaves the clustering open).
 
     Args:
         roots: (S, 3) [m].
         locks: how many; if left out, by the size of the scalp and the number of strands.
-        seed: of the first centres; the same roots and seed always give the same locks.
 
     Returns:
-        (S,) int32 lock of each strand, numbered without gaps from 0.
+        (S,) int32 lock of each strand, numbered without gaps from 0; always the same for the same roots.
     """
     roots = np.asarray(roots, dtype=np.float64)
     if locks is None:
         cells = len(np.unique(np.floor(roots / LOCK_SPACING).astype(np.int64), axis=0))
         locks = min(cells, -(-len(roots) // STRANDS_A_LOCK))
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     sample = roots if len(roots) <= _SAMPLE else roots[random.choice(len(roots), _SAMPLE, replace=False)]
     distinct = np.unique(sample, axis=0)  # a hair tie may hold many strands in one point
     centres = random.choice(distinct, min(max(locks, 1), len(distinct)), replace=False)
@@ -67,12 +69,11 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
     return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)
 
 
-def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float = 0.01, count: int = 5) -> np.ndarray:
+def neighbours(rest: np.ndarray, radius: float = 0.01, count: int = 5) -> np.ndarray:
     """The nearest vertices of other strands at rest, which adhesion keeps near.
 
     Args:
         rest: (S, K, 3) [m].
-        lock: (S,) int; if given, only strands of the same lock are neighbours.
         radius: largest distance [m].
         count: at most this many.
 
@@ -91,8 +92,6 @@ def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float =
         other = np.where(present, index, 0) // vertices
         own = todo[:, None] // vertices
         good = present & (other != own)
-        if lock is not None:
-            good &= lock[other] == lock[own]
         first = np.argsort(~good, axis=1, kind="stable")[:, :count]
         pick = np.where(np.take_along_axis(good, first, 1), np.take_along_axis(index, first, 1), -1)
         found[todo, : pick.shape[1]] = pick
@@ -104,29 +103,27 @@ def neighbours(rest: np.ndarray, lock: np.ndarray | None = None, radius: float =
     return found.reshape(strands, vertices, count)
 
 
-def lock_mates(rest: np.ndarray, lock: np.ndarray, count: int = 5, radius: float = 0.02) -> np.ndarray:
+def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
     """The strands of the same lock that lie nearest at rest, which clumping ties together.
 
     Args:
         rest: (S, K, 3) [m].
         lock: (S,) int.
-        count: at most this many.
-        radius: largest mean distance between the two strands [m].
 
     Returns:
-        (S, count) int32, nearest first; -1 where there are fewer.
+        (S, MATES) int32, nearest first in the mean distance along the strands; -1 where there are fewer within MATE_RADIUS.
     """
-    found = np.full((len(rest), count), -1, np.int32)
+    found = np.full((len(rest), MATES), -1, np.int32)
     order = np.argsort(lock, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(lock[order])) + 1):
         if len(members) < 2:
             continue
         # Of a large lock only the strands with the nearest roots are looked at along their length.
-        near = cKDTree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * count))[1]
+        near = cKDTree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * MATES))[1]
         apart = np.linalg.norm(rest[members[near]] - rest[members][:, None], axis=-1).mean(axis=-1)
         apart[members[near] == members[:, None]] = np.inf
-        apart[apart > radius] = np.inf
-        first = np.argsort(apart, axis=1, kind="stable")[:, :count]
+        apart[apart > MATE_RADIUS] = np.inf
+        first = np.argsort(apart, axis=1, kind="stable")[:, :MATES]
         close = np.isfinite(np.take_along_axis(apart, first, 1))
         mates = np.where(close, np.take_along_axis(members[near], first, 1), -1)
         found[members, : mates.shape[1]] = mates

@@ -16,6 +16,10 @@ MOTIONLESS = 1e-4
 """Mean speed [m/s] of the reference over a clip below which nothing can be measured relative to its motion."""
 DEEP = 0.003
 """Depth [m] at which a vertex inside the body begins to show."""
+SETTLED = 0.1
+"""Hair has settled when its tips keep below this share of their largest speed."""
+HELD = 1e-5
+"""Transforms that change by less are of a held pose."""
 
 
 def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -135,8 +139,8 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
     }
 
 
-def settling_time(points: np.ndarray, times: np.ndarray, stop: float, share: float = 0.1) -> float:
-    """Time [s] after `stop` until the mean tip speed stays below `share` of the largest it has after the stop.
+def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
+    """Time [s] after `stop` until the mean tip speed stays below SETTLED of the largest it has after the stop.
 
     Tips that never exceed the standing-still speed have settled at once; those that never settle give the time left.
     """
@@ -145,7 +149,7 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float, share: flo
     after = middle >= stop
     if not after.any() or tips[after].max() < STILL:
         return 0.0
-    loud = np.flatnonzero(after & (tips > max(share * tips[after].max(), STILL)))
+    loud = np.flatnonzero(after & (tips > max(SETTLED * tips[after].max(), STILL)))
     return float(times[loud[-1] + 1] - stop) if len(loud) else 0.0
 
 
@@ -181,9 +185,9 @@ def tip_curves(displacement: np.ndarray) -> np.ndarray:
     return np.asarray(displacement, float)[:, :, -1].mean(axis=1)
 
 
-def held(joints_relative: np.ndarray, tolerance: float = 1e-5) -> np.ndarray:
+def held(joints_relative: np.ndarray) -> np.ndarray:
     """Which frames (T,) have the pose of the frame before: none of the given transforms (T, n, 4, 4) changes."""
-    same = np.abs(np.diff(joints_relative, axis=0)).max(axis=(1, 2, 3)) < tolerance
+    same = np.abs(np.diff(joints_relative, axis=0)).max(axis=(1, 2, 3)) < HELD
     return np.concatenate([[False], same])
 
 

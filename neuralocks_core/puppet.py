@@ -143,10 +143,10 @@ def leap(
     return BPoly.from_derivatives(knots, states)(np.clip(times, knots[0], knots[-1])), float(knots[-1])
 
 
-def noise(times: np.ndarray, rng: np.random.Generator, highest: float, columns: int = 3) -> np.ndarray:
-    """Smooth noise (T, columns) of about unit size: six sines up to `highest` [Hz], zero at the first sample."""
-    rates = rng.uniform(0.15, highest, (6, columns))
-    phases = rng.uniform(0, 2 * np.pi, (6, columns))
+def noise(times: np.ndarray, rng: np.random.Generator, highest: float) -> np.ndarray:
+    """Smooth noise (T, 3) of about unit size: six sines up to `highest` [Hz], zero at the first sample."""
+    rates = rng.uniform(0.15, highest, (6, 3))
+    phases = rng.uniform(0, 2 * np.pi, (6, 3))
     waves = np.sin(2 * np.pi * rates * (times[:, None, None] - times[0]) + phases) / np.sqrt(3)
     waves = waves.sum(axis=1) / np.sqrt(2)
     return (waves - waves[0]) * ease(times, times[0], 0.6)[:, None]

@@ -145,17 +145,17 @@ def _corners(points: np.ndarray) -> np.ndarray:
     return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
 
 
-def clearance(rest_distance: np.ndarray, margin: float = MARGIN) -> np.ndarray:
+def clearance(rest_distance: np.ndarray) -> np.ndarray:
     """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
 
     Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
     """
-    clear = np.minimum(rest_distance, margin).astype(np.float32)
+    clear = np.minimum(rest_distance, MARGIN).astype(np.float32)
     clear[:, :CLAMPED] = -np.inf
     return clear
 
 
-def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray, margin: float = MARGIN) -> np.ndarray:
+def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
     """Strands laid over the surface where they were inside it.
 
     Strand by strand, from the root on and with every length kept, each segment goes as near to where it was wanted as
@@ -167,7 +167,6 @@ def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray, margin: flo
         points: deformed strands (S, K, 3) [m], in the body's space.
         body: in this pose.
         clear: distance [m] that each vertex must keep (S, K), -inf for those that never move.
-        margin: clearance [m].
 
     Returns:
         (S, K, 3) float32.
@@ -183,7 +182,7 @@ def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray, margin: flo
         distance, way = body.distance(here.transpose(0, 2, 1).astype(np.float32))
         distance = distance.astype(float)
         # The first time a strand is given its margin; after that half of it is enough.
-        left = (distance < keep[CLAMPED:, todo] - 0.5 * margin * (done > 0)).any(axis=0)
+        left = (distance < keep[CLAMPED:, todo] - 0.5 * MARGIN * (done > 0)).any(axis=0)
         todo = todo[left]
         if not len(todo) or done == ROUNDS:
             break

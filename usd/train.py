@@ -94,7 +94,7 @@ def train(
     except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     history = {"spec": paper_boundary()} if paper else {}
-    work = work_folder(out, resume=resume)
+    work = work_folder(out, resume)
     if begin == NOTHING and resume and (work / BEGINNING).exists():
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
     begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)

@@ -8,6 +8,8 @@ from torch import Tensor
 
 FOLD = 1e-6
 """Smallest 1 + cos of a turn: keeps opposite edges finite in value and gradient."""
+DIRECT_FOLD = 1e-3
+"""The same of `direct_frames`, which meets opposite edges in every curl."""
 
 
 def turn(a: Tensor, b: Tensor, fold: float = FOLD) -> Tensor:
@@ -29,19 +31,18 @@ def conjugate(q: Tensor) -> Tensor:
     return torch.cat([q[..., :1], -q[..., 1:]], dim=-1)
 
 
-def direct_frames(edges: Tensor, fold: float = 1e-3) -> Tensor:
+def direct_frames(edges: Tensor) -> Tensor:
     """The paper's fast transport: straight from the root edge to each edge.
 
-    Singular where an edge points against the root edge; `fold` bounds its gradient there.
+    Singular where an edge points against the root edge; its gradient there is bounded.
 
     Args:
         edges: (..., E, 3) unit edges.
-        fold: smallest 1 + cos.
 
     Returns:
         (..., E, 4) quaternions wxyz.
     """
-    return turn(edges[..., :1, :].expand_as(edges), edges, fold)
+    return turn(edges[..., :1, :].expand_as(edges), edges, DIRECT_FOLD)
 
 
 def loop_frames(edges: Tensor) -> Tensor:

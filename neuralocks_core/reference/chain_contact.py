@@ -11,6 +11,8 @@ from neuralocks_core.rig.chains import HairChains
 CORNERS = 8
 """Points of each joint's mesh that meet the body. With spheres at the ends and middles of the bones alone the mesh lay 24 mm
 deep in the body at worst; with these 4 mm."""
+BONE_RADIUS = 0.012
+"""[m] kept from the body by the bones of hair without a mesh."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,11 @@ class Contacts:
     radius: np.ndarray
 
     @classmethod
-    def of_bones(cls, chains: HairChains, radius: float = 0.012) -> "Contacts":
+    def of_bones(cls, chains: HairChains) -> "Contacts":
         """Ends and middles of the bones, for hair without a mesh."""
         start = chains.origins[chains.bone_joint]
         points = np.concatenate([start + chains.bones, start + chains.bones / 2])
-        return cls(np.tile(chains.bone_joint, 2), points, np.full(len(points), radius))
+        return cls(np.tile(chains.bone_joint, 2), points, np.full(len(points), BONE_RADIUS))
 
     @classmethod
     def of_mesh(cls, chains: HairChains, points: np.ndarray, weights: np.ndarray, radius: float) -> "Contacts":

@@ -17,6 +17,9 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices
 from neuralocks_core.rotation import quaternion_product
 
+ITERATIONS = 2
+"""Gauss-Newton steps to each step in time."""
+
 
 class ChainSolver:
     """One rig's chains under one material.
@@ -89,11 +92,11 @@ class ChainSolver:
             result[:, sample] = turns
         return result
 
-    def _step(self, turns, start, flight, gravity, h, near, limit, iterations: int = 2):
+    def _step(self, turns, start, flight, gravity, h, near, limit):
         chains, tree = self.chains, self.tree
         inertia, drag = 1 / h**2, self.damping / h
         planes = None
-        for _ in range(iterations):
+        for _ in range(ITERATIONS):
             matrices = quaternion_matrices(turns)
             rotations, positions = pose_chains(chains, matrices)
             ends = bone_ends(chains, rotations, positions)

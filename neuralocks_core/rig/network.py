@@ -26,6 +26,8 @@ POSE = 15
 """Numbers of the pose and of gravity's direction; the history follows."""
 LARGEST = 1e15
 """Numbers whose squares single precision still holds."""
+MAX_ANGLE = 2.4
+"""Largest turn of a joint [rad] of what is trained."""
 _CHUNK = 1024
 
 
@@ -58,7 +60,7 @@ class RigModel:
     spec: BoundarySpec
     layers: tuple[tuple[np.ndarray, np.ndarray], ...] = field(repr=False)
     limits: np.ndarray = field(repr=False)
-    max_angle: float = 2.4
+    max_angle: float = MAX_ANGLE
     training: dict = field(default_factory=dict)
     report: dict = field(default_factory=dict)
     credits: list = field(default_factory=list)

@@ -17,7 +17,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 from neuralocks_core.strands import K
 
-LATENT = 32
+LATENT, HIDDEN = 32, 256
+"""Length of a code, and width of the hidden layers."""
 
 
 def train_autoencoder(
@@ -87,17 +88,15 @@ class StrandAutoencoder(nn.Module):
     """72 numbers -> 256 -> 256 -> 32 and back, ReLU, beside a linear map each way; coordinates in metres.
 
     Args:
-        hidden: width of the hidden layers.
-        latent: length of a code.
         principal: with the linear maps; else the paper's MLPs alone.
     """
 
-    def __init__(self, hidden: int = 256, latent: int = LATENT, *, principal: bool = True):
+    def __init__(self, *, principal: bool = True):
         super().__init__()
-        self.encoder = _mlp(3 * K, hidden, latent)
-        self.decoder = _mlp(latent, hidden, 3 * K)
-        self.into = nn.Linear(3 * K, latent, bias=False) if principal else None
-        self.back = nn.Linear(latent, 3 * K, bias=False) if principal else None
+        self.encoder = _mlp(3 * K, HIDDEN, LATENT)
+        self.decoder = _mlp(LATENT, HIDDEN, 3 * K)
+        self.into = nn.Linear(3 * K, LATENT, bias=False) if principal else None
+        self.back = nn.Linear(LATENT, 3 * K, bias=False) if principal else None
         self.register_buffer("mean", torch.zeros(3 * K))
         self.register_buffer("scale", torch.ones(3 * K))
 

@@ -14,7 +14,7 @@ FLAT = 0.5
 """Cosine between a vertex's normal and its cell's mean normal; where one has less, all vertices of the cell stay."""
 
 
-def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | None:
+def hair_body(character: Character, reach: float) -> Body | None:
     """The body from the top of the head down to `reach` [m] under the head joint, arms to the elbow.
 
     Every vertex kept is one of the body's own, so its skinning weights and blend shapes stay true.
@@ -31,7 +31,7 @@ def hair_body(character: Character, reach: float, cell: float = CELL) -> Body | 
     # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs it hangs
     # beside.
     main = body.joint_indices[np.arange(len(points)), body.joint_weights.argmax(axis=1)]
-    key = np.column_stack([np.floor(points[used] / cell).astype(np.int64), main[used]])
+    key = np.column_stack([np.floor(points[used] / CELL).astype(np.int64), main[used]])
     _, group = np.unique(key, axis=0, return_inverse=True)
     group = _parted(group.ravel(), vertex_normals(points, faces)[used])
     size = np.bincount(group)

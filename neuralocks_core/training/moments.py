@@ -88,11 +88,10 @@ class MomentPool:
         self.moments: list[Moment] = []
         self._maker = RolloutMaker(scene)
 
-    def grow(self, clips: int = 1) -> int:
-        """Add the moments of further random clips; returns how many moments there are."""
+    def grow(self, clips: int = 1) -> None:
+        """Add the moments of further random clips."""
         for _ in range(clips):
             self._add(len(self.hair))
-        return len(self.moments)
 
     def batch(self, rng: np.random.Generator, count: int) -> tuple[list[Moment], list[Hair]]:
         """Random moments and the hair of each."""

@@ -13,6 +13,8 @@ OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
 CODES = slice(2, 66)
 """Where the strand's and its lock's code lie among the strand inputs."""
+HIDDEN = 256
+"""Width of both hidden layers."""
 DEEP = 192
 """Width of the deep map of the frame."""
 RANKS = (64, 32)
@@ -29,8 +31,6 @@ class StrandNet(nn.Module):
     Args:
         frame_size: length of the boundary vector, `BoundarySpec.size`.
         strand_size: uv 2, rest code 32, lock code 32, root normal 3, length 1.
-        hidden: width of both hidden layers.
-        outputs: 3 for each of the 24 vertices.
         motion: `"linear"`, as in the paper; `"encoder"`: a deeper map of the boundary vector is added to the linear
             one; `"modulated"`: that map also scales the units of both hidden layers and adds matrices of low rank to
             the weights behind them. It runs once per frame, and so do these changes of the weights: nothing is added
@@ -41,8 +41,6 @@ class StrandNet(nn.Module):
         self,
         frame_size: int,
         strand_size: int = 70,
-        hidden: int = 256,
-        outputs: int = 3 * K,
         *,
         motion: str = "linear",
     ):
@@ -50,8 +48,8 @@ class StrandNet(nn.Module):
         if motion not in MOTIONS:
             raise ValueError(f"motion: {motion!r} is not one of {MOTIONS}")
         self.motion = motion
-        self.strand = nn.Linear(strand_size, hidden, bias=False)
-        self.frame = nn.Linear(frame_size, hidden)
+        self.strand = nn.Linear(strand_size, HIDDEN, bias=False)
+        self.frame = nn.Linear(frame_size, HIDDEN)
         # Both halves start as the slices of one Linear over the whole input would.
         bound = (strand_size + frame_size) ** -0.5
         for parameter in (self.strand.weight, self.frame.weight, self.frame.bias):
@@ -65,13 +63,13 @@ class StrandNet(nn.Module):
                 nn.ReLU(),
                 nn.Linear(DEEP, DEEP),
                 nn.ReLU(),
-                nn.Linear(DEEP, 3 * hidden + sum(RANKS) if motion == "modulated" else hidden),
+                nn.Linear(DEEP, 3 * HIDDEN + sum(RANKS) if motion == "modulated" else HIDDEN),
             )
-        self.middle = nn.Linear(hidden, hidden)
-        self.out = nn.Linear(hidden, outputs)
+        self.middle = nn.Linear(HIDDEN, HIDDEN)
+        self.out = nn.Linear(HIDDEN, 3 * K)
         if motion == "modulated":
-            self.middle_change = LowRank(hidden, RANKS[0], hidden)
-            self.out_change = LowRank(hidden, RANKS[1], outputs)
+            self.middle_change = LowRank(HIDDEN, RANKS[0], HIDDEN)
+            self.out_change = LowRank(HIDDEN, RANKS[1], 3 * K)
         with torch.no_grad():
             # Hair starts at rest: zero offsets are both the groom and a direction that exists.
             self.out.weight.mul_(0.1)
@@ -124,11 +122,11 @@ class StrandNet(nn.Module):
             getattr(self, f"{name}_scale").copy_(scale)
 
     def strand_part(self, strands: Tensor) -> Tensor:
-        """First layer, strand part: (..., S, strand_size) -> (..., S, hidden)."""
+        """First layer, strand part: (..., S, strand_size) -> (..., S, HIDDEN)."""
         return self.strand((strands - self.strand_mean) * self.strand_scale)
 
     def frame_part(self, frames: Tensor) -> Tensor:
-        """First layer, body part and bias: (..., frame_size) -> (..., hidden), or (..., 3 hidden + sum(RANKS)) with the
+        """First layer, body part and bias: (..., frame_size) -> (..., HIDDEN), or (..., 3 HIDDEN + sum(RANKS)) with the
         factors of both hidden layers and of the matrices of low rank behind it.
         """
         normal = (frames - self.frame_mean) * self.frame_scale

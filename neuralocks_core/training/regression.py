@@ -102,13 +102,12 @@ class RolloutBank:
         self.material = scene.spec.slices["material"]
         self._seen: set[Path] = set()
 
-    def add(self, files: list[Path]) -> int:
-        """Read the files that are new; returns how many rollouts are there."""
+    def add(self, files: list[Path]) -> None:
+        """Read the files that are new."""
         for path in files:
             if path not in self._seen:
                 self._seen.add(path)
                 self.rollouts.append(load(path))
-        return len(self.rollouts)
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:

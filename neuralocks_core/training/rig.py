@@ -38,7 +38,6 @@ def train_static(
     steps: int | None = None,
     hidden: int = 16,
     seed: int = 0,
-    max_angle: float = 2.4,
     batch: int = 32,
     report_poses: int = 1000,
     progress: Progress | None = None,
@@ -51,7 +50,6 @@ def train_static(
         seconds: how long to train; `steps`, if given, takes its place and makes the result repeatable.
         hidden: width of both layers (the paper's 16).
         seed: decides poses and first weights.
-        max_angle: largest turn of one joint [rad].
         batch: poses a step.
         report_poses: held-out poses of the report; 0 leaves it out.
         progress: called with (done, total, message); may raise to stop.
@@ -63,7 +61,7 @@ def train_static(
     say(0, 1, "posing bodies")
     roomy = replace(material, margin=material.margin + _ROOM)
     held = HairOnBodies(rig, roomy, _POOL, rng, spec)
-    net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec, max_angle)
+    net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
@@ -84,7 +82,5 @@ def train_static(
     }
     model = net.model(rig.chains, training)
     if report_poses:
-        model.report.update(
-            static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000, 1000))
-        )
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000)))
     return model

@@ -10,6 +10,9 @@ from neuralocks_core.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
 
+AROUND = 1000
+"""Body vertices that a simulation meets."""
+
 
 class BodyPatch:
     """The part of the body around the head that hair can reach.
@@ -73,8 +76,8 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     return Collider(rig.character.canonical(rig.character.body.points), body.triangles).distance(points)[0]
 
 
-def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tuple[np.ndarray, np.ndarray] | None:
-    """Body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
+def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
     canonical space of the head; None if there are none.
     """
     body, character = rig.character.body, rig.character
@@ -86,7 +89,7 @@ def body_around(rig: HairRig, joints: np.ndarray, most_points: int = 1000) -> tu
     near = np.flatnonzero(used)
     if not len(near):
         return None
-    chosen = np.sort(np.random.default_rng(0).permutation(near)[:most_points])
+    chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
     normals = vertex_normals(body.points, body.triangles)[chosen]
     to_head = np.linalg.inv(character.canonical_to_world(joints))
     skinning = to_head[:, None] @ joints @ character.inverse_bind

@@ -51,7 +51,6 @@ def train_dynamic(
     steps: int | None = None,
     hidden: int = 32,
     seed: int = 0,
-    max_angle: float = 2.4,
     clips: int = 256,
     clip_seconds: float = 4.0,
     batch: int = 256,
@@ -66,7 +65,6 @@ def train_dynamic(
         seconds: how long to regress, after the simulations; `steps`, if given, takes its place.
         hidden: width of both layers.
         seed: decides clips and first weights.
-        max_angle: largest turn of one joint [rad].
         clips: how many random motions are simulated.
         clip_seconds: length of each [s].
         batch: pairs of consecutive samples a step.
@@ -80,13 +78,11 @@ def train_dynamic(
     simulating, learning = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
     ends = np.cumsum([simulating, learning, _REPORT_TAKES])
     simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
-    features, turns, moments = _simulated(
-        rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated, 1000)
-    )
+    features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated))
     held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
-    net = TinyNet(features.shape[-1], hidden, len(rig.chains), held.pool, spec, max_angle)
+    net = TinyNet(features.shape[-1], hidden, len(rig.chains), held.pool, spec)
     net.normalise(features.reshape(-1, features.shape[-1]))
 
     def losses(done: float) -> dict[str, torch.Tensor]:
@@ -127,7 +123,7 @@ def train_dynamic(
     model = net.model(rig.chains, training)
     if report_poses:
         middle = (learned + 1000) // 2
-        held_poses, in_motion = within(say, learned, middle, 1000), within(say, middle, 1000, 1000)
+        held_poses, in_motion = within(say, learned, middle), within(say, middle, 1000)
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses))
         model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
         say(1000, 1000, "report done")

@@ -17,6 +17,9 @@ from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig_body import rest_clearance
 from neuralocks_core.training.rig_poses import PosePool
 
+COLLIDING = 500
+"""Hair vertices at most that collide, spread evenly over all."""
+
 
 @dataclass(frozen=True)
 class RigMaterial:
@@ -76,15 +79,14 @@ class RigEnergy(torch.nn.Module):
     Args:
         rig: chains and skinned vertices.
         material: constants.
-        most_points: hair vertices that collide, spread evenly over all.
     """
 
-    def __init__(self, rig: HairRig, material: RigMaterial, most_points: int = 500, dtype=torch.float32):
+    def __init__(self, rig: HairRig, material: RigMaterial, dtype=torch.float32):
         super().__init__()
         chains = rig.chains
         self.chains, self.material = chains, material
         tree = RodTree(chains, material)
-        chosen = np.linspace(0, len(rig.points) - 1, min(most_points, len(rig.points))).astype(int)
+        chosen = np.linspace(0, len(rig.points) - 1, min(COLLIDING, len(rig.points))).astype(int)
         self.chosen = chosen
 
         def keep(name, values):

@@ -25,9 +25,9 @@ RATE = 30.0
 SPRINGS, DEFAULTS = "spring bones, best of 12 settings", "spring bones, VRM's defaults"
 
 
-def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, rate: float = RATE):
-    """Features (C, T, F) and simulated turns (C, T, N, 4) of clips of equal length, sampled at `rate` [Hz]."""
-    times = np.arange(int(round((motions[0].end - motions[0].start) * rate)) + 1) / rate + motions[0].start
+def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions):
+    """Features (C, T, F) and simulated turns (C, T, N, 4) of clips of equal length, sampled at RATE."""
+    times = np.arange(int(round((motions[0].end - motions[0].start) * RATE)) + 1) / RATE + motions[0].start
     heads, features, bodies = [], [], []
     for motion in motions:
         joints = motion.at(times)
@@ -40,7 +40,7 @@ def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, rate: f
         body = BodyPoints(np.stack([b[0] for b in bodies]), np.stack([b[1] for b in bodies]), rest[0][0], rest[1][0])
     contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin) if len(rig.points) else None
     solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, material.weight, contacts)
-    return np.stack(features), solver.simulate(np.stack(heads), 1 / rate, body)
+    return np.stack(features), solver.simulate(np.stack(heads), 1 / RATE, body)
 
 
 def motion_report(

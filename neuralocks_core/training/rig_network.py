@@ -4,7 +4,7 @@
 import numpy as np
 import torch
 
-from neuralocks_core.rig.network import POSE, RigModel, input_limits
+from neuralocks_core.rig.network import MAX_ANGLE, POSE, RigModel, input_limits
 from neuralocks_core.training.rig_energy import bounded_turns
 from neuralocks_core.training.rig_poses import PosePool
 
@@ -18,12 +18,11 @@ class TinyNet(torch.nn.Module):
         joints: N.
         pool: poses whose features scale the inputs.
         spec: which features these are.
-        max_angle: largest turn of a joint [rad].
     """
 
-    def __init__(self, inputs: int, hidden: int, joints: int, pool: PosePool, spec, max_angle: float):
+    def __init__(self, inputs: int, hidden: int, joints: int, pool: PosePool, spec):
         super().__init__()
-        self.joints, self.spec, self.max_angle = joints, spec, max_angle
+        self.joints, self.spec = joints, spec
         sample = np.arange(min(pool.count, 512))
         features = pool.features(spec, sample, pool.gravity(sample))
         self.register_buffer("mean", torch.as_tensor(features.mean(0)))
@@ -52,12 +51,12 @@ class TinyNet(torch.nn.Module):
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         raw = self.raw(features) - self.raw(self.bind)
-        return bounded_turns(raw.reshape(len(features), self.joints, 3), self.max_angle)
+        return bounded_turns(raw.reshape(len(features), self.joints, 3), MAX_ANGLE)
 
     def model(self, chains, training: dict) -> RigModel:
         """What runs without torch, for the chains that this was trained on."""
         limits = input_limits(self.spec)
-        return RigModel(chains, self.spec, self.plain_layers(chains.axes), limits, self.max_angle, training=training)
+        return RigModel(chains, self.spec, self.plain_layers(chains.axes), limits, training=training)
 
     def plain_layers(self, axes: np.ndarray) -> tuple:
         """Weights and biases with the normalisation, the bind pose and the joints' axes (N, 3, 3) folded in;

@@ -17,6 +17,8 @@ from neuralocks_core.training.rig_body import BodyPatch
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Most nod, turn and tilt of the head against the chest that people have [rad]."""
+KEPT = 2000
+"""Vertices of each body, by whose planes depths are told."""
 _SIEVE = 5e-3
 """Points farther than this [m] outside the plane of the nearest body vertex are not asked for exactly."""
 _TOGETHER = 96
@@ -33,7 +35,6 @@ class PosePool:
         rig: hair and body.
         count: how many poses are held at a time.
         rng: decides all of them.
-        most_points: body vertices kept of each (nearest-vertex planes need no more).
         whole: keep each whole body around the head too, for exact distances.
         moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
             necks if left out.
@@ -50,14 +51,13 @@ class PosePool:
         rig: HairRig,
         count: int,
         rng: np.random.Generator,
-        most_points: int = 2000,
         whole: bool = False,
         moving: np.ndarray | None = None,
     ):
         self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
         self.moment = np.zeros(count, int)
         self.relative = np.empty((count, 2, 3, 3))
-        self._patch = BodyPatch(rig, rng, most_points) if rig.character.body is not None and len(rig.points) else None
+        self._patch = BodyPatch(rig, rng, KEPT) if rig.character.body is not None and len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
         self.bodies = [None] * count if self._patch and whole else None
         kept = len(self._patch.kept) if self._patch else 0

@@ -13,6 +13,8 @@ from neuralocks_core.training.rig_poses import PosePool
 
 POINTS = 400
 """Of a hair mesh, by which its motion is measured."""
+OPTIMISED = 250
+"""Steps of the direct optimisation from each of its beginnings."""
 
 
 def static_report(
@@ -45,7 +47,7 @@ def static_report(
     rigid = np.broadcast_to(no_turns(rig), turns.shape)
     few = poses[: min(optimised, count)]
     energy = RigEnergy(rig, material)
-    directly = _optimise(energy, pool, few, gravity[few], model.max_angle, turns[few], within(say, 0, 300, 1000))
+    directly = _optimise(energy, pool, few, gravity[few], model.max_angle, turns[few], within(say, 0, 300))
     states = {"network": turns, "optimised": directly}
     states["rigid"] = rigid[: max(len(few), count // 20)]
     report = {"poses": count, "energy": {}, "energy_collision": {}}
@@ -67,7 +69,7 @@ def static_report(
         outside, done, whole = rest > 0, 0, sum(map(len, states.values()))
         for name, state in states.items():
             begin, done = done, done + len(state)
-            tell = within(say, 300 + 700 * begin // whole, 300 + 700 * done // whole, 1000)
+            tell = within(say, 300 + 700 * begin // whole, 300 + 700 * done // whole)
             points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(state)), rig.points, rig.weights)
             distance = pool.distances(poses[: len(state)], points, tell)[:, outside]
             report[f"penetration_{name}"] = depths(distance)
@@ -96,9 +98,9 @@ def no_turns(rig) -> np.ndarray:
     return np.tile([1.0, 0.0, 0.0, 0.0], (len(rig.chains), 1))
 
 
-def within(say, begin: int, end: int, whole: int):
-    """A progress callback for the part of a longer work of `whole` steps that goes from `begin` to `end`."""
-    return lambda done, total, message: say(begin + (end - begin) * done // total, whole, message)
+def within(say, begin: int, end: int):
+    """A progress callback for the part of a longer work that goes from `begin` to `end`, in thousandths of it."""
+    return lambda done, total, message: say(begin + (end - begin) * done // total, 1000, message)
 
 
 def depths(distance: np.ndarray) -> dict:
@@ -118,7 +120,7 @@ def _ends(rig, turns: np.ndarray) -> np.ndarray:
     return bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)))
 
 
-def _optimise(energy, pool, poses, gravity, max_angle, start, say, steps: int = 250) -> np.ndarray:
+def _optimise(energy, pool, poses, gravity, max_angle, start, say) -> np.ndarray:
     """Turns (B, N, 4) of the lowest energy that Adam finds from the network's own answer and from rest."""
     vector = start[..., 1:] / np.sin(max_angle / 2)
     near = vector / np.sqrt(np.maximum(1 - np.sum(vector**2, axis=-1, keepdims=True), 1e-3))
@@ -126,9 +128,9 @@ def _optimise(energy, pool, poses, gravity, max_angle, start, say, steps: int = 
     for turn, first in enumerate((near, np.zeros_like(near))):
         raw = torch.tensor(first, dtype=torch.float32, requires_grad=True)
         optimiser = torch.optim.Adam([raw], lr=0.03, betas=(0.8, 0.98))
-        for step in range(steps):
-            say(turn * steps + step, 2 * steps, "optimising directly, for comparison")
-            optimiser.param_groups[0]["lr"] = 0.03 * (1 - step / steps) ** 1.5 + 1e-4
+        for step in range(OPTIMISED):
+            say(turn * OPTIMISED + step, 2 * OPTIMISED, "optimising directly, for comparison")
+            optimiser.param_groups[0]["lr"] = 0.03 * (1 - step / OPTIMISED) ** 1.5 + 1e-4
             optimiser.zero_grad()
             sum(energy.parts(pool, poses, bounded_turns(raw, max_angle), gravity)).sum().backward()
             optimiser.step()

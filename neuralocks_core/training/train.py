@@ -52,7 +52,6 @@ def train_strands(
     *,
     rollouts: int = 1200,
     processes: int = 1,
-    work: str | Path | None = None,
     begin: str | Path | None = None,
     resume: bool = False,
     keep_work: bool = False,
@@ -72,11 +71,10 @@ def train_strands(
             for rollouts, SelfSupervisedOptions for the paper's.
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
         processes: that make rollouts; the network's training uses what is left.
-        work: folder for checkpoint and rollouts; `OUT.training` beside the model where left out.
         begin: a model whose network and strand codes are begun with, in place of random weights and codes of one's own.
-        resume: go on with what is in `work`: simulations, strand codes, the checkpoint if it came to one; with a larger
-            budget than before, a finished run trains longer.
-        keep_work: leave `work` behind after success.
+        resume: go on with what is in the folder `OUT.training` beside the model: simulations, strand codes, the
+            checkpoint if it came to one; with a larger budget than before, a finished run trains longer.
+        keep_work: leave that folder behind after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
         progress: called with done, total (thousandths of the budget) and a message with the gauge.
@@ -85,7 +83,7 @@ def train_strands(
         NeuralocksError: nothing to train on, a model or a checkpoint that does not fit, or a failed solver process.
     """
     options = options or RegressionOptions()
-    out, work = Path(out), work_folder(out, work, resume)
+    out, work = Path(out), work_folder(out, resume)
     start = beginning_of(work, begin, resume)
     beginning = Beginning(start) if start else None
     if beginning:

@@ -26,7 +26,7 @@ INPUTS = "inputs.json"
 """In the work folder: what its simulations were made of."""
 
 
-def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = False) -> Path:
+def work_folder(out: str | Path, resume: bool) -> Path:
     """Where a training keeps what it goes on from: asked for before anything is read.
 
     Raises:
@@ -35,7 +35,7 @@ def work_folder(out: str | Path, work: str | Path | None = None, resume: bool = 
     out = Path(out)
     if out.suffix != ".neuralocks":
         raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
-    work = Path(work) if work else out.with_name(out.name + ".training")
+    work = out.with_name(out.name + ".training")
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work

@@ -56,12 +56,3 @@ def test_neighbours_against_brute_force():
     expected = np.argsort(distance, axis=1)[:, :count]
     expected = np.where(np.take_along_axis(distance, expected, 1) <= radius, expected, -1)
     np.testing.assert_array_equal(found.reshape(-1, count), expected)
-
-
-def test_neighbours_stay_in_their_lock():
-    rest = np.random.default_rng(0).normal(size=(20, 24, 3)) * 0.01
-    lock = np.arange(20) % 4
-    found = neighbours(rest, lock, radius=0.05)
-    other = np.where(found < 0, np.arange(20)[:, None, None], found // 24)
-    assert (lock[other] == lock[:, None, None]).all()
-    assert (found >= 0).mean() > 0.5
