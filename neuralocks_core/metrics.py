@@ -16,6 +16,8 @@ MOTIONLESS = 1e-4
 """Mean speed [m/s] of the reference over a clip below which nothing can be measured relative to its motion."""
 DEEP = 0.003
 """Depth [m] at which a vertex inside the body begins to show."""
+LIVELY = 0.005
+"""A strand moves if the rms of its motion is a larger share of its length."""
 SETTLED = 0.1
 """Hair has settled when its tips keep below this share of their largest speed."""
 HELD = 1e-5
@@ -120,23 +122,30 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
 
     The motion of a vertex is its place about its mean over the clip, so that a wrong droop alone is no error of motion.
     Per strand: rms over time and vertices of the motion's error, over the rms of the reference's motion. Strands that
-    move less than 0.5 % of their length (rms) have no motion to be wrong about and are left out.
+    move less than LIVELY have no motion to be wrong about and are left out.
 
     Returns:
         `median` over strands, and `p95`, which one strand in twenty exceeds; `rms`: the same ratio over all strands
         together, where a few that came to rest elsewhere weigh most. NaN if nothing moves.
     """
-    error = _swing(np.asarray(points, float) - reference)
-    true = _swing(np.asarray(reference, float))
-    lively = true > 0.005 * np.asarray(length)
-    if not lively.any():
+    error, true = swings(np.asarray(points, float), np.asarray(reference, float), length)
+    if not len(true):
         return dict.fromkeys(("median", "p95", "rms"), float("nan"))
-    each = error[lively] / true[lively]
+    each = error / true
     return {
         "median": float(np.median(each)),
         "p95": float(np.percentile(each, 95)),
-        "rms": float(np.sqrt(np.square(error[lively]).sum() / np.square(true[lively]).sum())),
+        "rms": float(np.sqrt(np.square(error).sum() / np.square(true).sum())),
     }
+
+
+def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What `motion_error` is made of: rms of the motion's error and of the reference's motion (n,) [m] of each strand that
+    moves by more than LIVELY of its length (S,) [m].
+    """
+    error, true = _swing(points - reference), _swing(reference)
+    lively = true > LIVELY * length
+    return error[lively], true[lively]
 
 
 def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:

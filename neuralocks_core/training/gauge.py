@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from neuralocks_core.metrics import swings
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RolloutBank, predicted
 from neuralocks_core.training.rollouts import STEP
@@ -83,11 +84,8 @@ def measure(
         still = predicted(net, bank, replace(rollout, vectors=held), output, anchored)[rollout.first :]
         for name, error in (("position", answer - target), ("rigid", target), ("static", still - target)):
             sums[name].append(100 * (np.linalg.norm(error, axis=-1) / length).mean())
-        swing = _swing(target)
-        lively = swing > 0.005 * length[:, 0]  # strands that hardly move have no motion to be wrong about
-        if lively.any():
-            motion.append((_swing(answer - target) / np.maximum(swing, 1e-9))[lively])
-            motion_static.append((_swing(still - target) / np.maximum(swing, 1e-9))[lively])
+        for ratios, moved in ((motion, answer), (motion_static, still)):
+            ratios.append(np.divide(*swings(moved, target, length[:, 0])))
         steps, true_steps = np.diff(answer, axis=0), np.diff(target, axis=0)
         speeds.append([np.linalg.norm(steps, axis=-1).mean(), np.linalg.norm(true_steps, axis=-1).mean()])
         ways.append([np.linalg.norm(answer, axis=-1).mean(), np.linalg.norm(target, axis=-1).mean()])
@@ -97,19 +95,15 @@ def measure(
         before = np.minimum((planes[..., :3] * target).sum(-1) - planes[..., 3], 0)
         deep.append(100 * ((distance < before - 1e-3) & (planes[..., 3] > -100)).mean())
     speeds, ways, wrong = (np.sum(values, axis=0) for values in (speeds, ways, wrong))
+    motion, motion_static = (np.concatenate(ratios) for ratios in (motion, motion_static))
     return Gauge(
         position=float(np.mean(sums["position"])),
         rigid=float(np.mean(sums["rigid"])),
         static=float(np.mean(sums["static"])),
-        motion=float(np.median(np.concatenate(motion))) if motion else 1.0,
-        motion_static=float(np.median(np.concatenate(motion_static))) if motion else 1.0,
+        motion=float(np.median(motion)) if len(motion) else 1.0,
+        motion_static=float(np.median(motion_static)) if len(motion) else 1.0,
         motion_ratio=float(speeds[0] / max(speeds[1], 1e-12)),
         droop=float(ways[0] / max(ways[1], 1e-12)),
         velocity=float(np.sqrt(wrong[0] / max(wrong[1], 1e-20))),
         penetration=float(np.mean(deep)),
     )
-
-
-def _swing(moved: np.ndarray) -> np.ndarray:
-    """(n,) rms over time and vertices of displacement (T, n, 24, 3) about its mean in time [m]."""
-    return np.sqrt(np.square(moved - moved.mean(axis=0)).sum(-1).mean(axis=(0, 2)))
