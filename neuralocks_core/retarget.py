@@ -9,10 +9,9 @@ from neuralocks_core import rotation
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.bvh import Motion
-from neuralocks_core.humanoid import Humanoid
+from neuralocks_core.humanoid import TRUNK, Humanoid
 from neuralocks_core.motion import Clip
 
-TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 LIMBS = {
     "shoulder": None,
     "upper_arm": ("upper_arm", "lower_arm"),

@@ -36,6 +36,20 @@ def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return result / np.linalg.norm(result, axis=-1, keepdims=True)
 
 
+def continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions (T, ..., 4) with the signs that let each go on from the one before: between q and -q, which are one
+    rotation, what blends linearly passes through zero.
+    """
+    flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
+    signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs])
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angles (...) [rad] of the turns from rotation matrices a (..., 3, 3) to b (..., 3, 3)."""
+    return np.arccos(np.clip((np.einsum("...ij,...ij->...", a, b) - 1) / 2, -1, 1))
+
+
 def to_vector(matrices: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3)."""
     matrices = np.asarray(matrices, float)

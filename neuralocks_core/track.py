@@ -26,9 +26,7 @@ class Track:
         from scipy.interpolate import CubicSpline
 
         times, poses = _extended(clip)
-        quaternions = rotation.to_quaternion(character.relative_rotations(poses, joints))
-        flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0, -1.0, 1.0), axis=0)
-        quaternions[1:] *= flips[..., None]
+        quaternions = rotation.continuous(rotation.to_quaternion(character.relative_rotations(poses, joints)))
         values = np.concatenate([poses[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
         self._clip, self._start, self._end = clip, times[0], times[-1]
         self._drift = clip.joints[-1, character.head, :3, 3] - clip.joints[0, character.head, :3, 3]

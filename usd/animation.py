@@ -31,10 +31,7 @@ def write_animation(
     # A joint's own axes keep unit length in the stage's unit; only its place is scaled.
     world[..., :3, :3] = rotation.rotation_part(world, path)
     local = _local(world, character.skeleton.parents)
-    turns = rotation.to_quaternion(local[..., :3, :3])
-    # One continuous sign per joint, or a player that blends linearly between samples passes through zero.
-    flips = np.sum(turns[1:] * turns[:-1], axis=-1) < 0
-    turns[1:] *= np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
+    turns = rotation.continuous(rotation.to_quaternion(local[..., :3, :3]))
     places = local[..., :3, 3]
     animation = UsdSkel.Animation.Define(stage, path)
     animation.CreateJointsAttr(list(character.skeleton.names))

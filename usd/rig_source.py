@@ -13,6 +13,7 @@ from neuralocks_core.cuts import find_cuts
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
+from neuralocks_core.rotation import angle_between
 
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
@@ -62,7 +63,7 @@ class StageRig:
         """
         ends = self.clip.joints[[0, -1], :, :3, :3]
         first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
-        turn = np.degrees(np.arccos(np.clip((np.einsum("jab,jab->j", first, last) - 1) / 2, -1, 1)))
+        turn = np.degrees(angle_between(first, last))
         turn[list(replaced)] = 0
         if turn.max() <= LOOP_GAP:
             return []

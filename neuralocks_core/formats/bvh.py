@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from neuralocks_core.character import Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LARGEST_CLIP, Clip
+from neuralocks_core.rotation import angle_between
 
 LARGEST_FILE = 256 * 2**20
 """Bytes; an hour of motion at 120 frames a second is about that."""
@@ -271,6 +272,5 @@ def _first_of_motion(world: np.ndarray) -> int:
     """0, or 1 where the first frame is a T-pose from which the motion jumps away."""
     if len(world) < 4:
         return 0
-    cosine = (np.einsum("tjxy,tjxy->tj", world[1:, :, :3, :3], world[:-1, :, :3, :3]) - 1) / 2
-    jump = np.arccos(np.clip(cosine, -1, 1)).max(axis=1)
+    jump = angle_between(world[1:, :, :3, :3], world[:-1, :, :3, :3]).max(axis=1)
     return int(jump[0] > 0.3 and jump[0] > 4 * jump[1:].max())
