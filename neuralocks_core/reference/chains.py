@@ -14,8 +14,8 @@ import numpy as np
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearBody
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices
-from neuralocks_core.rotation import quaternion_product
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains
+from neuralocks_core.rotation import from_quaternion, quaternion_product
 
 ITERATIONS = 2
 """Gauss-Newton steps to each step in time."""
@@ -77,7 +77,7 @@ class ChainSolver:
                 share = 1.0 if sample == 0 else (part + 1) / substeps
                 head = _between(previous, heads[:, sample], share)
                 rotation, origin = head[:, :3, :3], head[:, :3, 3]
-                ends = bone_ends(self.chains, *pose_chains(self.chains, quaternion_matrices(turns)))
+                ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
                 if last is None:
                     last = before = np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
                 if sample == 0:  # settles without momentum
@@ -97,7 +97,7 @@ class ChainSolver:
         inertia, drag = 1 / h**2, self.damping / h
         planes = None
         for _ in range(ITERATIONS):
-            matrices = quaternion_matrices(turns)
+            matrices = from_quaternion(turns)
             rotations, positions = pose_chains(chains, matrices)
             ends = bone_ends(chains, rotations, positions)
             carriers = np.where((chains.parents < 0)[:, None, None], np.eye(3), rotations[:, chains.parents])
@@ -141,7 +141,7 @@ class ChainSolver:
             local = np.einsum("cnji,cnj->cni", carriers, change)
             turns = quaternion_product(_small(local), turns)
             turns = np.where(turns[..., :1] < 0, -turns, turns)
-        return turns, bone_ends(chains, *pose_chains(chains, quaternion_matrices(turns)))
+        return turns, bone_ends(chains, *pose_chains(chains, from_quaternion(turns)))
 
     def _limits(self, body):
         """Distance that each contact keeps: its radius, or its distance at rest if that is less."""

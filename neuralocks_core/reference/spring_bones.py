@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.kinematics import quaternion_matrices
+from neuralocks_core.rotation import from_quaternion
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def spring_bones(
             local = np.einsum("cji,cj->ci", carrier, new - place[:, j]) / lengths[j]
             turn = _from_to(bones[j] / lengths[j], local)
             result[:, frame, j] = turn
-            world[:, j] = carrier @ quaternion_matrices(turn)
+            world[:, j] = carrier @ from_quaternion(turn)
     return result
 
 

@@ -24,17 +24,6 @@ def half_turns(raw: np.ndarray, max_angle: float) -> np.ndarray:
     return np.concatenate([scalar, vector], axis=-1)
 
 
-def quaternion_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4) wxyz."""
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
 def pose_chains(chains: HairChains, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Turns (B, N, 3, 3) in canonical axes -> rotations G (B, N, 3, 3) since bind and joint positions (B, N, 3) [m]."""
     rotations = np.empty_like(turns)

@@ -13,9 +13,10 @@ from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
-from neuralocks_core.rig.kinematics import pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.kinematics import pose_chains, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig_body import body_around, posed_distances, rest_distances
 from neuralocks_core.training.rig_energy import RigMaterial, RodTree
 from neuralocks_core.training.rig_report import depths, hair_points, no_turns
@@ -113,7 +114,7 @@ def _depths(rig: HairRig, candidates: dict[str, np.ndarray], joints: np.ndarray)
     outside = rest_distances(rig, rig.points) > 0
     few, result = joints[:, ::8].reshape(-1, *joints.shape[2:]), {}
     for name, turns in candidates.items():
-        matrices = quaternion_matrices(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
+        matrices = from_quaternion(turns[:, ::8].reshape(len(few), -1, 4).astype(float))
         points = skin(rig.chains, *pose_chains(rig.chains, matrices), rig.points[outside], rig.weights[outside])
         result[name] = depths(posed_distances(rig, few, points))
     return result

@@ -6,7 +6,8 @@ import torch
 
 from neuralocks_core.joint_names import leaf
 from neuralocks_core.progress import Progress, silent
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
+from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig_body import rest_distances
 from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, bounded_turns
 from neuralocks_core.training.rig_poses import PosePool
@@ -70,7 +71,7 @@ def static_report(
         for name, state in states.items():
             begin, done = done, done + len(state)
             tell = within(say, 300 + 700 * begin // whole, 300 + 700 * done // whole)
-            points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(state)), rig.points, rig.weights)
+            points = skin(rig.chains, *pose_chains(rig.chains, from_quaternion(state)), rig.points, rig.weights)
             distance = pool.distances(poses[: len(state)], points, tell)[:, outside]
             report[f"penetration_{name}"] = depths(distance)
         report["hair_vertices"] = int(outside.sum())
@@ -84,7 +85,7 @@ def hair_points(rig, turns: np.ndarray) -> np.ndarray:
     """Where the hair is, canonical (..., P, 3) [m], for turns (..., N, 4): vertices of its mesh, at most POINTS and evenly
     chosen, or the bones' ends where it has none. Vertices tell of locks that twist about themselves, as ends do not.
     """
-    posed = pose_chains(rig.chains, quaternion_matrices(turns.reshape(-1, *turns.shape[-2:]).astype(float)))
+    posed = pose_chains(rig.chains, from_quaternion(turns.reshape(-1, *turns.shape[-2:]).astype(float)))
     few = np.linspace(0, len(rig.points) - 1, min(POINTS, len(rig.points))).astype(int)
     if len(few):
         points = skin(rig.chains, *posed, rig.points[few], rig.weights[few])
@@ -117,7 +118,7 @@ def depths(distance: np.ndarray) -> dict:
 
 
 def _ends(rig, turns: np.ndarray) -> np.ndarray:
-    return bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)))
+    return bone_ends(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)))
 
 
 def _optimise(energy, pool, poses, gravity, max_angle, start, say) -> np.ndarray:

@@ -13,11 +13,11 @@ from neuralocks_core.character import Body
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
-from neuralocks_core.rig.kinematics import bone_ends, pose_chains, quaternion_matrices, skin
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
 from neuralocks_core.rig.network import feature_columns
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
-from neuralocks_core.rotation import from_vector
+from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig import train_static
 from neuralocks_core.training.rig_body import BodyPatch
@@ -60,7 +60,7 @@ def test_ribbons_that_fall_over_the_head_lie_on_it():
     depths = []
     for met in (None, balls):
         turns = solver.simulate(heads, 1 / 30, met)[0].astype(float)
-        points = skin(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)), rig.points, rig.weights)
+        points = skin(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)), rig.points, rig.weights)
         depths.append(RADIUS - np.linalg.norm(points - CENTRE, axis=-1).min())
     assert depths[0] > 0.02 and depths[1] < -0.004, depths
 
@@ -140,7 +140,7 @@ def test_twist_of_a_lock_is_seen_and_learned_from():
     angle, joint = 1.0, rig.chains.bone_joint[-1]
     axis = rig.chains.bones[-1] / np.linalg.norm(rig.chains.bones[-1])
     turns[1, joint] = [np.cos(angle / 2), *(np.sin(angle / 2) * axis)]
-    ends = bone_ends(rig.chains, *pose_chains(rig.chains, quaternion_matrices(turns)))
+    ends = bone_ends(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)))
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
     still, twisted = hair_points(rig, turns)
     assert np.linalg.norm(twisted - still, axis=1).max() > 0.01

@@ -14,14 +14,9 @@ from neuralocks_core.character import Body
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains, rig_spec
-from neuralocks_core.rig.kinematics import (
-    bone_ends,
-    half_turns,
-    pose_chains,
-    quaternion_matrices,
-    skin,
-)
+from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, skin
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training import rig_dynamic
 from neuralocks_core.training.rig import train_static
 from neuralocks_core.training.rig_body import posed_distances, rest_distances
@@ -53,7 +48,7 @@ def test_torch_and_numpy_pose_alike():
     turns = half_turns(raw, 2.4)
     np.testing.assert_allclose(bounded_turns(torch.as_tensor(raw), 2.4).numpy(), turns, atol=1e-12)
     rotation, position, ends = energy.pose(torch.as_tensor(turns))
-    ours = pose_chains(rig.chains, quaternion_matrices(turns))
+    ours = pose_chains(rig.chains, from_quaternion(turns))
     np.testing.assert_allclose(position.numpy(), ours[1], atol=1e-12)
     np.testing.assert_allclose(ends.numpy(), bone_ends(rig.chains, *ours), atol=1e-12)
     np.testing.assert_allclose(
