@@ -7,13 +7,17 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
+from neuralocks_core.physics.adhesion import STIFFNESS as ADHESION
 from neuralocks_core.physics.adhesion import adhesion
+from neuralocks_core.physics.bend_twist import STIFFNESS as BEND
 from neuralocks_core.physics.bend_twist import Cosserat, bend_twist
-from neuralocks_core.physics.body_collision import body_collision
+from neuralocks_core.physics.body_collision import MARGIN, body_collision
+from neuralocks_core.physics.body_collision import STIFFNESS as COLLISION
 from neuralocks_core.physics.gravity import gravity
 from neuralocks_core.physics.hair_style import hair_style
 from neuralocks_core.physics.inertia import damping, inertia
 from neuralocks_core.physics.rods import Rods
+from neuralocks_core.physics.stretch import STIFFNESS as STRETCH
 from neuralocks_core.physics.stretch import stretch
 
 
@@ -35,7 +39,7 @@ class Surroundings:
 
     gravity: Tensor | None = None
     planes: Tensor | None = None
-    margin: Tensor | float = 0.004
+    margin: Tensor | float = MARGIN
     distance: Tensor | None = None
     neighbours: Tensor | None = None
     before: Tensor | None = None
@@ -48,12 +52,12 @@ class Surroundings:
 class Stiffness:
     """Constants, per unit line density; numbers or tensors (..., S, 1). See the module of each for the unit."""
 
-    stretch: float | Tensor = 1000.0
-    bend: float | Tensor = 1e-3
+    stretch: float | Tensor = STRETCH
+    bend: float | Tensor = BEND
     weight: float | Tensor = 1.0
     damping: float | Tensor = 10.0
-    clumping: float | Tensor = 60.0
-    collision: float | Tensor = 1e6
+    clumping: float | Tensor = ADHESION
+    collision: float | Tensor = COLLISION
     style: float | Tensor = 0.0
     inertia: float = 1.0
 

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from neuralocks_core.physics.body_collision import MARGIN
 from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.strands import K
 from neuralocks_core.training.descent import Descended, Schedule, descend, muon
@@ -23,8 +24,6 @@ from neuralocks_core.training.farm import load
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
 
-MARGIN = 0.004
-"""[m] Distance to the body that the solver keeps, and below which the collision term acts."""
 STILL = 0.01
 """Motion, in strand lengths, below which a strand counts as standing."""
 CREEP = 0.002

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.motion import GRAVITY, G
+from neuralocks_core.physics.body_collision import LINEAR
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig_body import rest_clearance
@@ -179,8 +180,7 @@ class RigEnergy(torch.nn.Module):
         """
         margins = self.margins if chosen is None else self.margins[chosen]
         depth = torch.relu(margins - ((points * normals).sum(-1) - offsets))
-        cap = 0.02
-        cubic = depth.clamp(max=cap).pow(3) + 3 * cap * cap * (depth - cap).clamp(min=0)
+        cubic = depth.clamp(max=LINEAR).pow(3) + 3 * LINEAR * LINEAR * (depth - LINEAR).clamp(min=0)
         return self.material.collision * cubic.mean(-1)
 
 
