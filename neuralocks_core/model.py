@@ -4,6 +4,7 @@
 import json
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -47,6 +48,18 @@ def shipped(kind: str = "strands") -> Path:
     return path
 
 
+def named(path: str | os.PathLike) -> Path:
+    """The path of a model file that is to be written.
+
+    Raises:
+        NeuralocksError: it is no name for one.
+    """
+    path = Path(path)
+    if path.suffix != ".neuralocks":
+        raise NeuralocksError(f"{path}: a model file ends in .neuralocks; choose such a name")
+    return path
+
+
 def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path:
     """Write a model file at once under its final name.
 
@@ -54,10 +67,12 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
         path: ends in `.neuralocks`.
         meta: plain JSON values; `kind` is needed, `format` is set here.
         graphs: the ONNX files that `KINDS[kind]` lists.
+
+    Raises:
+        NeuralocksError: it has another name, or cannot be written.
+        ValueError: the graphs are not those of its kind, or `meta` holds NaN.
     """
-    path = Path(path)
-    if path.suffix != ".neuralocks":
-        raise NeuralocksError(f"{path}: a model file ends in .neuralocks; choose such a name")
+    path = named(path)
     if set(graphs) != set(KINDS[meta["kind"]]):
         raise ValueError(f"a {meta['kind']} model holds {KINDS[meta['kind']]}, not {tuple(graphs)}")
     text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
@@ -122,8 +137,6 @@ def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes
         raise NeuralocksError(
             f"{path}: {info.filename} claims {info.file_size} bytes, more than a model has; get another copy"
         )
-    import zlib
-
     try:
         with archive.open(info) as file:
             data = file.read(_LARGEST + 1)

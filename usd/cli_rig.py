@@ -43,8 +43,9 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a tiny network for the hair joints of one rig. No data is needed."""
-    if out.suffix != ".neuralocks":
-        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
+    from neuralocks_core import model as model_file
+
+    model_file.named(out)
     changed = {"bend": bend, "weight": weight, "damping": damping}
     _check_amounts(dynamic, seconds, steps, hidden, clips, changed)
     from .rig_train import train_rig

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.lock_file import FolderLock
@@ -32,9 +33,7 @@ def work_folder(out: str | Path, resume: bool) -> Path:
     Raises:
         NeuralocksError: `out` is no name for a model, or there is nothing to resume.
     """
-    out = Path(out)
-    if out.suffix != ".neuralocks":
-        raise NeuralocksError(f"{out}: a model file ends in .neuralocks; choose such a name")
+    out = model.named(out)
     work = out.with_name(out.name + ".training")
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
@@ -84,7 +83,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
     file, now = work / INPUTS, _inputs(scene)
     if resume and file.exists():
         try:
-            before = json.loads(file.read_text())
+            before = json.loads(file.read_text("utf-8"))
             changed = [name for name in now if before[name] != now[name]]
         except (OSError, ValueError, KeyError, TypeError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
@@ -98,7 +97,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
                 "without --resume"
             )
     with atomic_write(file) as part:
-        part.write_text(json.dumps(now))
+        part.write_text(json.dumps(now), "utf-8")
 
 
 def _inputs(scene: TrainingScene) -> dict:
