@@ -90,6 +90,16 @@ class Body:
     joint_weights: np.ndarray
     shapes: dict[str, np.ndarray] = field(default_factory=dict)
 
+    def part(self, vertices: np.ndarray, triangles: np.ndarray) -> "Body":
+        """Some of the vertices (v,), with triangles (f, 3) whose corners are counted among these."""
+        return Body(
+            self.points[vertices],
+            triangles,
+            self.joint_indices[vertices],
+            self.joint_weights[vertices],
+            {name: offsets[vertices] for name, offsets in self.shapes.items()},
+        )
+
     def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
         """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
         if weights is None or not len(self.shapes) or not len(weights):

@@ -265,10 +265,4 @@ def _within_reach(character: Character, strands: StrandSet) -> Body | None:
     if not len(faces):
         return None
     used, triangles = np.unique(faces, return_inverse=True)
-    return Body(
-        body.points[used],
-        triangles.reshape(-1, 3),
-        body.joint_indices[used],
-        body.joint_weights[used],
-        {name: offsets[used] for name, offsets in body.shapes.items()},
-    )
+    return body.part(used, triangles.reshape(-1, 3))

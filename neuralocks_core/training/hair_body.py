@@ -42,13 +42,7 @@ def hair_body(character: Character, reach: float) -> Body | None:
     new[used] = group
     faces = new[faces]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return Body(
-        body.points[keeper],
-        faces[whole].astype(np.int32),
-        body.joint_indices[keeper],
-        body.joint_weights[keeper],
-        {name: offsets[keeper] for name, offsets in body.shapes.items()},
-    )
+    return body.part(keeper, faces[whole].astype(np.int32))
 
 
 def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The body around the head of a rig with mesh hair: posed, and how far from it points are."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.character import Body
 from neuralocks_core.collider import Collider
 from neuralocks_core.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
@@ -29,14 +30,14 @@ class BodyPatch:
         used = np.unique(body.triangles[inside])
         place = np.zeros(len(body.points), int)
         place[used] = np.arange(len(used))
-        weights, joints = body.joint_weights[used], body.joint_indices[used]
+        near = body.part(used, place[body.triangles[inside]])
         # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(weights * (joints == character.head), axis=1)
+        on_head = np.sum(near.joint_weights * (near.joint_indices == character.head), axis=1)
         shapes = {}
-        for name, offsets in body.shapes.items():
-            mean = offsets[used][on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
-            shapes[name] = (offsets[used] - mean) * (1 - on_head)[:, None]
-        self.body = Body(body.points[used], place[body.triangles[inside]], joints, weights, shapes)
+        for name, offsets in near.shapes.items():
+            mean = offsets[on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
+            shapes[name] = (offsets - mean) * (1 - on_head)[:, None]
+        self.body = replace(near, shapes=shapes)
         self.kept = np.sort(rng.permutation(len(used))[:most_points])
         cut = np.zeros(len(body.points), bool)
         cut[body.triangles[~inside]] = True
