@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,10 @@ LARGEST = 1e6
 """No length in a file, in its own unit, is larger."""
 LONGEST_NUMBER = 64
 """Characters; an array of words is as wide as its longest one."""
+LONGEST_NAME = 200
+"""Characters of a joint's name that are kept."""
+PIECE = 1 << 16
+"""Bytes of the frames that are made numbers at a time."""
 MOST_NAMES = 2**24
 """Characters of all joint paths together; each path repeats those of the joints above."""
 UNITS = (1.0, 0.01, 0.0254, 0.056444, 0.001)
@@ -81,6 +86,9 @@ class _Joint:
     end: np.ndarray | None = None
 
 
+_WORD, _BREAK = re.compile(rb"\S+"), re.compile(rb"\s")
+
+
 class _Words:
     """The file's words one by one, with errors that name it."""
 
@@ -91,19 +99,26 @@ class _Words:
                 raise self.error("no such file", "check the path")
             if path.stat().st_size > LARGEST_FILE:
                 raise self.error(f"larger than {LARGEST_FILE} bytes", "cut the take")
-            self.words = path.read_bytes().split()
+            self._content = path.read_bytes()
         except OSError as error:
             raise self.error(f"cannot be read ({error.strerror})", "check its permissions") from None
-        self.place = 0
+        # One after the other: the words of a hostile file never become millions of Python objects.
+        self._found, self._place = _WORD.finditer(self._content), 0
 
     def error(self, fact: str, remedy: str = "export it again as BVH") -> NeuralocksError:
         return NeuralocksError(f"{self.path}: {fact}; {remedy}")
 
     def next(self) -> str:
-        if self.place >= len(self.words):
+        word = next(self._found, None)
+        if word is None:
             raise self.error("ends in the middle")
-        self.place += 1
-        return self.words[self.place - 1].decode("utf-8", "replace")
+        self._place = word.end()
+        return word[0].decode("utf-8", "replace")
+
+    @property
+    def left(self) -> int:
+        """Bytes after the last word."""
+        return len(self._content) - self._place
 
     def expect(self, word: str) -> None:
         found = self.next()
@@ -125,6 +140,22 @@ class _Words:
         if value != int(value) or not 0 <= value <= highest:
             raise self.error(f"says {value:g} {what}, where 0 to {highest} are possible")
         return int(value)
+
+    def numbers(self, most: int) -> np.ndarray:
+        """All that follows as numbers (n,), or so many of them where there are more."""
+        values, start = [np.zeros(0)], self._place
+        while most and start < len(self._content):
+            gap = _BREAK.search(self._content, start + PIECE)
+            end = gap.start() if gap else len(self._content)
+            block = self._content[start:end].split()[:most]
+            if max(map(len, block), default=0) > LONGEST_NUMBER:
+                raise self.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
+            try:
+                values.append(np.array(block, bytes).astype(float))
+            except ValueError as error:
+                raise self.error(f"its frames hold what is no number ({str(error)[:80]})") from None
+            start, most = end, most - len(block)
+        return np.concatenate(values)
 
 
 def _hierarchy(words: _Words) -> list[_Joint]:
@@ -177,17 +208,17 @@ def _name(words: _Words) -> str:
     """A joint's name: all words up to the brace, without what joint paths cannot hold."""
     parts = []
     while (word := words.next()) != "{":
-        parts.append(word)
-    return "_".join(parts).replace("/", "_")[:200] or "joint"
+        if len(parts) < LONGEST_NAME:
+            parts.append(word)
+    return "_".join(parts).replace("/", "_")[:LONGEST_NAME] or "joint"
 
 
 def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
     words.expect("Frames:")
     width = sum(len(joint.channels) for joint in joints)
-    left = len(words.words) - words.place - 3
     if not width:
         raise words.error("no joint has a channel")
-    frames = words.count(max(left // width, 0), "frames, of which the file holds fewer")
+    frames = words.count(int(LARGEST), "frames")
     words.expect("Frame")
     words.expect("Time:")
     step = words.number()
@@ -201,13 +232,10 @@ def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
 
 
 def _values(words: _Words, frames: int, width: int) -> np.ndarray:
-    block = words.words[words.place : words.place + frames * width]
-    if max(map(len, block), default=0) > LONGEST_NUMBER:
-        raise words.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
-    try:
-        values = np.array(block).astype(float).reshape(frames, width)
-    except ValueError as error:
-        raise words.error(f"its frames hold what is no number ({str(error)[:80]})") from None
+    values = words.numbers(frames * width) if frames * width <= words.left else ()
+    if len(values) < frames * width:
+        raise words.error(f"says {frames} frames, of which it holds fewer")
+    values = values.reshape(frames, width)
     bad = ~(np.abs(values) <= LARGEST).all(axis=1)
     if bad.any():
         raise words.error(f"frame {bad.argmax()} holds NaN or too large a number", "repair the take")

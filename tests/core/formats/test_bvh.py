@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats import bvh
 from neuralocks_core.formats.bvh import read_bvh
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "motion"
@@ -126,6 +127,18 @@ def test_small_files_do_not_ask_for_much_memory(tmp_path):
             read_bvh(written(tmp_path, text))
         assert tracemalloc.get_traced_memory()[1] < 50 * len(text)
         tracemalloc.stop()
+
+
+def test_reading_takes_little_memory_beside_the_file_and_the_motion(tmp_path):
+    frames = 30_000
+    path = written(tmp_path, TEXT.replace("Frames: 2", f"Frames: {frames}") + "0 " * 12 * frames)
+    tracemalloc.start()
+    words = bvh._Words(path)
+    joints = bvh._hierarchy(words)
+    values = bvh._values(words, bvh._motion_header(words, joints)[0], 12)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < path.stat().st_size + 3 * values.nbytes + 40 * bvh.PIECE
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the shared motion capture is not there")
