@@ -48,7 +48,7 @@ def hair_body(character: Character, reach: float) -> Body | None:
 def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Groups (V,) int in which no vertices of opposite sides are together, from groups (V,) and normals (V, 3).
 
-    An ear's two sides welded to one sheet have neither an inside nor an outside: hair 8 cm beside it was pulled in.
+    An ear's two sides welded to one sheet have neither an inside nor an outside: hair 8 cm beside it is pulled in.
     """
     mean = np.stack([np.bincount(group, part) for part in normals.T], axis=1)
     mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)

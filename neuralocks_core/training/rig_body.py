@@ -56,8 +56,8 @@ def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
     """Distance (V,) [m] that canonical points (V, 3) may come near the body: what they have in bind pose, exactly or by
     the nearest body vertex's plane, whichever is less.
 
-    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair was thrown
-    from where the artist had put it.
+    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair would be thrown
+    from where the artist has put it.
     """
     exact, body = rest_distances(rig, points), rig.character.body
     if body is None or not len(points):

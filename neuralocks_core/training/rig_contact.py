@@ -14,16 +14,16 @@ from neuralocks_core.training.rig_poses import PosePool
 COLLIDING = 96
 """Hair vertices that collide in one step, drawn anew: finding the nearest body is half of a step's time."""
 EVERY, RENEWED = 16, 8
-"""Every so many steps so many poses are replaced: with a fixed pool the hair kept clear of the bodies that it knew, and
-went twice as deep into others."""
+"""Every so many steps so many poses are replaced: with a fixed pool hair keeps clear of the bodies that it knows, and
+goes twice as deep into others."""
 HARD = 256
 """So many situations in which hair lay deepest are remembered. Among random ones alone they are met too seldom to be
-learned: of 1,000 held-out poses hair was deeper than 5 mm in ten to twenty, and is in at most six."""
+learned: of 1,000 held-out poses hair is then deeper than 5 mm in ten to twenty, and so in at most six."""
 
 GENTLE, GROWING = 1e-3, 0.6
 """Contact begins with this share of its weight, which grows evenly in its logarithm over this share of the budget. With all
 of it from the start the first steps throw hair off the body as far as it goes, and where it comes down again, in front of a
-shoulder or behind it, is luck: one seed in four never came near the others' energy."""
+shoulder or behind it, is luck: one seed in four never comes near the others' energy."""
 
 
 def contact_weight(done: float) -> float:

@@ -25,7 +25,7 @@ from neuralocks_core.training.rig_report import static_report, within
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
 _BESIDE = 0.02
-"""How far beside a bone's end [m] a turn shows: of ends alone networks learned that locks may twist as they like."""
+"""How far beside a bone's end [m] a turn shows: of ends alone networks learn that locks may twist as they like."""
 _COLLISION, _HELD_COLLISION, _HELD_ELASTIC = 1.5e-4, 2e-4, 2e-3
 """Of the skinned mesh's contact in motion and in held poses, and of gravity and bending in held poses [m^2/s^2], against
 squared errors [m^2]. Clips hold few of the poses that necks can take; energy needs no clip."""
