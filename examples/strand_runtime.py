@@ -27,7 +27,7 @@ class Runtime:
     """One groom in one material: what no frame changes is read once; `strands` makes a frame."""
 
     def __init__(self, folder: Path, name: str, material: dict[str, float]):
-        described = json.loads((folder / "description.json").read_text())
+        described = json.loads((folder / "description.json").read_text("utf-8"))
         self.model, self.parts = described["model"], described["boundary vector"]["parts"]
         self.weights = np.array(described["boundary vector"]["bin weights"])
         self.joints = described["grooms"]["files"][name]["joints"]
@@ -144,7 +144,7 @@ def check_even(stage: Usd.Stage, prim: str) -> None:
 
 def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str, float]) -> float:
     """How far this runtime's strands lie from a bake's in the same material at most [m]."""
-    files = json.loads((folder / "description.json").read_text())["grooms"]["files"]
+    files = json.loads((folder / "description.json").read_text("utf-8"))["grooms"]["files"]
     stage, result, worst = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), 0.0
     for name, facts in files.items():
         runtime, motion = Runtime(folder, name, material), Motion(stage, facts["joints"])

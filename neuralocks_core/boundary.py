@@ -67,7 +67,11 @@ class BoundarySpec:
 
     @classmethod
     def from_json(cls, values: dict) -> "BoundarySpec":
-        """Make it from what `to_json` gave; unknown keys mean a later version."""
+        """Make it from what `to_json` gave.
+
+        Raises:
+            NeuralocksError: it holds what cannot be, or what a later version knows.
+        """
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
             raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")

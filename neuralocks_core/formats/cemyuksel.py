@@ -23,6 +23,9 @@ def read(content: bytes, subject: str) -> RawGroom:
     Args:
         content: the whole file.
         subject: what messages call it.
+
+    Raises:
+        NeuralocksError: it is truncated, or holds no points.
     """
     if len(content) < _HEADER.size:
         raise bad_file(subject, f"has {len(content)} bytes but the header has {_HEADER.size}", "it is truncated")

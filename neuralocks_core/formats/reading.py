@@ -42,7 +42,7 @@ def read(path: str | Path, unit: str | float | None = None, up: str | None = Non
 def read_with_notes(
     path: str | Path, unit: str | float | None = None, up: str | None = None
 ) -> tuple[Groom, list[str]]:
-    """The same as `read`, and one line for each thing that was assumed or left out."""
+    """The same as `read`, with its errors, and one line for each thing that was assumed or left out."""
     path = Path(path)
     wanted = None if unit is None else metres_per_unit(unit)
     wanted_axis = None if up is None else upward_axis(up)

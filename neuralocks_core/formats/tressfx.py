@@ -23,6 +23,9 @@ def read(content: bytes, subject: str) -> RawGroom:
     Args:
         content: the whole file.
         subject: what messages call it.
+
+    Raises:
+        NeuralocksError: it is truncated, of another version, or holds no strands.
     """
     if len(content) < 12:
         raise bad_file(subject, f"has {len(content)} bytes, fewer than a TressFX header", "it is truncated")

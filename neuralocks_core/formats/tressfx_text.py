@@ -30,6 +30,9 @@ def read(content: bytes, subject: str) -> RawGroom:
     Args:
         content: the whole file.
         subject: what messages call it.
+
+    Raises:
+        NeuralocksError: it is truncated, of another version, malformed, or holds no strands.
     """
     # Line by line into plain arrays: the numbers of a hostile file never become millions of Python objects.
     lines = enumerate(io.BytesIO(content.removeprefix(codecs.BOM_UTF8)), start=1)

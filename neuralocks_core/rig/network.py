@@ -106,6 +106,9 @@ class RigModel:
         Returns:
             unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind
             local rotation * this.
+
+        Raises:
+            NeuralocksError: the features are not as many as the model reads.
         """
         features = np.asarray(features)
         if features.dtype != np.float32:  # numbers that single precision has no room for are beyond the limits anyway
@@ -155,7 +158,11 @@ class RigModel:
 
     @classmethod
     def load(cls, path=None) -> "RigModel":
-        """Read a model file; the shipped one where none is named."""
+        """Read a model file; the shipped one where none is named.
+
+        Raises:
+            NeuralocksError: it is missing, damaged, of a later format or no model of mesh hair.
+        """
         path = model_file.shipped("rig") if path is None else path
         meta = model_file.read(path, "rig").meta
         try:
@@ -197,6 +204,7 @@ def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray)
     """Features (n, F) float32 of held poses.
 
     Args:
+        spec: what the network reads; its history stays zero.
         relative: rotations of neck and upper chest relative to the head, since bind, canonical axes, (n, 2, 3, 3).
         gravity: its direction in the head's frame, (n, 3).
     """
