@@ -26,6 +26,20 @@ def test_products_of_quaternions_of_any_length_turn_by_b_and_then_a():
     np.testing.assert_allclose(rotation.from_quaternion(product), one_by_one, atol=1e-12)
 
 
+def test_quaternions_of_a_motion_go_on_from_each_other():
+    turns = rotation.from_vector(np.linspace(0, 4 * np.pi, 60)[:, None, None] * [[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]])
+    found = rotation.to_quaternion(turns)
+    smooth = rotation.continuous(found)
+    assert ((found[1:] * found[:-1]).sum(axis=-1) < 0).any() and ((smooth[1:] * smooth[:-1]).sum(axis=-1) > 0.9).all()
+    np.testing.assert_array_equal(np.abs(smooth), np.abs(found))
+
+
+def test_the_angle_between_rotations_is_that_of_the_turn_from_one_to_the_other():
+    a, b = rotation.from_vector(np.random.default_rng(0).normal(size=(2, 20, 3)))
+    angles = np.linalg.norm(rotation.to_vector(b @ np.swapaxes(a, -1, -2)), axis=-1)
+    np.testing.assert_allclose(rotation.angle_between(a, b), angles, atol=1e-7)
+
+
 def test_affine_transforms_are_undone_by_their_inverse_and_flat_ones_refused():
     rng = np.random.default_rng(4)
     for size in (1e-3, 1.0, 1e3):
