@@ -3,7 +3,6 @@
 
 import math
 import os
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
 
+from .damage import first_line, named
 from .stopping import check
 
 LAYERS = (".usd", ".usda", ".usdc")
@@ -171,23 +171,13 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
         NeuralocksError: the path has another ending, or cannot be written.
     """
     check_layer_name(path)
-    try:
-        with atomic_write(path) as part:
-            stage = Usd.Stage.CreateNew(str(part))
-            author(stage)
-            stage.GetRootLayer().Save()
-            del stage
-            check()
-    except Tf.ErrorException as error:
-        raise NeuralocksError(f"{path}: cannot be written ({first_line(error)}); choose another folder") from None
+    with named(path), atomic_write(path) as part:
+        stage = Usd.Stage.CreateNew(str(part))
+        author(stage)
+        stage.GetRootLayer().Save()
+        del stage
+        check()
     return path
-
-
-def first_line(error: Exception) -> str:
-    """The message of a USD error without USD's own source positions."""
-    found = re.search(r" : '(.*?)'\s*$", str(error), re.MULTILINE | re.DOTALL)
-    lines = (found.group(1) if found else str(error)).strip().splitlines() or ["unknown error"]
-    return lines[0].strip().rstrip(".")[:200]
 
 
 def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:

@@ -1,23 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A damaged USD file may open and still have values that cannot be unpacked: USD says so when they are read."""
+"""USD's errors as one line that names the file: what cannot be written, and what is damaged."""
 
 import functools
+import inspect
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 from pxr import Tf
 
 from neuralocks_core.errors import NeuralocksError
 
-from .border import first_line
-
 
 def names_damage(function):
-    """A decorator: USD's errors in a function become one line that names its first argument, a path or what was read."""
+    """A decorator: USD's errors in a function become one line that names its first argument, a path or what was read.
+
+    A damaged file may open and still have values that cannot be unpacked: USD says so when they are read.
+    """
+    arguments = inspect.signature(function)
 
     @functools.wraps(function)
-    def run(source, *args, **kwargs):
+    def run(*args, **kwargs):
         try:
-            return function(source, *args, **kwargs)
+            return function(*args, **kwargs)
         except Tf.ErrorException as error:
+            source = next(iter(arguments.bind(*args, **kwargs).arguments.values()))
             source = getattr(source, "shot", source)
             path = getattr(source, "path", source)
             raise NeuralocksError(
@@ -25,3 +33,21 @@ def names_damage(function):
             ) from None
 
     return run
+
+
+@contextmanager
+def named(out: Path) -> Iterator[None]:
+    """Turns USD's errors in what writes a file into one line that names it."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        raise NeuralocksError(
+            f"{out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
+        ) from None
+
+
+def first_line(error: Exception) -> str:
+    """The message of a USD error without USD's own source positions."""
+    found = re.search(r" : '(.*?)'\s*$", str(error), re.MULTILINE | re.DOTALL)
+    lines = (found.group(1) if found else str(error)).strip().splitlines() or ["unknown error"]
+    return lines[0].strip().rstrip(".")[:200]

@@ -3,6 +3,7 @@
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,11 +14,12 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 
-from .border import Border, check_layer_name, check_not_input, first_line, one_file, open_stage
+from .border import Border, check_layer_name, check_not_input, one_file, open_stage
+from .damage import first_line, named
 from .notes import composition_notes, out_of_place
 from .override import deliver, relative, repeat_metadata
 from .recorded import KEY
-from .sample_layer import Lagging, SampleLayer, named
+from .sample_layer import Lagging, SampleLayer
 from .spool import Spool, fingerprint
 
 
@@ -95,18 +97,24 @@ class _Part:
 
     def __init__(self, path: Path):
         self.path = path
-        try:
+        with self._named():
             self.layer = Sdf.Layer.FindOrOpen(str(path))
-        except Tf.ErrorException as error:
-            raise self._damaged(error) from None
         if self.layer is None:
             raise NeuralocksError(f"{path}: no such file, or no USD file; check the path")
-        self.grooms = [prim.path for prim in _below(self.layer.pseudoRoot) if KEY in prim.customData]
+        self.grooms = [prim.path for prim in _below(self.layer.pseudoRoot) if self._is_baked(prim)]
         if not self.grooms:
             raise NeuralocksError(f"{path}: is no bake; give files that neuralocks bake wrote")
 
-    def _damaged(self, error: Exception) -> NeuralocksError:
-        return NeuralocksError(f"{self.path}: cannot be read ({first_line(error)}); bake that part again")
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except Tf.ErrorException as error:
+            raise NeuralocksError(f"{self.path}: cannot be read ({first_line(error)}); bake that part again") from None
+
+    def _is_baked(self, prim: Sdf.PrimSpec) -> bool:
+        # On what is no groom, the key tells in a word what else was written here.
+        return isinstance(prim.customData.get(KEY), dict) and bool(self.codes(prim.path))
 
     def codes(self, groom: Sdf.Path) -> list[float]:
         """Time codes of a groom's samples, ascending."""
@@ -119,10 +127,8 @@ class _Part:
             NeuralocksError: it is missing, or damaged.
         """
         path = groom.AppendProperty(name)
-        try:
+        with self._named():
             found = self.layer.QueryTimeSample(path, code)
-        except Tf.ErrorException as error:
-            raise self._damaged(error) from None
         if found is None:
             raise NeuralocksError(f"{self.path}: {path} has no sample at {code:g}; bake that part again")
         return found
@@ -134,7 +140,7 @@ class _Part:
     def made(self, groom: Sdf.Path) -> dict:
         """With what a groom was baked."""
         codes = self.codes(groom)
-        count = len(self.value(groom, codes[0], "points")) if codes else 0
+        count = len(self.value(groom, codes[0], "points"))
         options = {"velocities": self.samples_of(groom, "velocities"), "number of points": count}
         return self.layer.GetPrimAtPath(groom).customData[KEY] | options
 

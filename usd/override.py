@@ -14,8 +14,9 @@ from neuralocks_core.rotation import sizes
 
 from .border import Border, transformed
 from .curves import rest_points, widest_sample
+from .damage import named
 from .recorded import record
-from .sample_layer import SampleLayer, named
+from .sample_layer import SampleLayer
 from .spool import Spool
 from .stage import Shot, StageGroom
 from .stopping import check

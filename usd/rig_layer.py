@@ -10,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import quaternion_product, rotation_part, to_quaternion
 
+from .damage import named
 from .joints import JointSource
 from .override import write_header
 from .rig_stage import BAKED, RiggedHair
@@ -132,6 +133,6 @@ def _blend_shapes(layer, prim, animation) -> None:
 
 
 def _save(layer: Sdf.Layer, out: Path) -> None:
-    with atomic_write(out) as part:
+    with named(out), atomic_write(out) as part:
         if not layer.Export(str(part), args={"format": "usda" if out.suffix.lower() == ".usda" else "usdc"}):
             raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")

@@ -3,11 +3,9 @@
 
 from pathlib import Path
 
-from pxr import Sdf, Tf, Vt
+from pxr import Sdf, Vt
 
-from neuralocks_core.errors import NeuralocksError
-
-from .border import first_line
+from .damage import named
 
 SAVE_EVERY = 32 << 20
 """Bytes of samples held before they are saved."""
@@ -73,20 +71,3 @@ class Lagging:
     def rest(self) -> list[float]:
         """Whose velocities come last."""
         return self._waiting
-
-
-class named:
-    """Turns USD's errors into one line that names the output."""
-
-    def __init__(self, out: Path):
-        self._out = out
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, trace):
-        if kind is not None and issubclass(kind, Tf.ErrorException):
-            raise NeuralocksError(
-                f"{self._out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
-            ) from None
-        return False

@@ -215,6 +215,9 @@ def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
         except NeuralocksError as error:
             assert str(error).startswith(str(broken)) or "/Hero" in str(error)
             found.add("damaged" in str(error))
+            if "damaged" in str(error):
+                with pytest.raises(NeuralocksError, match=f"{place}.usdc: .*damaged"):
+                    read_shot(joints={}, path=broken)
     assert True in found
 
 

@@ -98,6 +98,10 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
     bake(shot, part, model, frames="1:4")
     stage = Usd.Stage.CreateNew(str(tmp_path / "empty.usda"))
     stage.GetRootLayer().Save()
+    for name, prim in (("shot", ("/Hero", "shot")), ("unsampled", ("/Hero/Hair", {"solver": "rods"}))):
+        stage = Usd.Stage.CreateNew(str(tmp_path / f"{name}_alone.usda"))
+        stage.OverridePrim(prim[0]).SetCustomDataByKey("neuralocks", prim[1])
+        stage.GetRootLayer().Save()
     (tmp_path / "broken.usdc").write_bytes(part.read_bytes()[:-300])
     elsewhere = write_shot(tmp_path, Recipe(bound="mesh", frames=12), "elsewhere")
     for frames_of, options, said in (
@@ -111,6 +115,8 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
         (shot, {"velocities": False}, "other velocities than"),
         (elsewhere, {}, "is a bake of another shot than .*part.usdc is"),
         (None, "empty.usda", "is no bake"),
+        (None, "shot_alone.usda", "is no bake"),
+        (None, "unsampled_alone.usda", "is no bake"),
         (None, "broken.usdc", "broken.usdc: cannot be read"),
         (None, "missing.usdc", "missing.usdc: cannot be read|no such file"),
     ):
