@@ -19,7 +19,7 @@ from .border import check_layer_name, check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, rigged_notes
-from .stage import check_cuts
+from .stage import check_cuts, frame_range
 from .time_codes import given_cuts, time_codes
 
 STILL = 1e-4
@@ -146,12 +146,8 @@ def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
 
 def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
     """What was asked for and the animation's own samples: the body must come out sample for sample."""
-    stage, own = hair.stage, _rotation_samples(hair)
-    known = hair.source.time_codes
-    ranged = stage.HasAuthoredTimeCodeRange()
-    first = stage.GetStartTimeCode() if ranged else float(known[0])
-    last = stage.GetEndTimeCode() if ranged else float(known[-1])
-    wanted = time_codes(frames, first, max(first, last), subframes, hair.border.frame)
+    own = _rotation_samples(hair)
+    wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
     # A frame and a sample at the same time, up to rounding, are one.
     apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
     return sorted({*apart, *own})

@@ -163,6 +163,33 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
 
 
+def test_a_full_disk_is_not_a_damaged_shot(tmp_path):
+    resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        for name in ("out.usda", "out.usdc"):
+            with pytest.raises(NeuralocksError, match=f"{name}: .*(no space|cannot be written)"):
+                bake_rig(shot, tmp_path / name, model)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [path.name for path in tmp_path.iterdir()] == ["shot.usda"]
+
+
+@pytest.mark.parametrize("first", [float("nan"), float("-inf"), 99.0])
+def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, first):
+    shot = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(shot))
+    model = model_for(read_rigged_hair(shot))
+    stage.SetStartTimeCode(first)
+    stage.SetEndTimeCode(24)
+    stage.GetRootLayer().Save()
+    out = bake_rig(shot=shot, out=tmp_path / "out.usda", model=model)
+    assert out.samples == len(read_rigged_hair(shot).source.time_codes)
+
+
 def test_a_held_head_is_that_of_a_held_pose(tmp_path):
     """Reading, or in a still: the hair hangs from the bent head as it does in a shot that passes through the pose."""
     moving = small_shot(tmp_path / "moving.usda")
