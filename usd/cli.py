@@ -226,11 +226,12 @@ def demo_command(
 
     with progress_bar("demo") as progress:
         done = demo(out, model, progress=progress)
-    note([*done.bake.notes, *done.notes])
+    notes = [*done.bake.notes, *done.notes]
+    note(notes)
     outputs = {name: str(path) for name, path in done.outputs.items()}
     if as_json:
         seconds = {name: round(value, 2) for name, value in done.seconds.items()}
-        print_json({"shot": str(done.shot), "outputs": outputs, "seconds": seconds, "notes": done.notes})
+        print_json({"shot": str(done.shot), "outputs": outputs, "seconds": seconds, "notes": notes})
         return
     typer.echo(done.card.text(encoding=sys.stdout.encoding))
     for name, path in {"shot": str(done.shot), **outputs}.items():

@@ -73,7 +73,7 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
         seconds[name] = time.monotonic() - began
         return result
 
-    # Without velocities: twice as fast and half as large, and nothing here draws motion blur.
+    # Without velocities it is half as large, and nothing here draws motion blur.
     result = timed("bake", lambda: bake(shot, outputs["bake"], model, velocities=False, progress=progress))
     baked = read_baked(outputs["bake"])
     card = timed("report card", lambda: evaluate(baked, progress=progress))

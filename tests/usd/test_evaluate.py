@@ -2,6 +2,7 @@
 """The report card, the preview and the demo on bakes whose answers are known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_a_stage_without_samples_is_no_bake():
         read_baked(shipped_shot())
 
 
-def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch):
+def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch, capsys):
     import usd.demo
 
     short = lambda *args, **options: bake(*args, frames="1:9:2", **options)  # noqa: E731
@@ -101,6 +102,11 @@ def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch):
     done = demo(tmp_path / "out", still_model, clip=False)
     assert all(path.is_file() for path in done.outputs.values())
     assert json.loads(done.outputs["report card"].read_text())["grooms"]
+    told = replace(done, bake=replace(done.bake, notes=["of the bake"]), notes=["of the picture"])
+    monkeypatch.setattr(usd.demo, "demo", lambda *args, **options: told)
+    with pytest.raises(SystemExit):
+        main(["demo", "--json"])
+    assert json.loads(capsys.readouterr().out)["notes"] == ["of the bake", "of the picture"]
 
 
 def test_only_what_was_baked_is_measured(tmp_path, model):
