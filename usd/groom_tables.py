@@ -59,13 +59,25 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
     """
     runner = StrandModel(model_file.read(model, "strands"))
     read, written = read_shot(shot, grooms, skeleton, head, joints), {}
-    for item in read.grooms:
-        stem = re.sub(r"\W+", "_", item.path.strip("/"))
-        name = f"{stem}.npz" if f"{stem}.npz" not in written else f"{stem}_{len(written)}.npz"
+    names = file_names([item.path for item in read.grooms])
+    for name, item in zip(names, read.grooms, strict=True):
         arrays, joints = tables(item, runner)
         np.savez(put(name), **arrays)
         written[name] = {"prim": item.path, "strands": len(arrays["rest"]), "joints": joints}
     return written
+
+
+def file_names(paths: list[str]) -> list[str]:
+    """A file name for each prim path; they differ in more than case, which some disks do not tell apart."""
+    names: list[str] = []
+    for path in paths:
+        stem = name = re.sub(r"\W+", "_", path.strip("/"))
+        number = 1
+        while name.casefold() in {other.casefold() for other in names}:
+            number += 1
+            name = f"{stem}_{number}"
+        names.append(name)
+    return [f"{name}.npz" for name in names]
 
 
 def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], list[str]]:
