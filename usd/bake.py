@@ -4,7 +4,6 @@
 import hashlib
 import time
 from dataclasses import asdict, dataclass
-from numbers import Real
 from pathlib import Path
 
 from neuralocks_core import model as model_file
@@ -14,6 +13,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
 
+from .amounts import check_number
 from .border import check_layer_name
 from .notes import out_of_place, out_of_range
 from .posing import GroomPoser
@@ -95,10 +95,7 @@ def bake(
     jobs = _jobs(jobs)
     strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
     look = as_material(material)
-    if isinstance(strength, bool) or not isinstance(strength, Real):
-        raise NeuralocksError(f"strength: {strength!r} is no number; 1 is what the model was trained for")
-    if not 0 <= strength <= 4:
-        raise NeuralocksError(f"strength: {strength:g} is outside 0 to 4; 1 is what the model was trained for")
+    check_number("--strength", strength, 0, 4)
     cuts = given_cuts(cuts, loop)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
@@ -153,8 +150,7 @@ def described(shot: Shot) -> list[dict]:
 def _jobs(jobs: int | None) -> int:
     if jobs is None:
         return cores()
-    if isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= 1024:
-        raise NeuralocksError(f"--jobs {jobs}: must be a whole number from 1 to 1024")
+    check_number("--jobs", jobs, 1, 1024, whole=True)
     return jobs
 
 

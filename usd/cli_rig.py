@@ -109,7 +109,9 @@ def bake(
     loop: Annotated[
         bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
     ] = False,
-    strength: Annotated[float, typer.Option(help="Motion strength of a dynamic model.")] = 1.0,
+    strength: Annotated[
+        float, typer.Option(help="Motion strength of a dynamic model, from 0 to 2; 1 is as trained.")
+    ] = 1.0,
     cuts: Cuts = None,
     head: Head = None,
     skeleton: Skeleton = None,

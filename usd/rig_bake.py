@@ -15,6 +15,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
+from .amounts import check_number
 from .border import check_layer_name, check_not_input
 from .damage import names_damage
 from .rig_layer import write_rig_layer
@@ -86,8 +87,7 @@ def bake_rig(
     """
     out, shot = as_path(out, "out"), as_path(shot, "shot")
     check_layer_name(out)
-    if not 0 <= strength <= 2:
-        raise NeuralocksError(f"--strength {strength}: must lie between 0 and 2")
+    check_number("--strength", strength, 0, 2)
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     cuts = given_cuts(cuts, loop)
     hair, moved = _read(shot, skeleton, head, model, cuts, joints)

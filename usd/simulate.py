@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 
+from .amounts import check_number
 from .bake import BakeResult, as_material, described
 from .border import check_layer_name
 from .placing import GroomPlacer
@@ -57,10 +58,8 @@ def simulate(
     check_layer_name(out)
     look = as_material(material)
     count = STRANDS if strands is None else strands
-    if count < 1:
-        raise NeuralocksError(f"--strands {count}: must be above 0")
-    if not 0 <= volume <= STIFFEST_VOLUME:
-        raise NeuralocksError(f"--volume {volume:g}: must lie between 0 and {STIFFEST_VOLUME:g}")
+    check_number("--strands", count, 1, whole=True)
+    check_number("--volume", volume, 0, STIFFEST_VOLUME)
     cuts = given_cuts(cuts)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, cuts=cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)

@@ -5,6 +5,8 @@ import math
 
 from neuralocks_core.errors import NeuralocksError
 
+from .amounts import check_number
+
 MOST = 1_000_000
 
 
@@ -30,7 +32,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     """Ascending time codes without doubles.
 
     Args:
-        frames: None for the whole range, `A:B[:STEP]`, a tuple (first, last, step), or any iterable of time codes.
+        frames: None for the whole range, `A:B[:STEP]`, or any iterable of time codes.
         first, last: the shot's range.
         subframes: samples per frame: n adds the n - 1 times at equal steps after each frame, for motion blur.
         frame: time codes from one frame to the next.
@@ -38,16 +40,9 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     Raises:
         NeuralocksError: no frame, too many, or something that is no time code.
     """
-    if isinstance(subframes, bool) or not isinstance(subframes, int) or not 1 <= subframes <= 64:
-        raise NeuralocksError(f"--subframes {subframes}: must be a whole number from 1 to 64")
-    if frames is None:
-        # Where a time code is a frame, frames are whole numbers; else the shot begins with one.
-        begin = float(math.ceil(first - 1e-9)) if frame == 1 else first
-        frames = (begin, max(last, begin), frame)
-    if isinstance(frames, str):
-        frames = parse_frames(frames, frame)
-    if isinstance(frames, tuple) and len(frames) == 3:
-        begin, end, step = _numbers(frames, "frames")
+    check_number("--subframes", subframes, 1, 64, whole=True)
+    if frames is None or isinstance(frames, str):
+        begin, end, step = _whole_range(first, last, frame) if frames is None else parse_frames(frames, frame)
         count = (end - begin) / step + 1e-9  # may overflow to infinity
         if not count * subframes < MOST:
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
@@ -72,6 +67,13 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
     if loop and given:
         raise NeuralocksError("--cuts: a loop has none; leave out --loop")
     return [] if loop else given
+
+
+def _whole_range(first: float, last: float, frame: float) -> tuple[float, float, float]:
+    """First and last time code of a shot's frames, and from one to the next."""
+    # Where a time code is a frame, frames are whole numbers; else the shot begins with one.
+    begin = float(math.ceil(first - 1e-9)) if frame == 1 else first
+    return begin, max(last, begin), frame
 
 
 def _numbers(codes, name: str) -> list[float]:

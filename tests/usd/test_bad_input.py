@@ -166,7 +166,9 @@ WRONG = {
     "number as skeleton": ({"skeleton": 5}, "skeleton: 5 is no prim path"),
     "number as frames": ({"frames": 5}, "frames: 5 holds no time codes"),
     "word as cuts": ({"cuts": "25"}, "cuts: '25' holds no time codes"),
-    "word as strength": ({"strength": "1"}, "strength: '1' is no number"),
+    "word as strength": ({"strength": "1"}, "--strength '1': must be a number from 0 to 4"),
+    "no strength": ({"strength": float("nan")}, "--strength nan: must be"),
+    "truth as jobs": ({"jobs": True}, "--jobs True: must be a whole number"),
     "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is no dict"),
 }
 

@@ -145,6 +145,7 @@ def test_hair_starts_anew_after_a_cut(tmp_path):
     assert np.abs(turns["none"] - turns["found"])[12:].max() > 0.05
     for options, words in (
         ({"cuts": [99]}, "--cuts 99: lies outside"),
+        ({"strength": None}, "--strength None: must be a number from 0 to 2"),
         ({"cuts": [13], "loop": True}, "leave out --loop"),
     ):
         with pytest.raises(NeuralocksError, match=words):

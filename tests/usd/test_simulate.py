@@ -29,7 +29,9 @@ def test_what_would_take_for_ever_is_refused(tmp_path):
     for wrong, said in (
         ({"frames": "1e308:1e308"}, "10000 are the most"),
         ({"frames": "9000000:9000001"}, "10000 are the most"),
-        ({"volume": 1e308}, "--volume 1e\\+308: must lie between"),
+        ({"volume": 1e308}, "--volume 1e\\+308: must be a number from 0 to 100"),
+        ({"strands": 0}, "--strands 0: must be a whole number from 1 on"),
+        ({"strands": "40"}, "--strands '40': must be"),
     ):
         with pytest.raises(NeuralocksError, match=said):
             simulate(shot, tmp_path / "slow.usdc", **wrong)
