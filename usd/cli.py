@@ -211,7 +211,7 @@ def grow_command(
     """Grow a hairstyle on a character and write it as a USD groom."""
     from .grow import grow
 
-    typer.echo(str(grow(style, character, out, count, seed, skeleton=skeleton, head=head)))
+    typer.echo(str(grow(style, character, out, count, seed, skeleton=skeleton, head=head, tell=note)))
 
 
 @command("demo")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from .command import note
 from .options import Head, Joints, Out, Seed, Skeleton, pairs
 
 
@@ -61,6 +62,6 @@ def train_command(
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, rollouts=rollouts, processes=processes,
-            credits=credit or [], keep_work=keep_work, progress=progress,
+            credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))

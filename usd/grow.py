@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks grow`: hairstyles of the procedural library on any character."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +16,7 @@ from neuralocks_core.hairstyles import grow as grow_style
 
 from .border import check_not_input
 from .groom import write_groom
+from .notes import first_of, unlikely_head
 from .stage import read_rigs
 
 
@@ -27,6 +29,7 @@ def grow(
     *,
     skeleton: str | None = None,
     head: str | None = None,
+    tell: Callable[[list[str]], None] | None = None,
 ) -> Path:
     """Grow a hairstyle on the head of a USD character and write it as a USD groom, in metres and Y up.
 
@@ -37,12 +40,16 @@ def grow(
         count: strands, 1 to 150,000.
         seed: the same one gives the same groom.
         skeleton, head: as for `bake`.
+        tell: called with notes for the user.
 
     Raises:
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
     """
-    rig = read_rigs(character, skeleton, head)[0]
+    rigs = read_rigs(character, skeleton, head)
+    rig = rigs[0]
     check_not_input(Path(out), rig.source.prim.GetStage())
+    if tell:
+        tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
     return write_groom(out, Barber(rig.character).grow(style, count, seed))
 
 

@@ -2,7 +2,7 @@
 """Notes: what a user should know about a shot though the bake goes on. One line each: prim or file, fact, remedy."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +105,16 @@ def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> Neura
 def left_out(error) -> str:
     """The note on a skeleton that cannot be used, beside others that can."""
     return f"{error} (this skeleton is left out)"
+
+
+def first_of(rigs: Sequence[StageRig]) -> list[str]:
+    """The note on a file with several skeletons of which the first is taken."""
+    if len(rigs) < 2:
+        return []
+    return [
+        f"{rigs[0].path}: the first of {len(rigs)} skeletons is taken; choose another, such as {rigs[1].path}, with "
+        "--skeleton PRIM"
+    ]
 
 
 def few(lines: list[str], most: int = 3) -> list[str]:

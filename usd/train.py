@@ -6,6 +6,7 @@ import enum
 import math
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,7 @@ def train(
     processes: int = 1,
     credits=(),
     keep_work: bool = False,
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Train a strand model.
@@ -60,6 +62,7 @@ def train(
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
+        tell: called with notes for the user before the training, whose minutes some of them would save.
         progress: called with (done, total, message).
 
     Raises:
@@ -99,7 +102,7 @@ def train(
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
     begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
-        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, **history
+        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, tell=tell, **history
     )
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(

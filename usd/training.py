@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `neuralocks train` learns from: a character, grooms and motion, out of files."""
 
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from neuralocks_core.character import Character
+from neuralocks_core.comparison import whole_locks
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
@@ -18,6 +18,7 @@ from .border import open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .grow import Barber
+from .notes import first_of, unfound, unlikely_head
 from .placement import Placement
 from .stage import StageRig, read_rigs
 
@@ -36,6 +37,7 @@ def training_scene(
     head: str | None = None,
     joints: dict[str, str] | None = None,
     seed: int = 0,
+    tell: Callable[[list[str]], None] | None = None,
     **settings,
 ) -> TrainingScene:
     """Read a character, its grooms and motion for training.
@@ -49,28 +51,32 @@ def training_scene(
         head: joint that is the head, where its name does not tell.
         joints: semantic joint -> joint, where names do not tell.
         seed: of everything random.
+        tell: called with notes for the user.
         **settings: further fields of TrainingScene.
 
     Raises:
         NeuralocksError: a file cannot be used, or there is no hair.
     """
-    rig = read_rigs(character, skeleton, head, joints)[0]
+    rigs = read_rigs(character, skeleton, head, joints)
+    rig = rigs[0]
     if "head" not in rig.character.humanoid:
         raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
+    notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
     for source in grooms or [str(character)]:
-        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, seed)
+        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, seed, notes)
     clips = tuple(read_clip(path, rig.character) for path in motion)
+    if tell:
+        tell(list(dict.fromkeys(notes)))
     return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
 
 
 @names_damage
-def _file(source: str, rig: StageRig, head: str | None, seed: int) -> list[StrandSet]:
+def _file(source: str, rig: StageRig, head: str | None, seed: int, notes: list[str]) -> list[StrandSet]:
     stage = open_stage(Path(source))
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
-    notes: list[str] = []
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
     # Beside hair, the grass of a set is none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
@@ -86,23 +92,24 @@ def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
     strands = strands_on(character, groom)
     if len(strands.rest) <= MOST_STRANDS:
         return strands
-    # Whole locks, so that neighbours stay neighbours.
-    order = np.random.default_rng(seed).permutation(strands.lock.max() + 1)
-    size = np.bincount(strands.lock)[order]
-    kept = order[: max(1, np.searchsorted(np.cumsum(size), MOST_STRANDS))]
-    return strands.subset(np.isin(strands.lock, kept))
+    return strands.subset(whole_locks(strands, MOST_STRANDS, seed))  # neighbours stay neighbours
 
 
 def read_clip(path: str, character: Character) -> Clip:
-    """Motion of a file on a character: BVH is retargeted, USD must animate the same joints."""
+    """Motion of a file on a character: BVH is retargeted, a skeleton of USD must have the same joints.
+
+    Raises:
+        NeuralocksError: it holds no such motion.
+    """
     if Path(path).suffix.lower() == ".bvh":
         from neuralocks_core.formats.bvh import read_bvh
         from neuralocks_core.retarget import retarget
 
         return retarget(read_bvh(path), character)
-    rig = read_rigs(path)[0]
-    if len(rig.clip.times) < 2:
-        raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
-    if rig.character.skeleton.names != character.skeleton.names:
+    clips = [rig.clip for rig in read_rigs(path) if rig.character.skeleton.names == character.skeleton.names]
+    if not clips:
         raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
-    return rig.clip
+    moving = [clip for clip in clips if len(clip.times) > 1]
+    if not moving:
+        raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
+    return moving[0]

@@ -2,6 +2,7 @@
 """What `neuralocks train` begins with, decided before anything large is read."""
 
 import pytest
+from pxr import Sdf, Usd
 
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
@@ -11,7 +12,11 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RegressionOptions
+from usd.grow import grow
 from usd.train import _beginning
+from usd.training import MOST_STRANDS, read_clip, training_scene
+
+from .shots import Recipe, write_shot
 
 SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
 LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSupervisedOptions.paper()
@@ -31,3 +36,22 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
         _beginning("shipped", False, SPEC, STILL)
     with pytest.raises(NeuralocksError, match="none.neuralocks: no such model file"):
         _beginning(tmp_path / "none.neuralocks", False, SPEC, LIKE)
+
+
+def test_what_a_training_should_know_is_told_before_it(tmp_path):
+    """Of several skeletons the first is taken, and motion is that of the one with the character's joints."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", strands=MOST_STRANDS + 40, vertices=3))
+    stage = Usd.Stage.Open(str(path))
+    layer = stage.GetRootLayer()
+    Sdf.CopySpec(layer, "/Hero/Rig", layer, "/Hero/Another")
+    layer.Save()
+    told, grown = [], []
+    scene = training_scene(path, motion=[str(path)], tell=told.extend)
+    grow("bob", path, tmp_path / "bob.usda", 20, tell=grown.extend)
+    for notes in (told, grown):
+        assert any("/Hero/Rig: the first of 2 skeletons is taken" in note for note in notes)
+    assert any("no joint found for" in note for note in told)
+    assert len(scene.grooms[0].rest) == MOST_STRANDS and len(scene.clips) == 1
+    stage.GetPrimAtPath("/Hero/Rig").GetRelationship("skel:animationSource").SetTargets([])
+    layer.Save()
+    assert len(read_clip(str(path), scene.character).times) > 1
