@@ -15,7 +15,7 @@ from neuralocks_core.runtime import StrandModel, cores
 
 from .amounts import check_number
 from .border import check_layer_name
-from .notes import out_of_place, out_of_range
+from .notes import written_notes
 from .posing import GroomPoser
 from .prim_paths import prim_path
 from .recorded import cut_facts
@@ -112,8 +112,8 @@ def bake(
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
     facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
     resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
-    notes = [*shot.notes, *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1]))]
-    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()] + out_of_place(shot.stage, out)
+    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()]
     if cuts is None and strand_model.spec.bins:
         notes += [text for rig in shot.rigs for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)

@@ -80,6 +80,18 @@ def _in_a_variant(stage: Usd.Stage, most: int = 64) -> str:
     return ""
 
 
+def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: list[float]) -> list[str]:
+    """The notes on a layer that was written over a shot.
+
+    Args:
+        stage: the shot.
+        rigs: skeletons that carry what was baked.
+        out: the layer.
+        codes: its time codes, ascending.
+    """
+    return [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])] + out_of_place(stage, out)
+
+
 def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
     """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
     if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):

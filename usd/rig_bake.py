@@ -18,6 +18,7 @@ from neuralocks_core.rig.network import RigModel, RigSampler
 from .amounts import check_number
 from .border import check_layer_name, check_not_input
 from .damage import names_damage
+from .notes import written_notes
 from .rig_layer import write_rig_layer
 from .rig_stage import RiggedHair, read_rigged_hair, rigged_notes
 from .stage import check_cuts, frame_range
@@ -102,6 +103,7 @@ def bake_rig(
     notes += hair.source.loop_notes(moved) if loop else []
     if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
+    notes += written_notes(hair.stage, [hair.source], out, codes)
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 

@@ -15,6 +15,7 @@ from neuralocks_core.progress import Progress
 from .amounts import check_number
 from .bake import BakeResult, as_material, described
 from .border import check_layer_name
+from .notes import written_notes
 from .placing import GroomPlacer
 from .recorded import cut_facts
 from .samples import write_samples
@@ -71,7 +72,8 @@ def simulate(
     facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
     facts |= cut_facts(cuts)
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
-    notes = [*shot.notes, *(text for rig in shot.rigs if cuts is None for text in rig.cut_notes())]
+    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
+    notes += [text for rig in shot.rigs if cuts is None for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

@@ -49,6 +49,19 @@ def test_the_body_stays_sample_for_sample(tmp_path):
     assert stage.GetRootLayer().subLayerPaths[0] == "./shot.usda"
 
 
+def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path):
+    """As of strands, see test_bake.py."""
+    for name in ("show", "layout", "cache"):
+        (tmp_path / name).mkdir()
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "show" / "who.usda")))
+    (tmp_path / "layout" / "set.usda").write_text('#usda 1.0\ndef "Who" (references = @who.usda@</Who>)\n{\n}\n')
+    shot = tmp_path / "show" / "shot.usda"
+    shot.write_text("#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@../layout/set.usda@]\n)\n")
+    notes = {name: bake_rig(shot, tmp_path / name / "b.usda", model).notes for name in ("show", "cache")}
+    assert not any("who.usda" in note for note in notes["show"])
+    assert any("who.usda" in note and "SEARCH_PATH" in note for note in notes["cache"])
+
+
 def test_a_model_of_another_rig_is_named_as_such(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))

@@ -47,3 +47,5 @@ def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_pat
     )
     assert samples(early, "points", at=5).tobytes() == samples(late, "points", at=5).tobytes()
     assert samples(early, "points", at=-3).tobytes() == samples(early, "points", at=1).tobytes()
+    before = simulate(shot, tmp_path / "before.usdc", strands=1, frames="-3:-2")
+    assert any("none of it within -3 to -2" in note for note in before.notes)
