@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import inverse
+from neuralocks_core.rotation import inverse, transformed
 
 from .scene import curves
 from .scene.armature import matrix
@@ -67,7 +67,7 @@ def follow(hair, sampled, world: np.ndarray) -> None:
     # from where it stands in the world.
     for then, place in zip(before.places, (matrix(hair.matrix_basis), world), strict=True):
         change = inverse(place) @ then
-        moved = before.points @ change[:3, :3].T + change[:3, 3]
+        moved = transformed(before.points, change)
         if np.abs(moved - now).max() <= ROUNDING * np.abs(moved).max():
             break
     else:

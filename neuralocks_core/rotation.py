@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rotations as 3x3 matrices, and from and to quaternions (w, x, y, z) and rotation vectors."""
+"""Rotations as 3x3 matrices, and from and to quaternions (w, x, y, z) and rotation vectors; affine transforms."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -87,6 +87,11 @@ def volumes(linear: np.ndarray) -> np.ndarray:
     """Determinants (...) of matrices (..., 3, 3), written out: an LU decomposition of each takes four times as long."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(np.asarray(linear, float), (-2, -1), (0, 1))
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
+
+
+def transformed(points: np.ndarray, transform: np.ndarray) -> np.ndarray:
+    """Points (..., 3) through an affine transform (4, 4), in float64."""
+    return np.asarray(points, float) @ transform[:3, :3].T + transform[:3, 3]
 
 
 def inverse(transform: np.ndarray) -> np.ndarray:

@@ -13,8 +13,8 @@ from pxr import Usd
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
+from neuralocks_core.rotation import transformed
 
-from .border import transformed
 from .curves import moment, rest_points
 from .placement import Placement
 from .rig_source import StageRig

@@ -9,8 +9,8 @@ from pxr import UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.film import Scene
+from neuralocks_core.rotation import transformed
 
-from .border import transformed
 from .recorded import recorded_cuts
 from .stage import Shot, StageGroom, read_shot
 

@@ -195,8 +195,3 @@ def quaternions(wxyz: np.ndarray) -> Vt.QuatfArray:
     would take seconds.
     """
     return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(wxyz, -1, axis=1), np.float32))
-
-
-def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Points (..., 3) through an affine transform (4, 4)."""
-    return np.asarray(points, float) @ matrix[:3, :3].T + matrix[:3, 3]

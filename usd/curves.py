@@ -6,8 +6,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.rotation import transformed
 
-from .border import transformed
 from .prim_paths import prim_paths
 from .surface import rest_primvar, rest_value
 

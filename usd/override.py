@@ -10,9 +10,9 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import sizes
+from neuralocks_core.rotation import sizes, transformed
 
-from .border import Border, transformed
+from .border import Border
 from .curves import rest_points, widest_sample
 from .damage import named
 from .recorded import record

@@ -6,8 +6,8 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.film import Scene
 from neuralocks_core.mesh import connected_pieces
+from neuralocks_core.rotation import transformed
 
-from .border import transformed
 from .rig_stage import RiggedHair
 
 MOST = 0.3

@@ -13,11 +13,11 @@ from neuralocks_core.cuts import find_cuts
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
-from neuralocks_core.rotation import angle_between
+from neuralocks_core.rotation import angle_between, transformed
 
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
-from .border import Border, transformed
+from .border import Border
 from .joints import JointSource
 from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
 

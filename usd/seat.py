@@ -14,8 +14,8 @@ from pxr import Usd, UsdGeom
 from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
 
-from .border import transformed
 from .curves import moment, rest_points
 from .placement import Placement
 from .rig_source import StageRig

@@ -5,7 +5,8 @@ import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
-from .border import transformed
+from neuralocks_core.rotation import transformed
+
 from .placement import Placement
 from .rig_source import StageRig
 from .seat import NEAR, find_seat, some_ends

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
 
 from .nodes import geometry_nodes
 
@@ -105,7 +106,7 @@ def keep_rest(data) -> None:
 
 def move_rest(data, matrix: np.ndarray) -> None:
     """Move the rest shape that is kept aside by a transform (4, 4)."""
-    moved = _read(data, REST) @ matrix[:3, :3].T + matrix[:3, 3]
+    moved = transformed(_read(data, REST), matrix)
     data.attributes[REST].data.foreach_set("vector", np.ascontiguousarray(moved, np.float32).ravel())
 
 

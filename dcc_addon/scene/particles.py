@@ -8,8 +8,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.rotation import transformed
 
-from ..services.axes import transformed
 from ..services.widths import radii
 from . import curves
 from .armature import matrix

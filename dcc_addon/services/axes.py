@@ -12,8 +12,3 @@ def to_core(metres_per_unit: float = 1.0) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, :3] = _TURN * metres_per_unit
     return matrix
-
-
-def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Points (N, 3) through an affine transform (4, 4), in float64."""
-    return np.asarray(points, float) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .axes import transformed
+from neuralocks_core.rotation import transformed
+
 from .rig import BodyArrays
 
 

@@ -11,10 +11,11 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.humanoid import find_humanoid
 from neuralocks_core.mesh import inside_out
+from neuralocks_core.rotation import transformed
 from neuralocks_core.standing import standing
 
 from . import names
-from .axes import to_core, transformed
+from .axes import to_core
 from .motion import TOLERANCE, similar, trim_of
 
 

@@ -14,7 +14,7 @@ from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.report import Card
-from neuralocks_core.rotation import from_vector
+from neuralocks_core.rotation import from_vector, transformed
 from tests.core.rigs import moved, person
 
 BONES = ("hips", "spine", "neck", "head", "upper_arm.L", "upper_arm.R")
@@ -126,7 +126,7 @@ def test_frame_numbers():
 def test_blender_front_becomes_core_front():
     """Z up and looking along -Y becomes Y up and +Z; the unit is applied once."""
     core = axes.to_core(0.01)
-    np.testing.assert_allclose(axes.transformed([[0, -100, 0], [0, 0, 100], [100, 0, 0]], core),
+    np.testing.assert_allclose(transformed([[0, -100, 0], [0, 0, 100], [100, 0, 0]], core),
                                [[0, 0, 1], [0, 1, 0], [1, 0, 0]], atol=1e-12)  # fmt: skip
 
 

@@ -7,8 +7,9 @@ import bmesh
 import bpy
 import numpy as np
 
-from dcc_addon.services.axes import to_core, transformed
+from dcc_addon.services.axes import to_core
 from dcc_addon.session import session
+from neuralocks_core.rotation import transformed
 from tests.blender import scenes
 from tests.blender.checks import make_live, refused
 
