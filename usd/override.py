@@ -46,16 +46,11 @@ class OverrideWriter:
         self._reach[path] = max(
             np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
         )
-        for above in path.GetPrefixes():
-            if item.prim.GetStage().GetPrimAtPath(above).IsInstance():
-                # What lies inside an instance cannot be overridden.
-                _over(layer, above).instanceable = False
-        over = _over(layer, path)
+        over = over_prim(layer, item.prim)
         record(over, {**facts, "joint": item.joint})
         if item.attachment.skinned:
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
-            if not item.prim.HasAPI("SkelBindingAPI"):
-                over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
+            apply_binding(over, item.prim)
             relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
             relation.targetPathList.ClearEditsAndMakeExplicit()
         names = Sdf.ValueTypeNames
@@ -98,6 +93,20 @@ class OverrideWriter:
     def close(self) -> None:
         """Write what is held."""
         self._file.close()
+
+
+def over_prim(layer: Sdf.Layer, prim: Usd.Prim) -> Sdf.PrimSpec:
+    """The over of a shot's prim; instances that it lies in are so no longer, for what is inside of them cannot be overridden."""
+    for above in prim.GetPath().GetPrefixes():
+        if prim.GetStage().GetPrimAtPath(above).IsInstance():
+            _over(layer, above).instanceable = False
+    return _over(layer, prim.GetPath())
+
+
+def apply_binding(over: Sdf.PrimSpec, prim: Usd.Prim) -> None:
+    """Apply SkelBindingAPI to an over, where its prim has it not."""
+    if not prim.HasAPI("SkelBindingAPI"):
+        over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
 
 
 def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:

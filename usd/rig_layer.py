@@ -12,7 +12,7 @@ from neuralocks_core.rotation import quaternion_product, rotation_part, to_quate
 
 from .damage import named
 from .joints import JointSource
-from .override import write_header
+from .override import apply_binding, over_prim, write_header
 from .rig_stage import BAKED, RiggedHair
 
 
@@ -74,15 +74,10 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
 def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:
     """A new SkelAnimation below the skeleton, and the skeleton bound to it."""
     source = hair.source.source
-    path = source.prim.GetPath()
-    over = Sdf.CreatePrimInLayer(layer, path)
-    for above in path.GetPrefixes():
-        if hair.stage.GetPrimAtPath(above).IsInstance():
-            layer.GetPrimAtPath(above).instanceable = False  # what lies inside an instance cannot be overridden
-    if not source.prim.HasAPI(UsdSkel.BindingAPI):
-        over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
+    over = over_prim(layer, source.prim)
+    apply_binding(over, source.prim)
     relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)
-    relation.targetPathList.explicitItems = [path.AppendChild(BAKED)]
+    relation.targetPathList.explicitItems = [over.path.AppendChild(BAKED)]
     return Sdf.PrimSpec(over, BAKED, Sdf.SpecifierDef, "SkelAnimation")
 
 
