@@ -21,6 +21,10 @@ from .rig_source import StageRig, find_skeletons
 
 SAME = 0.01
 """Joints of two skeletons at most so far apart [m] are one."""
+MOST_VARIANTS = 64
+"""Variants that are tried: each composes the stage anew."""
+FEW = 3
+"""Similar lines told one by one."""
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -61,14 +65,14 @@ def _on_joints(stage: Usd.Stage) -> str:
     return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
 
 
-def _in_a_variant(stage: Usd.Stage, most: int = 64) -> str:
-    """Which variant that is not chosen has curves, and what to do then; '' if none of `most` has."""
+def _in_a_variant(stage: Usd.Stage) -> str:
+    """Which variant that is not chosen has curves, and what to do then; '' if none of MOST_VARIANTS has."""
     tried = 0
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         for path in [prim.GetPath() for prim in stage.Traverse() if prim.HasVariantSets()]:
             for name in stage.GetPrimAtPath(path).GetVariantSets().GetNames():
                 variants = stage.GetPrimAtPath(path).GetVariantSet(name)
-                for variant in variants.GetVariantNames()[: most - tried]:
+                for variant in variants.GetVariantNames()[: MOST_VARIANTS - tried]:
                     tried += 1
                     variants.SetVariantSelection(variant)
                     curves = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)), None)
@@ -129,11 +133,9 @@ def first_of(rigs: Sequence[StageRig]) -> list[str]:
     ]
 
 
-def few(lines: list[str], most: int = 3) -> list[str]:
+def few(lines: list[str]) -> list[str]:
     """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
-    return (
-        lines if len(lines) <= most + 1 else [*lines[:most], f"{len(lines) - most} more prims are left out like that"]
-    )
+    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more prims are left out like that"]
 
 
 def no_points(path: str) -> str:

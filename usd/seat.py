@@ -23,6 +23,8 @@ from .surface import StageMesh, rest_value
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
+SOME_ROOTS, SOME_TIMES = 1000, 16
+"""How many of a groom's roots and of a prim's samples are looked at, about: all are too many."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,8 @@ def kinship(prim: Usd.Prim, rig: StageRig) -> int:
     return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
 
 
-def some_ends(prim: Usd.Prim, most: int = 1000, *, last: bool = False) -> np.ndarray:
-    """Up to `most` finite roots (n, 3) in the prim's own space; or the last points of these strands.
+def some_ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
+    """About SOME_ROOTS finite roots (n, 3) in the prim's own space; or the last points of these strands.
 
     Raises:
         NeuralocksError: none is finite.
@@ -124,7 +126,7 @@ def some_ends(prim: Usd.Prim, most: int = 1000, *, last: bool = False) -> np.nda
     counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
     ends = np.cumsum(counts) - (1 if last else counts)
     ends = ends[(counts > 0) & (ends >= 0) & (ends < len(points))]
-    found = points[ends[:: max(1, len(ends) // most)]] if len(ends) else points[:1]
+    found = points[ends[:: max(1, len(ends) // SOME_ROOTS)]] if len(ends) else points[:1]
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):
         raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
@@ -141,9 +143,9 @@ def _carried(rig: StageRig, when: float) -> np.ndarray:
     return rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
 
 
-def _steady(placement: Placement, against: Callable[[float], np.ndarray], most: int = 16) -> bool:
+def _steady(placement: Placement, against: Callable[[float], np.ndarray]) -> bool:
     """Whether a moving prim stands still against something else in stage space, which then is what moves it."""
-    times = placement.samples[:: max(1, len(placement.samples) // most)]
+    times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
     places = np.stack([placement.at(time) for time in times])
     relative = np.stack([np.linalg.inv(against(time)) for time in times]) @ places
     turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
