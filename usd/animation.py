@@ -11,10 +11,8 @@ from neuralocks_core.motion import Clip
 from .border import Border, quaternions
 
 
-def write_animation(
-    stage: Usd.Stage, path: str, character: Character, clip: Clip, *, first: float = 1.0, shapes: tuple[str, ...] = ()
-) -> UsdSkel.Animation:
-    """Author a clip of a character on a stage as joint samples, one per clip time.
+def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Clip) -> UsdSkel.Animation:
+    """Author a clip of a character on a stage as joint samples, one per clip time, whose zero is time code 1.
 
     A joint's scale is left at one. The skeleton is taken to stand at the stage's origin.
 
@@ -23,8 +21,6 @@ def write_animation(
         path: prim path of the animation.
         character: whose joints they are; the skeleton prim must hold the same paths.
         clip: what to write.
-        first: time code of the clip's time zero.
-        shapes: names of the clip's blend shapes, if it has any.
     """
     border = Border.of(stage)
     world = border.from_core @ clip.joints
@@ -36,13 +32,9 @@ def write_animation(
     animation = UsdSkel.Animation.Define(stage, path)
     animation.CreateJointsAttr(list(character.skeleton.names))
     animation.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1)] * len(character.skeleton.names)))
-    codes = first + clip.times * border.rate
+    codes = 1.0 + clip.times * border.rate
     _samples(animation.CreateRotationsAttr(), codes, turns, quaternions)
     _samples(animation.CreateTranslationsAttr(), codes, places, lambda p: Vt.Vec3fArray.FromNumpy(np.float32(p)))
-    if shapes:
-        animation.CreateBlendShapesAttr(list(shapes))
-        weights = animation.CreateBlendShapeWeightsAttr()
-        _samples(weights, codes, clip.shape, lambda w: Vt.FloatArray.FromNumpy(np.float32(w)))
     return animation
 
 

@@ -8,6 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
 
+from .authoring import author_influences, author_skeleton, bind_to
 from .border import check_layer_name, write_stage
 
 ROOT = "/Body"
@@ -37,35 +38,16 @@ def _author(stage, body: StatisticalBody) -> None:
     root = UsdSkel.Root.Define(stage, ROOT)
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind("component")
-    skeleton = _skeleton(stage, body.character.skeleton)
+    joints = body.character.skeleton
+    parents = np.array([joints.bind[p] if p >= 0 else np.eye(4) for p in joints.parents])
+    skeleton = author_skeleton(stage, SKELETON, joints.names, joints.bind, np.linalg.inv(parents) @ joints.bind)
     mesh = _mesh(stage, body)
-    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
-    skin, influences = body.character.body, body.character.body.joint_indices.shape[1]
-    indices, weights = np.int32(skin.joint_indices).ravel(), np.float32(skin.joint_weights).ravel()
-    binding.CreateJointIndicesPrimvar(False, influences).Set(Vt.IntArray.FromNumpy(indices))
-    binding.CreateJointWeightsPrimvar(False, influences).Set(Vt.FloatArray.FromNumpy(weights))
+    binding, skin = bind_to(skeleton, mesh.GetPrim(), np.eye(4)), body.character.body
+    author_influences(binding, skin.joint_indices, skin.joint_weights)
     _blend_shapes(stage, binding, skin.shapes)
     # A skinned mesh moves beyond its own points: the root's extent is the answer that usdview and the validators read.
     low, high = skin.points.min(axis=0), skin.points.max(axis=0)
     UsdGeom.Boundable(root).CreateExtentAttr([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
-
-
-def _skeleton(stage, joints):
-    skeleton = UsdSkel.Skeleton.Define(stage, SKELETON)
-    bind = joints.bind
-    parents = np.array([bind[p] if p >= 0 else np.eye(4) for p in joints.parents])
-    skeleton.CreateJointsAttr(list(joints.names))
-    skeleton.CreateBindTransformsAttr(_matrices(bind))
-    skeleton.CreateRestTransformsAttr(_matrices(np.linalg.inv(parents) @ bind))
-    UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
-    return skeleton
-
-
-def _matrices(transforms):
-    # USD multiplies row vectors: its matrices are the transposes of ours.
-    return Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(np.swapaxes(transforms, -1, -2)))
 
 
 def _mesh(stage, body):

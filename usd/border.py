@@ -190,6 +190,11 @@ def row_matrix(matrix: np.ndarray) -> Gf.Matrix4d:
     return Gf.Matrix4d(np.asarray(matrix, float).T.tolist())
 
 
+def row_matrices(matrices: np.ndarray) -> Vt.Matrix4dArray:
+    """(N, 4, 4) transforms for column vectors as USD matrices."""
+    return Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(np.swapaxes(np.asarray(matrices, float), -1, -2)))
+
+
 def quaternions(wxyz: np.ndarray) -> Vt.QuatfArray:
     """Quaternions (J, 4) wxyz as USD keeps them, with the imaginary part first; made one by one, those of a long shot
     would take seconds.

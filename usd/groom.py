@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write grooms as USD BasisCurves with the attributes that other tools read, and import them from any file."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,21 +10,13 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 
+from .authoring import POLYLINES, Spline, author_curves
 from .border import LAYERS, Border, check_not_input, open_stage, write_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .placement import Placement
 
 USD = (*LAYERS, ".usdz")
-
-
-@dataclass(frozen=True)
-class Spline:
-    """How a renderer interpolates the vertices: the tokens of UsdGeomBasisCurves."""
-
-    type: str = "linear"
-    basis: str = "bezier"
-    wrap: str = "nonperiodic"
 
 
 def import_groom(source, out, unit: str | float | None = None, up: str | None = None) -> tuple[list[Groom], list[str]]:
@@ -50,14 +41,14 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
         from neuralocks_core import formats
 
         groom, notes = formats.read_with_notes(source, unit, up)
-        found = [(groom, Spline())]
+        found = [(groom, POLYLINES)]
     write_grooms(out, found)
     return [groom for groom, _ in found], notes
 
 
-def write_groom(path, groom: Groom, spline: Spline = Spline()) -> Path:
+def write_groom(path, groom: Groom) -> Path:
     """Write one groom; see `write_grooms`."""
-    return write_grooms(path, [(groom, spline)])
+    return write_grooms(path, [(groom, POLYLINES)])
 
 
 def write_grooms(path, grooms: list[tuple[Groom, Spline]]) -> Path:
@@ -79,24 +70,12 @@ def write_grooms(path, grooms: list[tuple[Groom, Spline]]) -> Path:
     return write_stage(Path(path), author)
 
 
-def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = Spline()) -> UsdGeom.BasisCurves:
+def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINES) -> UsdGeom.BasisCurves:
     """Define a BasisCurves prim for a groom in a stage of metres, Y up.
 
     The `groom_*` primvars are those that Unreal and other groom readers know.
     """
-    curves = UsdGeom.BasisCurves.Define(stage, path)
-    curves.CreateTypeAttr(spline.type)
-    if spline.type == "cubic":
-        curves.CreateBasisAttr(spline.basis)
-    curves.CreateWrapAttr(spline.wrap)
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(groom.points)))
-    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(groom.counts)))
-    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(groom.widths)))
-    each = {1: UsdGeom.Tokens.constant, groom.strand_count: UsdGeom.Tokens.uniform}
-    curves.SetWidthsInterpolation(each.get(len(groom.widths), UsdGeom.Tokens.vertex))
-    pad = np.float32(groom.widths.max() / 2)
-    extent = np.stack([groom.points.min(axis=0) - pad, groom.points.max(axis=0) + pad])
-    curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent))
+    curves = author_curves(stage, path, groom.points, groom.counts, groom.widths, spline)
     api = UsdGeom.PrimvarsAPI(curves)
     names, uniform = Sdf.ValueTypeNames, UsdGeom.Tokens.uniform
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel, Vt
 
+from .authoring import Spline, author_curves, author_influences, author_skeleton, bind_to
 from .border import quaternions, row_matrix, write_stage
-from .groom import Spline
 from .recorded import KEY
 
 ROOT = "/Character"
@@ -110,12 +110,9 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     root = UsdSkel.Root.Define(stage, ROOT)
     root.GetPrim().SetCustomDataByKey(KEY, "shot")  # by which `own_layers` knows it
     stage.SetDefaultPrim(root.GetPrim())
-    skeleton = UsdSkel.Skeleton.Define(stage, f"{ROOT}/Rig")
-    skeleton.CreateJointsAttr(scene.joints)
-    skeleton.CreateBindTransformsAttr(Vt.Matrix4dArray([row_matrix(m) for m in scene.bind]))
-    skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray([row_matrix(m) for m in scene.rest]))
+    skeleton = author_skeleton(stage, f"{ROOT}/Rig", scene.joints, scene.bind, scene.rest)
     animation = _animation(stage, scene)
-    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
+    UsdSkel.BindingAPI(skeleton).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     for skin in scene.skins:
         _skin(stage, skin, skeleton)
     for hair in scene.hair:
@@ -151,11 +148,8 @@ def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> Non
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(skin.triangles), 3, np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(skin.triangles, np.int32).ravel()))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    binding = _bind(mesh.GetPrim(), skeleton, np.eye(4))
-    width = skin.joint_indices.shape[1]
-    indices, weights = binding.CreateJointIndicesPrimvar(False, width), binding.CreateJointWeightsPrimvar(False, width)
-    indices.Set(Vt.IntArray.FromNumpy(np.ascontiguousarray(skin.joint_indices, np.int32).ravel()))
-    weights.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(skin.joint_weights, np.float32).ravel()))
+    binding = bind_to(skeleton, mesh.GetPrim(), np.eye(4))
+    author_influences(binding, skin.joint_indices, skin.joint_weights)
     targets = []
     for name, offsets in skin.shapes.items():
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(f"shape_{name}"))
@@ -168,31 +162,12 @@ def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> Non
 
 
 def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdSkel.Skeleton) -> None:
-    curves = UsdGeom.BasisCurves.Define(stage, hair_path(hair.name))
-    points = np.ascontiguousarray(hair.points, np.float32)
-    curves.CreateTypeAttr(hair.spline.type)
-    if hair.spline.type == "cubic":
-        curves.CreateBasisAttr(hair.spline.basis)
-    curves.CreateWrapAttr(hair.spline.wrap)
-    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(hair.counts, np.int32)))
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    widths = np.ascontiguousarray(hair.widths, np.float32)
-    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths))
-    curves.SetWidthsInterpolation(UsdGeom.Tokens.constant if len(widths) == 1 else UsdGeom.Tokens.vertex)
-    reach = np.float32(widths.max() / 2)
-    curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])))
+    curves = author_curves(stage, hair_path(hair.name), hair.points, hair.counts, hair.widths, hair.spline)
     op = curves.AddTransformOp(UsdGeom.XformOp.PrecisionDouble)
     op.Set(row_matrix(hair.places[0]))
     if (np.abs(hair.places - hair.places[0]) > 1e-9).any():
         for frame, place in zip(map(float, frames), hair.places, strict=True):
             op.Set(row_matrix(place), frame)
-    binding = _bind(curves.GetPrim(), skeleton, hair.bind_place)
+    binding = bind_to(skeleton, curves.GetPrim(), hair.bind_place)
     binding.CreateJointIndicesPrimvar(True, 1).Set([hair.joint])
     binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
-
-
-def _bind(prim: Usd.Prim, skeleton: UsdSkel.Skeleton, bind_place: np.ndarray) -> UsdSkel.BindingAPI:
-    binding = UsdSkel.BindingAPI.Apply(prim)
-    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    binding.CreateGeomBindTransformAttr(row_matrix(bind_place))
-    return binding

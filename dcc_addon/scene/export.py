@@ -63,7 +63,7 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
 
 def _hair(hair, label: str, sampled):
     """A hair object at rest, as `HairArrays`."""
-    from usd.groom import Spline
+    from usd.authoring import Spline
     from usd.scene_writer import HairArrays
 
     data, radius = hair.data, curves.radius(hair.data)

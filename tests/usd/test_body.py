@@ -92,7 +92,7 @@ def test_an_animation_comes_back_as_written(tmp_path, unit, up):
     UsdGeom.SetStageMetersPerUnit(stage, unit)
     UsdGeom.SetStageUpAxis(stage, up)
     stage.SetTimeCodesPerSecond(24)
-    write_animation(stage, "/Motion", character, clip, first=1.0)
+    write_animation(stage, "/Motion", character, clip)
     query = UsdSkel.Cache().GetAnimQuery(UsdSkel.Animation(stage.GetPrimAtPath("/Motion")))
     to_core = np.eye(4)
     if up == "Z":
