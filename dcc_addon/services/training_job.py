@@ -8,9 +8,12 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 CHILD = Path(__file__).with_name("training_child.py")
+UTF8 = {"encoding": "utf-8", "errors": "replace"}
+"""Of what is said by a child, and to it: in the code page of Windows, a letter that is not in it would end who listens."""
 
 
 def problem(python: str) -> str:
@@ -29,7 +32,7 @@ def problem(python: str) -> str:
             [python, str(CHILD), "--check"],
             env=environment(),
             capture_output=True,
-            text=True,
+            **UTF8,
             timeout=60,
             stdin=subprocess.DEVNULL,
         )
@@ -47,7 +50,7 @@ def environment() -> dict[str, str]:
     """
     import neuralocks_core
 
-    kept = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")} | {"PYTHONUTF8": "1"}
     root = Path(neuralocks_core.__file__).resolve().parent.parent
     # A source checkout serves the child too. A site-packages folder does not: its compiled packages are for Blender's
     # Python.
@@ -76,7 +79,7 @@ class TrainingJob:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=environment(),
-            text=True,
+            **UTF8,
             **group,
         )
         self._process.stdin.write(json.dumps(settings))
@@ -105,19 +108,17 @@ class TrainingJob:
     def cancel(self) -> None:
         """Stop it, with the processes that it started."""
         self._cancelled = True
-        if self._process.poll() is None:
-            try:
-                if os.name == "posix":
-                    os.killpg(self._process.pid, signal.SIGTERM)
-                else:
-                    self._process.terminate()
-                self._process.wait(5)
-            except (ProcessLookupError, subprocess.TimeoutExpired):
-                if os.name == "posix":
-                    os.killpg(self._process.pid, signal.SIGKILL)
-                else:
-                    self._process.kill()
-                self._process.wait(5)
+        for hard in (False, True):
+            if self._process.poll() is None:
+                with suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                    self._end(hard)
+                    self._process.wait(5)
+
+    def _end(self, hard: bool) -> None:
+        if os.name == "posix":
+            os.killpg(self._process.pid, signal.SIGKILL if hard else signal.SIGTERM)
+        else:
+            self._process.terminate()
 
     def failure(self) -> str:
         """Why it failed, in one line."""

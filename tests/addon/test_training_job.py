@@ -15,6 +15,9 @@ print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
 if settings["out"] == "wait": time.sleep(60)
 if settings["out"] == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
+if settings["out"] == "odd":
+    for stream in (sys.stdout, sys.stderr): stream.buffer.write(b"\\xff\\x81\\n"); stream.flush()
+    print(json.dumps({"done": 0.75}), flush=True); sys.exit("broken: K\xfcche")
 if settings["out"] == "crash": raise RuntimeError("boom")
 """
 
@@ -22,7 +25,7 @@ if settings["out"] == "crash": raise RuntimeError("boom")
 @pytest.fixture
 def job(tmp_path, monkeypatch):
     child = tmp_path / "child.py"
-    child.write_text(CHILD)
+    child.write_text(CHILD, encoding="utf-8")
     monkeypatch.setattr(training_job, "CHILD", child)
     started = []
 
@@ -57,11 +60,15 @@ def test_training_is_cancelled_at_once(job):
     assert not running.succeeded
 
 
-@pytest.mark.parametrize(("out", "words"), [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom")])
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom"), ("odd", "broken: K\xfcche")],
+)
 def test_training_says_why_it_failed(job, out, words):
     running = job(out)
     _wait(lambda: not running.running)
     assert not running.succeeded and running.failure() == words
+    assert running.done == (0.75 if out == "odd" else 0.5), "bytes that are no text end nobody who listens"
 
 
 @pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
