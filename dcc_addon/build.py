@@ -88,7 +88,7 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
     """The zip that Blender 4.2 and later installs."""
     lines = [f'platforms = ["{platform}"]', "wheels = ["]
     lines += [f'  "./wheels/{wheel.name}",' for wheel in sorted(wheels)] + ["]", ""]
-    manifest = (HERE / "blender_manifest.toml").read_text()
+    manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     # Top-level keys must come before the first table.
     head, table, tail = manifest.partition("[permissions]")
     out = output / f"neuralocks-{version(manifest)}-{platform}.zip"
@@ -103,7 +103,10 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
 
 def legacy(output: Path, wheels: list[Path]) -> Path:
     """The zip for Blender before 4.2: a folder, with the packages unpacked in it."""
-    out = output / f"neuralocks-{version((HERE / 'blender_manifest.toml').read_text())}-legacy-{LEGACY[0]}.zip"
+    out = (
+        output
+        / f"neuralocks-{version((HERE / 'blender_manifest.toml').read_text(encoding='utf-8'))}-legacy-{LEGACY[0]}.zip"
+    )
     with Written(out) as archive:
         for path in sources():
             archive.write(path, f"neuralocks/{path.relative_to(HERE).as_posix()}")

@@ -22,24 +22,25 @@ from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
 LONGEST = 100
 """Bytes of an object's name that a file is named with; names may be as long as no file system takes them."""
 
-_jobs: list = []
+_running: list["_Training"] = []
+"""One at most. Not of the session, which ends with its file: a training goes on while other files are opened."""
 _checked: dict[str, str] = {}
 _asked: set[str] = set()
 
 
 def job() -> TrainingJob | None:
     """The training that runs or has just ended."""
-    return _jobs[0] if _jobs else None
+    return _running[0].job if _running else None
 
 
 def stop() -> None:
     """Cancel what runs and forget it."""
-    if _jobs:
-        _jobs[0].cancel()
-        _jobs[0].folder.cleanup()
-        _jobs.clear()
-    if bpy.app.timers.is_registered(_watch):
-        bpy.app.timers.unregister(_watch)
+    if _running:
+        _running[0].job.cancel()
+        _running[0].folder.cleanup()
+        _running.clear()
+    if bpy.app.timers.is_registered(watch):
+        bpy.app.timers.unregister(watch)
 
 
 def training_python() -> str:
@@ -97,9 +98,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
-        _jobs.append(TrainingJob(python, settings))
-        _jobs[0].target, _jobs[0].folder = _Target.of(target, self.kind), folder
-        bpy.app.timers.register(_watch, first_interval=0.5, persistent=True)  # it goes on while other files are opened
+        _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder))
+        bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
         return f"Training a model for {target.name_full} in the background"
 
 
@@ -135,6 +135,14 @@ class _Target(NamedTuple):
         return thing
 
 
+class _Training(NamedTuple):
+    """A process at work, what it is for, and the folder with what it reads."""
+
+    job: TrainingJob
+    target: _Target
+    folder: tempfile.TemporaryDirectory
+
+
 def finish() -> str | None:
     """Take over the result of an ended training: the model goes to what it was trained for. A message for the panel, or
     None while it runs.
@@ -144,13 +152,14 @@ def finish() -> str | None:
     running = job()
     if running is None or running.running:
         return None
-    name, target = running.target.name, running.target.found()
+    wanted = _running[0].target
+    name, target = wanted.name, wanted.found()
     if not running.succeeded:
         message = f"{name}: training failed: {running.failure()}"
     elif target is None:
         message = f"{name}: trained, but it is not in this file any more; choose its model by hand: {running.out}"
     else:
-        if running.target.kind == "strands":
+        if wanted.kind == "strands":
             target.neuralocks_hair.model = running.out
         else:
             target.neuralocks_character.rig_model = running.out
@@ -161,7 +170,8 @@ def finish() -> str | None:
     return message
 
 
-def _watch():
+def watch() -> float | None:
+    """Blender's timer: seconds until the next look at the training, None when it has ended."""
     redraw()
     running = job()
     if running is None:

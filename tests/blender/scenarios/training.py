@@ -47,7 +47,7 @@ def training_meanwhile(folder: Path) -> None:
     _in_training(folder)
     scenes.empty()
     strands = scenes.hair(scenes.armature(), 20)
-    assert strands.name == "Hair" and bpy.app.timers.is_registered(operator._watch)
+    assert strands.name == "Hair" and bpy.app.timers.is_registered(operator.watch)
     assert "Hair: trained" in _ended() and str(folder / "Hair_2.neuralocks") in messages()["training"]
     assert not strands.neuralocks_hair.model
 
