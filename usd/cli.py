@@ -46,9 +46,13 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from importlib.metadata import PackageNotFoundError, version
 
-        typer.echo(f"neuralocks {version('neuralocks')}")
+        try:
+            number = version("neuralocks")
+        except PackageNotFoundError:
+            number = "of a source tree that is not installed"
+        typer.echo(f"neuralocks {number}")
         raise typer.Exit
 
 

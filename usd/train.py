@@ -14,6 +14,7 @@ import numpy as np
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 
 METHODS = ("rollouts", "selfsupervised")
@@ -96,11 +97,12 @@ def train(
         torch.empty(0, device=options.device)
     except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
+    out = as_path(out, "out")
     history = {"spec": paper_boundary()} if paper else {}
     work = work_folder(out, resume)
     if begin == NOTHING and resume and (work / BEGINNING).exists():
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
-    begin = _beginning(begin, resume, history.get("spec", BoundarySpec()), options)
+    begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, tell=tell, **history
     )
@@ -111,8 +113,12 @@ def train(
     )  # fmt: skip
 
 
-def _beginning(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:
-    """The model to begin with, checked before anything large is read."""
+def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:
+    """The model that a training begins with, checked before anything large is read.
+
+    Raises:
+        NeuralocksError: the one named is none, or differs from what is trained.
+    """
     from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.regression import RegressionOptions
 

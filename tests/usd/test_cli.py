@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
@@ -115,6 +116,15 @@ def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
 def test_the_version_is_told(capsys):
     assert status("--version") == 0
     assert capsys.readouterr().out.split()[0] == "neuralocks"
+
+
+def test_a_source_tree_that_is_not_installed_has_no_version(capsys, monkeypatch):
+    monkeypatch.setattr("importlib.metadata.Distribution.from_name", missing)
+    assert status("--version") == 0 and capsys.readouterr().out.startswith("neuralocks of a source tree")
+
+
+def missing(name):
+    raise PackageNotFoundError(name)
 
 
 def test_wrong_usage_is_status_two(capsys):

@@ -13,7 +13,7 @@ pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RegressionOptions
 from usd.grow import grow
-from usd.train import _beginning
+from usd.train import begins_with
 from usd.training import MOST_STRANDS, read_clip, training_scene
 
 from .shots import Recipe, write_shot
@@ -23,19 +23,19 @@ LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSu
 
 
 def test_left_out_it_is_the_shipped_model_where_that_fits():
-    assert _beginning(None, False, SPEC, LIKE) == model.shipped()
+    assert begins_with(None, False, SPEC, LIKE) == model.shipped()
     for spec, options in ((OTHER, LIKE), (SPEC, STILL), (SPEC, PAPER)):
-        assert _beginning(None, False, spec, options) is None
-    assert _beginning(None, True, SPEC, LIKE) is None, "a resumed training has its own beginning"
+        assert begins_with(None, False, spec, options) is None
+    assert begins_with(None, True, SPEC, LIKE) is None, "a resumed training has its own beginning"
 
 
 def test_what_is_named_is_taken_or_refused(tmp_path):
-    assert _beginning("shipped", False, SPEC, LIKE) == model.shipped()
-    assert _beginning("nothing", False, SPEC, LIKE) is None
+    assert begins_with("shipped", False, SPEC, LIKE) == model.shipped()
+    assert begins_with("nothing", False, SPEC, LIKE) is None
     with pytest.raises(NeuralocksError, match="strands.neuralocks: differs from this training in static"):
-        _beginning("shipped", False, SPEC, STILL)
+        begins_with("shipped", False, SPEC, STILL)
     with pytest.raises(NeuralocksError, match="none.neuralocks: no such model file"):
-        _beginning(tmp_path / "none.neuralocks", False, SPEC, LIKE)
+        begins_with(tmp_path / "none.neuralocks", False, SPEC, LIKE)
 
 
 def test_what_a_training_should_know_is_told_before_it(tmp_path):
