@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core.files import as_path
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
 
 from .authoring import author_influences, author_skeleton, bind_to
@@ -27,9 +28,10 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
     Raises:
         NeuralocksError: the path has another ending or cannot be written, anny is missing or a phenotype is wrong.
     """
-    check_layer_name(Path(path))
+    path = as_path(path, "path")
+    check_layer_name(path)
     body = statistical_body(phenotype) if body is None else body
-    return write_stage(Path(path), lambda stage: _author(stage, body))
+    return write_stage(path, lambda stage: _author(stage, body))
 
 
 def _author(stage, body: StatisticalBody) -> None:

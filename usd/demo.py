@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.progress import Progress
 from neuralocks_core.report import Card
 
@@ -63,7 +63,7 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
     Raises:
         NeuralocksError: something is missing or cannot be written. A missing preview library is only noted.
     """
-    out = Path(out)
+    out = as_path(out, "out")
     shot, seconds, notes = shipped_shot(), {}, []
     outputs = {"bake": out / "demo.usdc"}
 

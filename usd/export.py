@@ -8,7 +8,7 @@ from pathlib import Path
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.measures import MEASURES
 
 from .stopping import check
@@ -78,7 +78,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         NeuralocksError: the model cannot be read or the folder not be written.
     """
     file = model_file.read(model)
-    folder = Path(folder)
+    folder = as_path(folder, "folder")
     if shot is None and (grooms or skeleton or head or joints):
         raise NeuralocksError(
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"

@@ -7,6 +7,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 
@@ -34,9 +35,9 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     Raises:
         NeuralocksError: the source cannot be read or the target not be written.
     """
-    source = Path(source)
+    source, out = as_path(source, "source"), as_path(out, "out")
     if source.suffix.lower() in USD:
-        found, notes = _read_usd(source, Path(out), unit, up)
+        found, notes = _read_usd(source, out, unit, up)
     else:
         from neuralocks_core import formats
 
@@ -67,7 +68,7 @@ def write_grooms(path, grooms: list[tuple[Groom, Spline]]) -> Path:
         for groom, spline in grooms:
             author_groom(stage, _free_path(stage, groom.name), groom, spline)
 
-    return write_stage(Path(path), author)
+    return write_stage(as_path(path, "path"), author)
 
 
 def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINES) -> UsdGeom.BasisCurves:

@@ -10,6 +10,7 @@ import numpy as np
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
@@ -45,9 +46,10 @@ def grow(
     Raises:
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
     """
+    out = as_path(out, "out")
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
-    check_not_input(Path(out), rig.source.prim.GetStage())
+    check_not_input(out, rig.source.prim.GetStage())
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
     return write_groom(out, Barber(rig.character).grow(style, count, seed))

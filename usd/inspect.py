@@ -9,6 +9,7 @@ from pxr import UsdGeom
 from neuralocks_core.arclength import arc_lengths, count_pointlike
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
@@ -54,7 +55,7 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     Raises:
         NeuralocksError: the file cannot be read at all.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     kind = path.suffix.lower()
     if kind in USD:
         return {"file": str(path), "kind": "stage", **_stage(path, head, joints)}

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import cannot_write
+from neuralocks_core.files import as_path, cannot_write
 from neuralocks_core.progress import Progress
 
 from .rig_stage import check_patterns, read_rigged_hair, rigged_notes
@@ -58,7 +58,8 @@ def train_rig(
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
     from neuralocks_core.training.rig_energy import RigMaterial
 
-    _check_writable(Path(out))
+    character, out = as_path(character, "character"), as_path(out, "out")
+    _check_writable(out)
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
     check_patterns(hair, chains)
     notes = rigged_notes(hair.source)
@@ -78,7 +79,7 @@ def train_rig(
     model = train(hair.rig, values, seed=seed, progress=progress, **chosen)
     if command:
         model.training["command"] = command
-    model.training["character"] = Path(character).name
+    model.training["character"] = character.name
     who = hair.source.character
     read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
     model.training["reads"] = {name: path.rsplit("/", 1)[-1] for name, path in read.items()}

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core.files import as_path
+
 from .authoring import Spline, author_curves, author_influences, author_skeleton, bind_to
 from .border import quaternions, row_matrix, write_stage
 from .recorded import KEY
@@ -92,7 +94,7 @@ def write_scene(path, scene: SceneArrays) -> Path:
     Raises:
         NeuralocksError: the file cannot be written there.
     """
-    return write_stage(Path(path), lambda stage: _author(stage, scene))
+    return write_stage(as_path(path, "path"), lambda stage: _author(stage, scene))
 
 
 def hair_path(name: str) -> str:

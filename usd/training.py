@@ -73,7 +73,7 @@ def training_scene(
 
 @names_damage
 def _file(source: str, rig: StageRig, head: str | None, seed: int, notes: list[str]) -> list[StrandSet]:
-    stage = open_stage(Path(source))
+    stage = open_stage(source)
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")

@@ -8,6 +8,11 @@ from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
+from usd.body import write_body
+from usd.demo import demo
+from usd.export import export_model
+from usd.groom import import_groom
+from usd.grow import grow
 from usd.inspect import inspect
 from usd.stage import read_shot
 
@@ -29,6 +34,16 @@ def test_nothing_is_no_path(model):
         bake("shot.usda", None, model)
     with pytest.raises(NeuralocksError, match="shot: None is no path"):
         bake(None, "a.usdc", model)
+    for work in (
+        lambda: demo(None),
+        lambda: grow("bob", "body.usdc", None),
+        lambda: import_groom(None, "a.usdc"),
+        lambda: inspect(None),
+        lambda: write_body(None),
+        lambda: export_model(model, None),
+    ):
+        with pytest.raises(NeuralocksError, match="None is no path"):
+            work()
 
 
 @pytest.mark.parametrize("kind", [str, Sdf.Path, lambda path: f"{path}/"])
