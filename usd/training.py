@@ -64,7 +64,7 @@ def training_scene(
     notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
     for source in grooms or [str(character)]:
-        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, seed, notes)
+        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, notes)
     clips = tuple(read_clip(path, rig.character) for path in motion)
     if tell:
         tell(list(dict.fromkeys(notes)))
@@ -72,7 +72,7 @@ def training_scene(
 
 
 @names_damage
-def _file(source: str, rig: StageRig, head: str | None, seed: int, notes: list[str]) -> list[StrandSet]:
+def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> list[StrandSet]:
     stage = open_stage(source)
     prims = find_curves(stage)
     if not prims:
@@ -80,19 +80,19 @@ def _file(source: str, rig: StageRig, head: str | None, seed: int, notes: list[s
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
     # Beside hair, the grass of a set is none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
-    return [_strands(read_groom(prim, a.to_bind, notes), a.character, seed) for prim, a in near]
+    return [_strands(read_groom(prim, a.to_bind, notes), a.character) for prim, a in near]
 
 
 def _library(character: Character, seed: int) -> list[StrandSet]:
     barber = Barber(character)
-    return [_strands(barber.grow(style, MOST_STRANDS, seed + i), character, seed) for i, style in enumerate(STYLES)]
+    return [_strands(barber.grow(style, MOST_STRANDS, seed + i), character) for i, style in enumerate(STYLES)]
 
 
-def _strands(groom: Groom, character: Character, seed: int) -> StrandSet:
+def _strands(groom: Groom, character: Character) -> StrandSet:
     strands = strands_on(character, groom)
     if len(strands.rest) <= MOST_STRANDS:
         return strands
-    return strands.subset(whole_locks(strands, MOST_STRANDS, seed))  # neighbours stay neighbours
+    return strands.subset(whole_locks(strands, MOST_STRANDS))  # neighbours stay neighbours
 
 
 def read_clip(path: str, character: Character) -> Clip:
