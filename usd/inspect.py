@@ -20,6 +20,7 @@ from .curves import find_curves, read_groom
 from .damage import names_damage
 from .groom import USD
 from .hair_search import HairSearch
+from .lacking import no_groom
 from .notes import (
     another_head,
     composition_notes,
@@ -27,7 +28,6 @@ from .notes import (
     groom_notes,
     layer_notes,
     left_out,
-    no_groom,
     not_animated,
     out_of_range,
     partial_body,

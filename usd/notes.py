@@ -6,23 +6,20 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel
+from pxr import Usd
 
 from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.boundary import POSE_JOINTS, joints_read
 from neuralocks_core.character import HEAD_WIDTHS
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair
 
 from .attach import Attachment, rig_joint
 from .border import Border
-from .rig_source import StageRig, find_skeletons
+from .rig_source import StageRig
 
 SAME = 0.01
 """Joints of two skeletons at most so far apart [m] are one."""
-MOST_VARIANTS = 64
-"""Variants that are tried: each composes the stage anew."""
 FEW = 3
 """Similar lines told one by one."""
 
@@ -41,47 +38,6 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
                 f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
             ]
     return []
-
-
-def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
-    """The error for a stage without BasisCurves."""
-    other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
-    remedy = _in_a_variant(stage) or _on_joints(stage) or "add one, or import a hair file with 'neuralocks import'"
-    if other:
-        remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
-    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
-
-
-def has_hair_joints(prim: Usd.Prim) -> bool:
-    """Whether joints of a Skeleton are named like hair."""
-    return any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()))
-
-
-def _on_joints(stage: Usd.Stage) -> str:
-    """Which skeleton has joints for hair, and what moves them; '' if none has."""
-    hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
-    if hairy is None:
-        return ""
-    return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
-
-
-def _in_a_variant(stage: Usd.Stage) -> str:
-    """Which variant that is not chosen has curves, and what to do then; '' if none of MOST_VARIANTS has."""
-    tried = 0
-    with Usd.EditContext(stage, stage.GetSessionLayer()):
-        for path in [prim.GetPath() for prim in stage.Traverse() if prim.HasVariantSets()]:
-            for name in stage.GetPrimAtPath(path).GetVariantSets().GetNames():
-                variants = stage.GetPrimAtPath(path).GetVariantSet(name)
-                for variant in variants.GetVariantNames()[: MOST_VARIANTS - tried]:
-                    tried += 1
-                    variants.SetVariantSelection(variant)
-                    curves = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)), None)
-                    if curves:
-                        found = f"choose variant '{variant}' of '{name}' on {path}, which has {curves.GetPath()}"
-                        variants.ClearVariantSelection()
-                        return found
-                variants.ClearVariantSelection()
-    return ""
 
 
 def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: list[float]) -> list[str]:
@@ -107,15 +63,6 @@ def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
         "have USD search that folder (PXR_AR_DEFAULT_SEARCH_PATH)"
         for text in lost[:1]
     ]
-
-
-def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
-    """The error for a stage that lacks what a bake needs; where layers are missing, it names those as the likely cause."""
-    missing = composition_notes(stage, path)
-    if missing:
-        loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
-        remedy = f"not all of it is there ({loaded}); bring along what the file refers to"
-    return NeuralocksError(f"{path}: holds no {what}; {remedy}")
 
 
 def left_out(error) -> str:

@@ -16,7 +16,8 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from .border import Border, open_stage
 from .damage import names_damage
-from .notes import another_head, has_hair_joints, nothing_found, unfound, unlikely_head
+from .lacking import has_hair_joints, nothing_found
+from .notes import another_head, unfound, unlikely_head
 from .prim_paths import prim_path
 from .rig_source import StageRig, find_skeletons, read_rig
 from .surface import find_skins, rest_primvar

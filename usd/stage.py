@@ -16,15 +16,14 @@ from .border import Border, open_stage
 from .curves import find_curves, read_groom
 from .damage import names_damage
 from .hair_search import HairSearch
+from .lacking import no_groom, nothing_found
 from .notes import (
     composition_notes,
     few,
     groom_notes,
     layer_notes,
     left_out,
-    no_groom,
     not_animated,
-    nothing_found,
     partial_body,
     rig_notes,
     stands_still,
