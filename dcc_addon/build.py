@@ -103,10 +103,8 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
 
 def legacy(output: Path, wheels: list[Path]) -> Path:
     """The zip for Blender before 4.2: a folder, with the packages unpacked in it."""
-    out = (
-        output
-        / f"neuralocks-{version((HERE / 'blender_manifest.toml').read_text(encoding='utf-8'))}-legacy-{LEGACY[0]}.zip"
-    )
+    manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
+    out = output / f"neuralocks-{version(manifest)}-legacy-{LEGACY[0]}.zip"
     with Written(out) as archive:
         for path in sources():
             archive.write(path, f"neuralocks/{path.relative_to(HERE).as_posix()}")
