@@ -84,7 +84,7 @@ def write_samples(
 
 def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
-    plans = [Stencils(item, codes, velocities) for item in shot.grooms]
+    plans = [Stencils(item, codes, shot.first, velocities) for item in shot.grooms]
     total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
     say(0, total, "reading")
     with WriteBehind() as behind:

@@ -67,7 +67,7 @@ def simulate(
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes, "cuts": cuts}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
-        return _SimulatedPoser(item, codes, look, count, volume, progress)
+        return _SimulatedPoser(item, codes, shot.first, look, count, volume, progress)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
     facts |= cut_facts(cuts)
@@ -80,7 +80,7 @@ def simulate(
 class _SimulatedPoser:
     """Points of one groom out of a simulation of some of its strands."""
 
-    def __init__(self, item: StageGroom, codes: list[float], material, count: int, volume: float, progress):
+    def __init__(self, item: StageGroom, codes: list[float], first: float, material, count: int, volume: float, progress):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
         chosen = whole_locks(every, count)
@@ -88,7 +88,7 @@ class _SimulatedPoser:
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
         # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest.
         start = float(self._rig.time_codes[0])
-        wanted = {code: max(code, start) for code in Stencils(item, codes).codes}
+        wanted = {code: max(code, start) for code in Stencils(item, codes, first).codes}
         times = sorted({start, *wanted.values()})
         rows = {time: row for row, time in enumerate(times)}
         self._row = {code: rows[time] for code, time in wanted.items()}

@@ -8,6 +8,8 @@ from neuralocks_core.errors import NeuralocksError
 from .amounts import check_number
 
 MOST = 1_000_000
+NEAR = 1e-3
+"""A time code that is nearer to a frame than this share of one was rounded from it."""
 
 
 def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
@@ -43,17 +45,28 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     check_number("--subframes", subframes, 1, 64, whole=True)
     if frames is None or isinstance(frames, str):
         begin, end, step = _whole_range(first, last, frame) if frames is None else parse_frames(frames, frame)
-        count = (end - begin) / step + 1e-9  # may overflow to infinity
+        begin, end = on_frame(begin, first, frame), on_frame(end, first, frame)
+        count = (end - begin) / step + 1e-6  # may overflow to infinity
         if not count * subframes < MOST:
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
         count = math.floor(count) + 1
-        # The same time is the same number in every part of a range that is baked in parts.
-        whole = [round(_on_frame(begin + i * step, first, frame), 9) for i in range(count)]
+        whole = [on_frame(begin + i * step, first, frame) for i in range(count)]
     else:
         whole = _numbers(frames, "frames")
     if not whole or not all(math.isfinite(code) for code in whole):
         raise NeuralocksError("frames: none given, or not finite; give at least one time code")
     return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})
+
+
+def on_frame(code: float, first: float, frame: float) -> float:
+    """A time code to nine digits. Where a frame is no whole number, that of the shot's frame that was meant: the same time
+    is the same number in every part of a range that is baked in parts, however its ends were rounded.
+    """
+    count = (code - first) / frame
+    if frame != 1 and math.isfinite(count):
+        near = first + frame * round(count)
+        code = near if abs(near - code) < NEAR * frame else code
+    return round(code, 9)
 
 
 def given_cuts(cuts, loop: bool = False) -> list[float] | None:
@@ -82,9 +95,3 @@ def _numbers(codes, name: str) -> list[float]:
         return [float(code) for code in (None if isinstance(codes, str) else codes)]
     except (TypeError, ValueError):
         raise NeuralocksError(f"{name}: {codes!r} holds no time codes; give a list such as [25, 49]") from None
-
-
-def _on_frame(code: float, first: float, frame: float) -> float:
-    """A time code, or the shot's frame that it was rounded from, where a frame is no whole number."""
-    near = first + frame * round((code - first) / frame)
-    return near if frame != 1 and abs(near - code) < 1e-6 * frame else code

@@ -5,7 +5,7 @@ import json
 import os
 
 import pytest
-from pxr import Sdf, Usd, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
 from typer.testing import CliRunner
 
 from neuralocks_core.errors import NeuralocksError
@@ -36,6 +36,24 @@ def test_joined_parts_are_the_one_bake_byte_for_byte(shot, tmp_path, model, endi
     assert joined.path.read_bytes() == whole.read_bytes()
     assert not joined.notes and len(joined.frames) == 12 * options.get("subframes", 1)
     assert sorted(os.listdir(tmp_path)) == sorted(["farm", whole.name, joined.path.name])
+
+
+def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model):
+    """Their frames are no whole numbers; what lies beyond a part is told by the same ones as within it."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "seconds.usda"))
+    stage.SetTimeCodesPerSecond(1)
+    stage.SetFramesPerSecond(24)
+    stage.GetRootLayer().subLayerPaths.append(str(shot))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    stage.SetStartTimeCode(1 / 24)
+    stage.SetEndTimeCode(12 / 24)
+    stage.Save()
+    whole = bake(tmp_path / "seconds.usda", tmp_path / "whole.usdc", model)
+    assert len(whole.frames) == 12
+    ranges = (f"0.0416667:{whole.frames[6]}", f"{whole.frames[7]:.6g}:0.5")
+    joined = join(parts_of(tmp_path / "seconds.usda", tmp_path, model, ranges), tmp_path / "hair.usdc").path
+    assert joined.read_bytes() == whole.path.read_bytes()
 
 
 def test_usds_own_stitching_gives_the_same_values(shot, tmp_path, model):

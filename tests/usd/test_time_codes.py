@@ -23,3 +23,16 @@ def test_a_range_left_out_is_the_shots_in_its_own_frames():
     assert time_codes(None, 2, 3, subframes=2) == [2.0, 2.5, 3.0, 3.5]
     assert np.allclose(time_codes(None, 0.25, 0.5, frame=1 / 24), np.arange(6, 13) / 24)
     assert np.allclose(time_codes("1:2", 0, 0, 2, frame=0.5), [1, 1.25, 1.5, 1.75, 2, 2.25])
+
+
+@pytest.mark.parametrize("frame", [1 / 24, 1 / 29.97, 1000 / 24, 1000 / 29.97])
+def test_frames_are_found_again_where_they_are_no_whole_numbers(frame):
+    """By the numbers that a bake wrote, and by those that are typed from what it told of them."""
+    first = 2.5 * frame
+    whole = time_codes(None, first, first + 15 * frame, frame=frame)
+    assert len(whole) == 16
+    for written in (repr, "{:.6g}".format):
+        for cut in range(1, 15):
+            before = time_codes(f"{written(whole[0])}:{written(whole[cut])}", first, 0, frame=frame)
+            after = time_codes(f"{written(whole[cut + 1])}:{written(whole[-1])}", first, 0, frame=frame)
+            assert before + after == whole
