@@ -110,7 +110,7 @@ def _load_anny():
     except ImportError:
         remedy = "run: pip install 'neuralocks[body]'"
         raise NeuralocksError(f"anny: the statistical body is not installed; {remedy}") from None
-    from neuralocks_core.reference.device import start_warp
+    from neuralocks_core.warp_device import start_warp
 
     start_warp("cpu")  # or it would tell of itself on standard output, where a command's answer belongs
     return Anny(rig="game_engine", topology="anny-quads", pose_parameterization="local-ref")

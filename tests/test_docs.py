@@ -68,6 +68,19 @@ def test_the_map_names_modules_that_are_there():
     assert len(named) > 80 and named <= set(modules()), named - set(modules())
 
 
+@pytest.mark.parametrize(
+    ("package", "section"),
+    [("neuralocks_core", "Where things are"), ("usd", "Where things are"), ("dcc_addon", "The Blender add-on")],
+)
+def test_every_module_is_on_the_map(package, section):
+    """Or is a package that is."""
+    text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"## {section}")[1].split("\n## ")[0]
+    named = {word for code in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", code)}
+    there = {path.stem for path in (ROOT / package).glob("[!_]*.py")}
+    there |= {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert there <= named, there - named
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_commands_have_the_options_that_are_written(document):
     """Of lines that begin with `neuralocks`; what its commands take stands in the sources of the command line."""

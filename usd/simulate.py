@@ -80,7 +80,9 @@ def simulate(
 class _SimulatedPoser:
     """Points of one groom out of a simulation of some of its strands."""
 
-    def __init__(self, item: StageGroom, codes: list[float], first: float, material, count: int, volume: float, progress):
+    def __init__(
+        self, item: StageGroom, codes: list[float], first: float, material, count: int, volume: float, progress
+    ):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
         chosen = whole_locks(every, count)

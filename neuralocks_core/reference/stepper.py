@@ -7,8 +7,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import G
-from neuralocks_core.reference.device import start_warp
 from neuralocks_core.reference.rest import RestRods
+from neuralocks_core.warp_device import start_warp
 
 REACH = 0.1
 """[m] how far a vertex looks for the body; also how deep a vertex may sink and still be brought back."""

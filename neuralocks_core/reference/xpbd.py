@@ -10,10 +10,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material
-from neuralocks_core.reference.device import start_warp
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.rods import Rollout
+from neuralocks_core.warp_device import start_warp
 
 REACH = 0.1
 """[m] how far a vertex looks for the body."""

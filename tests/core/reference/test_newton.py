@@ -19,7 +19,7 @@ if not os.environ.get("NEURALOCKS_COMPARE"):
 import warp as wp
 
 from neuralocks_core.reference import simulate
-from neuralocks_core.reference.device import start_warp
+from neuralocks_core.warp_device import start_warp
 
 EDGES, LENGTH, DT = 15, 0.3, 1 / 30
 EDGE = LENGTH / EDGES

@@ -22,8 +22,8 @@ def test_the_force_is_the_gradient_of_the_networks_potential():
 
     from neuralocks_core.physics.rods import rods
     from neuralocks_core.physics.self_collision import density, self_collision
-    from neuralocks_core.reference.device import start_warp
     from neuralocks_core.reference.volume import Volume
+    from neuralocks_core.warp_device import start_warp
 
     start_warp("cpu")
     rest = bundle()
