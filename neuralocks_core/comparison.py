@@ -125,7 +125,9 @@ def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
 
 
 def whole_locks(strands: StrandSet, count: int) -> np.ndarray:
-    """Indices of about `count` valid strands in whole locks, spread over the scalp by chance, the same each time."""
+    """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
+    the same each time.
+    """
     usable = np.flatnonzero(strands.valid)
     if len(usable) <= count:
         return usable

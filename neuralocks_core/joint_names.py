@@ -77,12 +77,13 @@ def _words(name: str) -> list[str]:
 
 def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str]]:
     """The words of each joint without a namespace's, whose colon is an underscore in USD (`Character1_LeftArm`)."""
-    while any(names):
-        first, _ = Counter(words[0] for words in names if words).most_common(1)[0]
-        if first in _SIDES or first in meant | _TRUNK or not _is_namespace(first, names):
-            break
-        names = [words[1:] if words[:1] == [first] else words for words in names]
-    return names
+    own = meant | _TRUNK | _SIDES.keys()
+    while True:
+        firsts = Counter(words[0] for words in names if words)
+        found = [first for first in firsts if first not in own and _is_namespace(first, names)]
+        if not found:
+            return names
+        names = [words[1:] if words[:1] == found[:1] else words for words in names]
 
 
 def _is_namespace(first: str, names: list[list[str]]) -> bool:

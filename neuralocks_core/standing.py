@@ -8,7 +8,7 @@ from neuralocks_core.humanoid import Humanoid
 from neuralocks_core.rotation import rotation_part
 
 UPRIGHT = 45.0
-"""A character whose axis from the ground to the head is less than this off the vertical [degrees] stands."""
+"""A character whose legs, or trunk, are less than this off the vertical [degrees] stands."""
 MUCH = 10.0
 """If it stands straighter by more than this [degrees] in axes that are turned by any angle, it was built in these."""
 FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
@@ -31,7 +31,9 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     """
     here = rotation_part(placed)
     feet = [joints[humanoid[name]] for name in FEET if name in humanoid]
-    axis = joints[humanoid.get("head", 0)] - (np.mean(feet, axis=0) if feet else joints[humanoid.get("hips", 0)])
+    head, hips = (joints[humanoid.get(name, 0)] for name in ("head", "hips"))
+    # Legs are upright on two feet and on four; a trunk without legs may be either's.
+    axis = (hips if "hips" in humanoid else head) - np.mean(feet, axis=0) if feet else head - hips
     length = np.linalg.norm(axis)
 
     def tilt(turn: np.ndarray) -> float:

@@ -2,7 +2,7 @@
 """Numbers that a caller gives for an argument, checked before anything is read."""
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 
 from neuralocks_core.errors import NeuralocksError
 
@@ -19,7 +19,7 @@ def check_number(option: str, value, low: float, high: float = math.inf, *, whol
     Raises:
         NeuralocksError: names the option and the range.
     """
-    known = isinstance(value, int if whole else Real) and not isinstance(value, bool)
+    known = isinstance(value, Integral if whole else Real) and not isinstance(value, bool)
     if not (known and low <= value <= high):
         kind, end = "a whole number" if whole else "a number", f" to {high:g}" if high < math.inf else " on"
         raise NeuralocksError(f"{option} {value!r}: must be {kind} from {low:g}{end}")

@@ -18,7 +18,7 @@ class Stencils:
     Args:
         item: the groom.
         codes: ascending time codes of the samples.
-        first: the shot's first time code.
+        origin: the shot's first time code, from which frames are counted.
         velocities: whether velocities are wanted at all.
 
     Attributes:
@@ -26,7 +26,7 @@ class Stencils:
         codes: ascending time codes at which points are needed.
     """
 
-    def __init__(self, item: StageGroom, codes: list[float], first: float, velocities: bool = True):
+    def __init__(self, item: StageGroom, codes: list[float], origin: float, velocities: bool = True):
         self.wanted = dict.fromkeys(codes)
         self.velocities = velocities
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
@@ -34,7 +34,7 @@ class Stencils:
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
         after = np.searchsorted(rig.clip.times, rig.clip.cuts - 1e-9)
         self._before, self._after = clip[after - 1], clip[after]
-        self._shot_first, self._step, self._rate = first, border.frame, border.rate / border.frame
+        self._origin, self._step, self._rate = origin, border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep the very same number.
         self._known = np.array(codes, float)
         extra = {other for code in codes for other, _ in self.terms(code)} if velocities else set()
@@ -65,4 +65,4 @@ class Stencils:
         near = int(np.searchsorted(self._known, code - 1e-6))
         if near < len(self._known) and abs(self._known[near] - code) < 1e-6:
             return float(self._known[near])
-        return on_frame(float(code), self._shot_first, self._step) if self._step != 1 else float(code)
+        return on_frame(float(code), self._origin, self._step)

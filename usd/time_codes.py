@@ -55,7 +55,8 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         whole = _numbers(frames, "frames")
     if not whole or not all(math.isfinite(code) for code in whole):
         raise NeuralocksError("frames: none given, or not finite; give at least one time code")
-    return sorted({code + part * frame / subframes for code in whole for part in range(subframes)})
+    parts = [part * frame / subframes for part in range(subframes)]
+    return sorted({on_frame(code + part, first, frame) for code in whole for part in parts})
 
 
 def on_frame(code: float, first: float, frame: float) -> float:

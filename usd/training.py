@@ -80,7 +80,10 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
     # Beside hair, the grass of a set is none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
-    return [_strands(read_groom(prim, a.to_bind, notes), a.character) for prim, a in near]
+    found = [_strands(read_groom(prim, a.to_bind, notes), a.character) for prim, a in near]
+    if not any(strands.valid.any() for strands in found):
+        raise NeuralocksError(f"{source}: no strand has two distinct points; there is nothing to learn from")
+    return [strands for strands in found if strands.valid.any()]
 
 
 def _library(character: Character, seed: int) -> list[StrandSet]:

@@ -9,6 +9,7 @@ import bpy
 
 from .binding import armatures_of
 from .carried import bodies_of, hairs_of
+from .shown import enabled
 
 
 def layer_of(armature, scene):
@@ -47,25 +48,7 @@ def _moves(armature, scene, layer, mode: str) -> bool:
     """Whether a view layer shows an armature or something that it moves; `mode` as of a depsgraph, "VIEWPORT" or "RENDER",
     for things may be disabled in either.
     """
-    if _enabled(armature, layer, mode):
+    if enabled(armature, layer, mode):
         return True
     carried = (thing for carried_by in (hairs_of, bodies_of) for thing in carried_by(armature, scene))
-    return any(_enabled(thing, layer, mode) and armature in armatures_of(thing) for thing in carried)
-
-
-def _enabled(thing, layer, mode: str) -> bool:
-    """Whether a view layer evaluates an object for itself. The eye of the outliner does not count: it hides from view
-    only.
-    """
-    if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
-        return True
-    off = "hide_render" if mode == "RENDER" else "hide_viewport"
-    return not getattr(thing, off) and _within(layer.layer_collection, set(thing.users_collection), off)
-
-
-def _within(branch, collections: set, off: str) -> bool:
-    """Whether a branch of a view layer takes in one of some collections; a child may be in though its parent is out."""
-    if getattr(branch.collection, off):
-        return False
-    own = branch.collection in collections and not branch.exclude
-    return own or any(_within(child, collections, off) for child in branch.children)
+    return any(enabled(thing, layer, mode) and armature in armatures_of(thing) for thing in carried)

@@ -7,6 +7,7 @@ import bpy
 
 from ..session import session
 from .animated import animated
+from .shown import enabled
 
 
 @contextmanager
@@ -14,45 +15,42 @@ def watched(scene, layer, things):
     """Meanwhile Blender evaluates objects of a view layer, be they hidden or disabled: an empty depends on them. Those that
     hang plainly on what carries them go without: to make empties and to remove them takes time in every frame.
     """
-    probes = [_probe(scene, thing) for thing in things if scene.library is None and _needs(thing, layer)]
-    session.watched = {thing.name_full for thing, _ in probes}
+    hidden, probes = [t for t in things if scene.library is None and _needs(t, layer)], []
     try:
+        for thing in hidden:
+            probes.append(bpy.data.objects.new("Neuralocks Probe", None))
+            scene.collection.objects.link(probes[-1])
+            _depend(probes[-1], thing)
+        session.watched = {thing.name_full for thing in hidden}
         yield
     finally:
         session.watched = set()
-        for _, probe in probes:
+        for probe in probes:
             bpy.data.objects.remove(probe)
 
 
 def evaluated_for_itself(thing, graph) -> bool:
-    """Whether a depsgraph keeps an object up to date: what is hidden by the eye of the outliner is hidden from view only."""
-    if graph.mode == "RENDER" or thing.name_full in session.watched:
-        return True
-    layer = graph.view_layer
-    return thing.hide_get(view_layer=layer) or thing.visible_get(view_layer=layer)
+    """Whether a depsgraph keeps an object up to date."""
+    return graph.mode == "RENDER" or thing.name_full in session.watched or enabled(thing, graph.view_layer)
 
 
 def _needs(thing, layer) -> bool:
     if "hide_viewport" in animated(thing.animation_data):
         return True
-    if thing.hide_get(view_layer=layer) or thing.visible_get(view_layer=layer):
-        return False
+    return not enabled(thing, layer) and (_moves(thing) or (thing.parent is not None and _needs(thing.parent, layer)))
+
+
+def _moves(thing) -> bool:
+    """Whether an object, or its shape, is moved by more than its parent, or by that in a way that Blender alone knows."""
     keys = getattr(thing.data, "shape_keys", None)
-    moved = thing.animation_data is not None or len(thing.constraints) or (keys and keys.animation_data)
-    return bool(moved) or thing.parent_type not in ("OBJECT", "BONE") or _relative(thing)
-
-
-def _relative(thing) -> bool:
-    """Whether it is parented to a bone with Relative Parenting."""
+    if thing.animation_data is not None or len(thing.constraints) or (keys and keys.animation_data):
+        return True
     bone = thing.parent.data.bones.get(thing.parent_bone) if thing.parent_type == "BONE" else None
-    return bone is not None and bone.use_relative_parent
+    return thing.parent_type not in ("OBJECT", "BONE") or (bone is not None and bone.use_relative_parent)
 
 
-def _probe(scene, thing):
-    probe = bpy.data.objects.new("Neuralocks Probe", None)
-    scene.collection.objects.link(probe)
+def _depend(probe, thing) -> None:
     probe.constraints.new("COPY_TRANSFORMS").target = thing
-    if thing.type == "MESH":  # its shape keys, too
+    if thing.type == "MESH":  # on its shape keys, too
         surface = probe.constraints.new("SHRINKWRAP")
         surface.target, surface.influence = thing, 0.0
-    return thing, probe

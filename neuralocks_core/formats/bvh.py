@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,20 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from neuralocks_core.character import Skeleton
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats.bvh_words import LARGEST, Words
 from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import angle_between
 
-LARGEST_FILE = 256 * 2**20
-"""Bytes; an hour of motion at 120 frames a second is about that."""
 MOST_JOINTS = 2048
-LARGEST = 1e6
-"""No length in a file, in its own unit, is larger."""
-LONGEST_NUMBER = 64
-"""Characters; an array of words is as wide as its longest one."""
 LONGEST_NAME = 200
 """Characters of a joint's name that are kept."""
-PIECE = 1 << 16
-"""Bytes of the frames that are made numbers at a time."""
 MOST_NAMES = 2**24
 """Characters of all joint paths together; each path repeats those of the joints above."""
 UNITS = (1.0, 0.01, 0.0254, 0.056444, 0.001)
@@ -65,7 +57,7 @@ def read_bvh(path: str | Path, unit: float | None = None, rate: float | None = N
     for name, value in (("unit", unit), ("rate", rate)):
         if value is not None and not 1e-6 <= value <= 1e6:
             raise NeuralocksError(f"{path}: a {name} of {value} cannot be meant; give a positive number")
-    words = _Words(path)
+    words = Words(path)
     joints = _hierarchy(words)
     frames, step = _motion_header(words, joints)
     values = _values(words, frames, sum(len(joint.channels) for joint in joints))
@@ -86,79 +78,7 @@ class _Joint:
     end: np.ndarray | None = None
 
 
-_WORD, _BREAK = re.compile(rb"\S+"), re.compile(rb"\s")
-
-
-class _Words:
-    """The file's words one by one, with errors that name it."""
-
-    def __init__(self, path: Path):
-        self.path = path
-        try:
-            if not path.is_file():
-                raise self.error("no such file", "check the path")
-            if path.stat().st_size > LARGEST_FILE:
-                raise self.error(f"larger than {LARGEST_FILE} bytes", "cut the take")
-            self._content = path.read_bytes()
-        except OSError as error:
-            raise self.error(f"cannot be read ({error.strerror})", "check its permissions") from None
-        # One after the other: the words of a hostile file never become millions of Python objects.
-        self._found, self._place = _WORD.finditer(self._content), 0
-
-    def error(self, fact: str, remedy: str = "export it again as BVH") -> NeuralocksError:
-        return NeuralocksError(f"{self.path}: {fact}; {remedy}")
-
-    def next(self) -> str:
-        word = next(self._found, None)
-        if word is None:
-            raise self.error("ends in the middle")
-        self._place = word.end()
-        return word[0].decode("utf-8", "replace")
-
-    @property
-    def left(self) -> int:
-        """Bytes after the last word."""
-        return len(self._content) - self._place
-
-    def expect(self, word: str) -> None:
-        found = self.next()
-        if found.lower() != word.lower():
-            raise self.error(f"'{found[:40]}' stands where '{word}' should")
-
-    def number(self) -> float:
-        word = self.next()
-        try:
-            value = float(word)
-        except ValueError:
-            raise self.error(f"'{word[:40]}' stands where a number should") from None
-        if not abs(value) <= LARGEST:
-            raise self.error(f"holds the number {word[:40]}")
-        return value
-
-    def count(self, highest: int, what: str) -> int:
-        value = self.number()
-        if value != int(value) or not 0 <= value <= highest:
-            raise self.error(f"says {value:g} {what}, where 0 to {highest} are possible")
-        return int(value)
-
-    def numbers(self, most: int) -> np.ndarray:
-        """All that follows as numbers (n,), or so many of them where there are more."""
-        values, start = [np.zeros(0)], self._place
-        while most and start < len(self._content):
-            gap = _BREAK.search(self._content, start + PIECE)
-            end = gap.start() if gap else len(self._content)
-            block = self._content[start:end].split()[:most]
-            if max(map(len, block), default=0) > LONGEST_NUMBER:
-                raise self.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
-            try:
-                values.append(np.array(block, bytes).astype(float))
-            except ValueError as error:
-                raise self.error(f"its frames hold what is no number ({str(error)[:80]})") from None
-            start, most = end, most - len(block)
-        return np.concatenate(values)
-
-
-def _hierarchy(words: _Words) -> list[_Joint]:
+def _hierarchy(words: Words) -> list[_Joint]:
     words.expect("HIERARCHY")
     joints: list[_Joint] = []
     open_joints: list[int] = []
@@ -204,7 +124,7 @@ def _hierarchy(words: _Words) -> list[_Joint]:
 _CHANNELS = {f"{axis}{kind}" for axis in "xyz" for kind in ("position", "rotation")}
 
 
-def _name(words: _Words) -> str:
+def _name(words: Words) -> str:
     """A joint's name: all words up to the brace, without what joint paths cannot hold."""
     parts = []
     while (word := words.next()) != "{":
@@ -213,7 +133,7 @@ def _name(words: _Words) -> str:
     return "_".join(parts).replace("/", "_")[:LONGEST_NAME] or "joint"
 
 
-def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
+def _motion_header(words: Words, joints: list[_Joint]) -> tuple[int, float]:
     words.expect("Frames:")
     width = sum(len(joint.channels) for joint in joints)
     if not width:
@@ -231,7 +151,7 @@ def _motion_header(words: _Words, joints: list[_Joint]) -> tuple[int, float]:
     return frames, step
 
 
-def _values(words: _Words, frames: int, width: int) -> np.ndarray:
+def _values(words: Words, frames: int, width: int) -> np.ndarray:
     values = words.numbers(frames * width) if frames * width <= words.left else ()
     if len(values) < frames * width:
         raise words.error(f"says {frames} frames, of which it holds fewer")

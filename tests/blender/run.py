@@ -26,7 +26,7 @@ def main() -> None:
     print(f"Blender {bpy.app.version_string}", flush=True)
     for line in sys.stdin:
         name, folder = line.rstrip("\n").split("\t")
-        Path(folder).mkdir(parents=True)
+        Path(folder).mkdir(parents=True, exist_ok=True)
         try:
             scenes.empty()
             getattr(importlib.import_module(modules[name]), name)(Path(folder))

@@ -5,6 +5,7 @@ opens file after file; after one that fails comes a fresh process.
 The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a list, `4.5,5.0`) chooses others.
 """
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -63,7 +64,8 @@ class _Blender:
         self.scenarios.append(scenario)
         begun, limit = self.log.stat().st_size, SLOW.get(scenario, LIMIT)
         until = time.monotonic() + limit
-        print(scenario, folder, sep="\t", file=self.process.stdin, flush=True)
+        with contextlib.suppress(OSError):  # where it has ended, its status says so
+            print(scenario, folder, sep="\t", file=self.process.stdin, flush=True)
         while time.monotonic() < until:
             gone = self.process.poll()
             if (folder / "outcome").exists():

@@ -82,6 +82,12 @@ RIGS = {
         "   Character1_RightArm",
         {"head": "Character1_Head", "left_upper_arm": "Character1_LeftArm", "left_eye": "eye_L"},
     ),
+    "a namespace, and more joints of hair without it": (
+        "Character1_Hips\n Character1_Spine\n  Character1_Neck\n   Character1_Head\n"
+        + "".join(f"    hair_{i:02d}\n" for i in range(9))
+        + "  Character1_LeftShoulder\n   Character1_LeftArm\n  Character1_RightShoulder\n   Character1_RightArm",
+        {"head": "Character1_Head", "left_upper_arm": "Character1_LeftArm"},
+    ),
     "AutoRig Pro": (
         "root_x\n spine_01_x\n  spine_03_x\n   neck_x\n    head_x\n   shoulder_l\n    arm_stretch_l\n     forearm_stretch_l\n"
         "   shoulder_r\n    arm_stretch_r",

@@ -15,6 +15,7 @@ from .shots import POSITIONS, Recipe, write_shot
 
 STANDING = {"hips": (0, 1, 0), "head": (0, 1.7, 0.05), "left_foot": (0.1, 0.1, 0), "right_foot": (-0.1, 0.1, 0)}
 GRAZING = {"hips": (0, 1.2, -1), "head": (0, 1.0, 1)}
+DOG = {"hips": (0, 0.6, -0.4), "head": (0, 0.75, 0.5), "left_foot": (0.1, 0, -0.45), "right_foot": (-0.1, 0, -0.45)}
 
 
 def turned(axis: str, degrees: float) -> np.ndarray:
@@ -55,8 +56,10 @@ def test_what_was_built_askew_stands_as_it_is_placed():
 
 
 def test_what_goes_on_four_legs_is_not_stood_up():
-    here = bind_world(GRAZING, np.eye(4))
-    assert np.array_equal(here, list(GRAZING.values()))
+    for joints in (GRAZING, DOG):
+        assert np.array_equal(bind_world(joints, np.eye(4)), list(joints.values()))
+    for lean in (20, 44):
+        assert np.abs(bind_world(DOG, turned("x", lean)) - list(DOG.values())).max() < 1e-9
 
 
 @pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z")])

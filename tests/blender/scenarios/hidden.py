@@ -11,9 +11,9 @@ from tests.blender.checks import SAME, apart, baked_points, make_live, messages,
 
 def hidden_hair(folder: Path) -> None:
     """Hair that hangs in whatever way is baked where it would be shown, in an excluded collection or disabled."""
-    for number, hang in enumerate((_child_of, _keyed, _vertex)):
+    for number, hang in enumerate((_child_of, _keyed, _vertex, _below_keyed)):
         shown = _baked(folder / f"{number}_shown.usdc", hang, lambda strands: None)
-        for way, hide in (("disabled", _disable), ("excluded", _exclude)):
+        for way, hide in (("disabled", _disable), ("excluded", _exclude), ("both", _disable_unseen)):
             here = _baked(folder / f"{number}_{way}.usdc", hang, hide)
             assert all(apart(here[f], shown[f]) < SAME for f in shown), (hang.__name__, way)
 
@@ -78,8 +78,23 @@ def _vertex(rig, strands) -> None:
     strands.parent_type = "VERTEX"
 
 
+def _below_keyed(rig, strands) -> None:
+    carrier = bpy.data.objects.new("Carrier", None)
+    bpy.context.scene.collection.objects.link(carrier)
+    carrier.parent, strands.parent = rig, carrier
+    _keyed(rig, carrier)
+
+
 def _disable(strands) -> None:
     strands.hide_viewport = True
+    if strands.parent is not None and strands.parent.type == "EMPTY":
+        strands.parent.hide_viewport = True
+
+
+def _disable_unseen(strands) -> None:
+    """By the eye of the outliner, too, which alone would leave it evaluated."""
+    strands.hide_set(True)
+    _disable(strands)
 
 
 def _exclude(strands) -> None:

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a view layer shows, and so evaluates."""
+
+
+def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
+    """Whether a view layer evaluates an object for itself. The eye of the outliner does not count: it hides from view
+    only.
+
+    Args:
+        mode: as of a depsgraph, "VIEWPORT" or "RENDER", for things may be disabled in either.
+    """
+    if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
+        return True
+    off = "hide_render" if mode == "RENDER" else "hide_viewport"
+    return not getattr(thing, off) and _within(layer.layer_collection, set(thing.users_collection), off)
+
+
+def _within(branch, collections: set, off: str) -> bool:
+    """Whether a branch of a view layer takes in one of some collections; a child may be in though its parent is out."""
+    if getattr(branch.collection, off):
+        return False
+    own = branch.collection in collections and not branch.exclude
+    return own or any(_within(child, collections, off) for child in branch.children)
