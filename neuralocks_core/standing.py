@@ -5,20 +5,26 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.humanoid import Humanoid
-from neuralocks_core.rotation import rotation_part
+from neuralocks_core.rotation import angle_between, rotation_part
 
-UPRIGHT = 45.0
-"""A character whose legs, or trunk, are less than this off the vertical [degrees] stands."""
-MUCH = 10.0
-"""If it stands straighter by more than this [degrees] in axes that are turned by any angle, it was built in these."""
+SAME = 1e-6
+"""Entries of rotations that differ by less are the same."""
+STRAIGHTER = 45.0
+"""Legs, or a trunk without legs, that are less off the vertical by more than this [degrees] stand, and lay before."""
+ASKEW = 10.0
+"""Legs and trunk that are less off the vertical by more than this [degrees], each, where they are than by any quarter turn
+were built askew."""
+NEAR = 30.0
+"""Where nothing tells what is up, the nearest quarter turn is meant if it is this near [degrees]."""
 FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
 
 
 def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> np.ndarray:
     """The turn and scale that a character's parents give it in its bind pose.
 
-    Quarter turns are what an exporter did to the axes: the nearest are taken in which the character stands. By other
-    angles parents turn a character as a joint would: one that leans with its parent has the bind pose of one that stands.
+    Quarter turns are what an exporter did to the axes: the nearest one is taken, or one in which the character stands
+    where it lies by that. By other angles parents turn a character as a joint would: one that leans with its parent has
+    the bind pose of one that stands.
 
     Args:
         placed: their turn and scale (3, 3) at rest.
@@ -30,20 +36,31 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
         (3, 3); `placed` itself, bit for bit, where that turns by quarters.
     """
     here = rotation_part(placed)
-    feet = [joints[humanoid[name]] for name in FEET if name in humanoid]
-    head, hips = (joints[humanoid.get(name, 0)] for name in ("head", "hips"))
-    # Legs are upright on two feet and on four; a trunk without legs may be either's.
-    axis = (hips if "hips" in humanoid else head) - np.mean(feet, axis=0) if feet else head - hips
-    length = np.linalg.norm(axis)
+    if np.abs(here - np.eye(3)).max() < SAME:
+        return placed
+    legs, trunk = _axes(joints, humanoid)
+    found = [axis for axis in (legs, trunk) if axis is not None]
 
-    def tilt(turn: np.ndarray) -> float:
-        cosine = up @ turn @ axis / length if length else 1.0
-        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    def tilt(turn: np.ndarray, axis: np.ndarray) -> float:
+        return np.degrees(np.arccos(np.clip(up @ turn @ axis, -1, 1)))
 
     quarters = sorted(Rotation.create_group("O").as_matrix().round(), key=lambda turn: -round(np.sum(turn * here), 9))
-    if not feet:  # without legs, what goes on four of them is not told from what lies down
-        quarters = [quarters[0], np.eye(3)]
-    turn = next((turn for turn in quarters if tilt(turn) < UPRIGHT), here)
-    if tilt(here) < tilt(turn) - MUCH or np.abs(turn - here).max() < 1e-6:
+    turn = quarters[0]
+    if found:
+        # Legs are upright on two feet and on four; a trunk without legs may be either's.
+        others = quarters if legs is not None else [np.eye(3)]
+        turn = next((o for o in others if tilt(o, found[0]) < tilt(turn, found[0]) - STRAIGHTER), turn)
+        if all(tilt(here, axis) < tilt(turn, axis) - ASKEW for axis in found):
+            return placed
+    elif np.degrees(angle_between(turn, here)) > NEAR:
         return placed
-    return turn @ here.T @ placed
+    return placed if np.abs(turn - here).max() < SAME else turn @ here.T @ placed
+
+
+def _axes(joints: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Directions (3,) from the feet to the hips and from the hips to the head; None where these are not known."""
+    feet = [joints[humanoid[name]] for name in FEET if name in humanoid]
+    head, hips = (joints[humanoid[name]] if name in humanoid else None for name in ("head", "hips"))
+    legs = hips - np.mean(feet, axis=0) if feet and hips is not None else None
+    trunk = head - hips if head is not None and hips is not None else None
+    return tuple(None if a is None or not np.linalg.norm(a) else a / np.linalg.norm(a) for a in (legs, trunk))

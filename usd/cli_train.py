@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks train`."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from neuralocks_core.errors import NeuralocksError
+
 from .command import note
 from .options import Head, Joints, Out, Seed, Skeleton, pairs
+from .stopping import stopped
 
 
 def train_command(
@@ -58,10 +63,25 @@ def train_command(
     from .train import train
 
     settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
-    with progress_bar("training") as progress:
+    with _telling_how_to_go_on(out), progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, rollouts=rollouts, processes=processes,
             credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))
+
+
+@contextmanager
+def _telling_how_to_go_on(out: Path) -> Iterator[None]:
+    """After Ctrl-C: what a training has kept is thrown away by one that begins anew."""
+    try:
+        yield
+    except BaseException:
+        from neuralocks_core.training.work import work_folder
+
+        if stopped():
+            with suppress(NeuralocksError):  # nothing kept yet
+                work_folder(out, resume=True)
+                note(["the same command with --resume goes on from here, without it it begins anew"])
+        raise

@@ -232,6 +232,6 @@ def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     gaps = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
     first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
     missed = usual * (1 - 1e-6)  # a shot need not begin and end with a frame, but less than a step of it is none
-    gaps = ([f"from {first:g} to {codes[0]:g}"] if codes[0] - first >= missed else []) + gaps
-    gaps += [f"from {codes[-1]:g} to {last:g}"] if last - frames[-1] >= missed else []
+    gaps = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + gaps
+    gaps += [f"after {codes[-1]:g}"] if last - frames[-1] >= missed else []
     return [f"no part has samples {', '.join(gaps[:4])}{', ...' if len(gaps) > 4 else ''}"] if gaps else []

@@ -2,6 +2,7 @@
 """Which time codes a bake writes."""
 
 import math
+from fractions import Fraction
 
 from neuralocks_core.errors import NeuralocksError
 
@@ -9,7 +10,10 @@ from .amounts import check_number
 
 MOST = 1_000_000
 NEAR = 1e-3
-"""A time code that is nearer to a frame than this share of one was rounded from it."""
+"""A time code that is nearer to a frame than this share of one was rounded from it,"""
+NEARER = 1e-5
+"""and one that is nearer than this to a part of a frame from that."""
+MOST_SUBFRAMES = 64
 
 
 def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
@@ -42,7 +46,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     Raises:
         NeuralocksError: no frame, too many, or something that is no time code.
     """
-    check_number("--subframes", subframes, 1, 64, whole=True)
+    check_number("--subframes", subframes, 1, MOST_SUBFRAMES, whole=True)
     if frames is None or isinstance(frames, str):
         begin, end, step = _whole_range(first, last, frame) if frames is None else parse_frames(frames, frame)
         begin, end = on_frame(begin, first, frame), on_frame(end, first, frame)
@@ -60,13 +64,16 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
 
 
 def on_frame(code: float, first: float, frame: float) -> float:
-    """A time code to nine digits. Where a frame is no whole number, that of the shot's frame that was meant: the same time
-    is the same number in every part of a range that is baked in parts, however its ends were rounded.
+    """A time code to nine digits. Where a frame is no whole number, that of the shot's frame, or simple part of one, that was
+    meant: the same time is the same number in every part of a range that is baked in parts, however its ends were rounded.
     """
     count = (code - first) / frame
     if frame != 1 and math.isfinite(count):
-        near = first + frame * round(count)
-        code = near if abs(near - code) < NEAR * frame else code
+        whole, part = round(count), Fraction(count).limit_denominator(MOST_SUBFRAMES)
+        if abs(whole - count) < NEAR:
+            code = first + frame * whole
+        elif abs(part - count) < NEARER:
+            code = first + frame * float(part)
     return round(code, 9)
 
 

@@ -16,6 +16,9 @@ from .shots import POSITIONS, Recipe, write_shot
 STANDING = {"hips": (0, 1, 0), "head": (0, 1.7, 0.05), "left_foot": (0.1, 0.1, 0), "right_foot": (-0.1, 0.1, 0)}
 GRAZING = {"hips": (0, 1.2, -1), "head": (0, 1.0, 1)}
 DOG = {"hips": (0, 0.6, -0.4), "head": (0, 0.75, 0.5), "left_foot": (0.1, 0, -0.45), "right_foot": (-0.1, 0, -0.45)}
+LYING = {"hips": (0, 0.1, 0), "head": (0, 0.1, 0.7), "left_foot": (0.1, 0.1, -0.9), "right_foot": (-0.1, 0.1, -0.9)}
+CRAWLING = {"hips": (0, 0.5, 0), "head": (0, 0.6, 0.6), "left_foot": (0.1, 0, -0.6), "right_foot": (-0.1, 0, -0.6)}
+SEATED = {"hips": (0, 0.5, 0), "head": (0, 1.1, 0), "left_foot": (0.1, 0, 0.45), "right_foot": (-0.1, 0, 0.45)}
 
 
 def turned(axis: str, degrees: float) -> np.ndarray:
@@ -55,11 +58,22 @@ def test_what_was_built_askew_stands_as_it_is_placed():
     assert np.abs(here - list(STANDING.values())).max() < 1e-9
 
 
-def test_what_goes_on_four_legs_is_not_stood_up():
-    for joints in (GRAZING, DOG):
-        assert np.array_equal(bind_world(joints, np.eye(4)), list(joints.values()))
-    for lean in (20, 44):
-        assert np.abs(bind_world(DOG, turned("x", lean)) - list(DOG.values())).max() < 1e-9
+@pytest.mark.parametrize("joints", [GRAZING, DOG, LYING, CRAWLING, SEATED])
+def test_what_does_not_stand_in_its_own_axes_is_left_in_them(joints):
+    assert np.array_equal(bind_world(joints, np.eye(4)), list(joints.values()))
+
+
+@pytest.mark.parametrize("joints", [DOG, SEATED])
+def test_what_goes_on_four_legs_or_sits_leans_too(joints):
+    for lean in (-40, -20, 20, 40):
+        assert np.abs(bind_world(joints, turned("x", lean)) - list(joints.values())).max() < 1e-9
+
+
+def test_a_head_alone_is_taken_for_upright_where_it_nearly_is():
+    head = {"neck": (0, 1.5, 0), "head": (0, 1.6, 0.05)}
+    assert np.abs(bind_world(head, turned("x", 25)) - list(head.values())).max() < 1e-9
+    placed = turned("x", 46)
+    assert np.abs(bind_world(head, placed) - list(head.values()) @ placed[:3, :3].T).max() < 1e-9
 
 
 @pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z")])

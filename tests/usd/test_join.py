@@ -38,7 +38,8 @@ def test_joined_parts_are_the_one_bake_byte_for_byte(shot, tmp_path, model, endi
     assert sorted(os.listdir(tmp_path)) == sorted(["farm", whole.name, joined.path.name])
 
 
-def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model):
+@pytest.mark.parametrize("subframes", [1, 3])
+def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model, subframes):
     """Their frames are no whole numbers; what lies beyond a part is told by the same ones as within it."""
     stage = Usd.Stage.CreateNew(str(tmp_path / "seconds.usda"))
     stage.SetTimeCodesPerSecond(1)
@@ -49,10 +50,11 @@ def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model):
     stage.SetStartTimeCode(1 / 24)
     stage.SetEndTimeCode(12 / 24)
     stage.Save()
-    whole = bake(tmp_path / "seconds.usda", tmp_path / "whole.usdc", model)
-    assert len(whole.frames) == 12
-    ranges = (f"0.0416667:{whole.frames[6]}", f"{whole.frames[7]:.6g}:0.5")
-    joined = join(parts_of(tmp_path / "seconds.usda", tmp_path, model, ranges), tmp_path / "hair.usdc").path
+    whole = bake(tmp_path / "seconds.usda", tmp_path / "whole.usdc", model, subframes=subframes)
+    assert len(whole.frames) == 12 * subframes
+    ranges = (f"0.0416667:{whole.frames[6 * subframes]}", f"{whole.frames[7 * subframes]:.6g}:0.5")
+    parts = parts_of(tmp_path / "seconds.usda", tmp_path, model, ranges, subframes=subframes)
+    joined = join(parts, tmp_path / "hair.usdc").path
     assert joined.read_bytes() == whole.path.read_bytes()
 
 
@@ -96,7 +98,7 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
 def test_steps_are_no_gaps(shot, tmp_path, model):
     parts = parts_of(shot, tmp_path, model, ("3:5:2", "7:9:2"), subframes=3)
     joined = join(parts, tmp_path / "hair.usdc")
-    assert joined.notes == ["no part has samples from 1 to 3, from 9.66667 to 12"]
+    assert joined.notes == ["no part has samples before 3, after 9.66667"]
     whole = bake(shot, tmp_path / "whole.usdc", model, frames="3:9:2", subframes=3).path
     assert joined.path.read_bytes() == whole.read_bytes()
 
