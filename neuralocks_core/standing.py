@@ -10,7 +10,8 @@ from neuralocks_core.rotation import angle_between, rotation_part
 SAME = 1e-6
 """Entries of rotations that differ by less are the same."""
 STRAIGHTER = 45.0
-"""Legs, or a trunk without legs, that are less off the vertical by more than this [degrees] stand, and lay before."""
+"""A quarter turn that brings legs, or a trunk without legs, nearer to the vertical than the nearest one does, by more than
+this [degrees], is meant in its place."""
 ASKEW = 10.0
 """Legs and trunk that are less off the vertical by more than this [degrees], each, where they are than by any quarter turn
 were built askew."""
@@ -33,7 +34,7 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
         up: the direction (3,) that is up where the parents are.
 
     Returns:
-        (3, 3); `placed` itself, bit for bit, where that turns by quarters.
+        (3, 3); `placed` itself, bit for bit, where that turns by quarters or the character was built askew.
     """
     here = rotation_part(placed)
     if np.abs(here - np.eye(3)).max() < SAME:

@@ -78,9 +78,9 @@ def _telling_how_to_go_on(out: Path) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        from neuralocks_core.training.work import work_folder
-
         if stopped():
+            from neuralocks_core.training.work import work_folder
+
             with suppress(NeuralocksError):  # nothing kept yet
                 work_folder(out, resume=True)
                 note(["the same command with --resume goes on from here, without it it begins anew"])

@@ -142,18 +142,24 @@ class _Recording:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
         anew, since handlers may have changed them.
         """
-        frame = self.frames[row]
-        whole = int(np.floor(frame + 1e-6))
+        self._step(self.frames[row])
         armature = named(self.name)
         layer = layer_of(armature, self._scene)
         if layer is None:
             raise hidden(armature)
-        with watched(self._scene, layer, [named(name) for name in self._tracked]):
-            self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+        tracked = [named(name) for name in self._tracked]
+        with watched(self._scene, layer, tracked) as any_hidden:
+            if any_hidden:  # shape keys among these are still those of another frame
+                self._step(self.frames[row])
+                armature = named(self.name)
             with working_in(self._scene, layer):
-                self._read(row, named(self.name))
+                self._read(row, armature)
         if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
             self._store(row - row % BLOCK, row + 1)
+
+    def _step(self, frame: float) -> None:
+        whole = int(np.floor(frame + 1e-6))
+        self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
 
     def _read(self, row: int, armature) -> None:
         """Read the frame that the scene shows."""
@@ -168,6 +174,7 @@ class _Recording:
             self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
             binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
+            # Not even rounding may move what stands already: what is pushed out of a body would leap.
             up = np.eye(4) if np.array_equal(self._place, here) else self._place @ np.linalg.inv(here)
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()

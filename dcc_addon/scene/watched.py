@@ -13,7 +13,8 @@ from .shown import enabled
 @contextmanager
 def watched(scene, layer, things):
     """Meanwhile Blender evaluates objects of a view layer, be they hidden or disabled: an empty depends on them. Those that
-    hang plainly on what carries them go without: to make empties and to remove them takes time in every frame.
+    hang plainly on what carries them go without: to make empties and to remove them takes time in every frame. Gives whether
+    there are any.
     """
     hidden, probes = [t for t in things if scene.library is None and _needs(t, layer)], []
     try:
@@ -22,7 +23,7 @@ def watched(scene, layer, things):
             scene.collection.objects.link(probes[-1])
             _depend(probes[-1], thing)
         session.watched = {thing.name_full for thing in hidden}
-        yield
+        yield bool(hidden)
     finally:
         session.watched = set()
         for probe in probes:
