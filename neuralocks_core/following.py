@@ -16,6 +16,9 @@ from neuralocks_core.turning import Coils
 WIDEST = spans.NODES + 4
 """Strands are laid out as a grid where each own vertex depends on at most so many network vertices over all strands."""
 
+BASE = 1
+"""The step from an own vertex's first network vertex to the one that it lies nearest to, as a rule."""
+
 _scratch, _network = Scratch(), Scratch()
 
 
@@ -86,9 +89,11 @@ class _Alike:
         low, late = first.min(axis=0), first.T - first.min(axis=0)[:, None]
         reach = late.max(axis=1) + spans.NODES
         # From the first to the last own vertex that needs it: a network vertex of each, and its weights (V', N). Few own
-        # vertices need more than four.
-        self._terms = []
+        # vertices need more than four. All weights of a vertex add up to one: those of BASE, which all need, are not kept.
+        self._base, self._terms = low + BASE, []
         for step in range(reach.max()):
+            if step == BASE:
+                continue
             needed = np.flatnonzero(reach > step)
             own = slice(needed[0], needed[-1] + 1)
             term = np.zeros((own.stop - own.start, len(first)), np.float32)
@@ -99,14 +104,17 @@ class _Alike:
     def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
         """Into `result` (3, V, n), of strands from `start` on."""
         count, vertices = displacement.shape[:2]
-        network, spare = _network.arrays((3, vertices, count), result.shape)
+        network, base, spare = _network.arrays((3, vertices, count), *[result.shape] * 2)
         network[:] = displacement.transpose(2, 1, 0)
-        for step, (own, of, weights) in enumerate(self._terms):
-            part = spare[:, own] if step else result
+        network.take(self._base, axis=1, out=base, mode="clip")
+        so_far = base
+        for own, of, weights in self._terms:
+            part = spare[:, own]
             network.take(of, axis=1, out=part, mode="clip")
+            part -= base[:, own]
             part *= weights[:, start : start + count]
-            if step:
-                result[:, own] += part
+            np.add(so_far[:, own], part, out=result[:, own])
+            so_far = result
 
 
 class _Varied:
