@@ -21,7 +21,12 @@ def preparing() -> Iterator[None]:
     finally:
         _tell("mallopt", _MMAP_THRESHOLD, LARGE)
         _tell("mallopt", _TRIM_THRESHOLD, 2 * LARGE)  # as it would have grown by itself
-        _tell("malloc_trim", 0)
+        give_back()
+
+
+def give_back() -> None:
+    """Return what is free by now; what is needed again later is mapped anew, which takes time, too."""
+    _tell("malloc_trim", 0)
 
 
 def _tell(name: str, *values: int) -> None:

@@ -11,7 +11,7 @@ from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.strands import StrandSet
 
-from .memory import preparing
+from .memory import LARGE, give_back, preparing
 from .placing import GroomPlacer
 from .stage import StageGroom
 
@@ -81,6 +81,8 @@ class GroomPoser:
         if self._resolver is not None:
             shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
             self._resolver.apply(moved, joints, shape, self._model.map)
+            if moved.nbytes > LARGE:
+                give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
         return moved
 
     def _vector(self, time_code: float, joints: np.ndarray) -> np.ndarray:
