@@ -29,6 +29,10 @@ SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
+class NoHead(NeuralocksError):
+    """No joint of a rig is named like a head."""
+
+
 @dataclass(frozen=True)
 class Humanoid(Mapping):
     """Semantic name -> joint index; `reasons` says in words how each one was found."""
@@ -81,11 +85,12 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     Args:
         names: joint paths (J), separated by `/`.
         parents: (J,) parent indices, -1 for roots.
-        positions: bind positions (J, 3), for the last guess at a head: the highest joint of the trunk.
+        positions: bind positions (J, 3), which tell the head from what else hangs on the neck.
         by_hand: semantic name -> joint path or its last part; overrides what is found.
 
     Raises:
-        NeuralocksError: no head joint can be found, or a joint given by hand does not exist.
+        NoHead: no joint is named like one.
+        NeuralocksError: a joint given by hand does not exist.
     """
     names, parents = list(names), np.asarray(parents, int)
     joints: dict[str, int] = {}
@@ -107,7 +112,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
             put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
     put("head", *_find_head(names, sides, keys, parents, positions))
     if "head" not in joints:
-        raise NeuralocksError("skeleton: no joint is named like a head; name it with --head JOINT")
+        raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
     _find_trunk(joints, put, names, keys, parents)
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 STRANDS_A_LOCK = 8
 """A lock holds at least about this many strands, or its mean code says nothing."""
@@ -39,11 +38,11 @@ def lock_of_roots(roots: np.ndarray, locks: int | None = None) -> np.ndarray:
     distinct = np.unique(sample, axis=0)  # a hair tie may hold many strands in one point
     centres = random.choice(distinct, min(max(locks, 1), len(distinct)), replace=False)
     for _ in range(_ITERATIONS):
-        nearest = cKDTree(centres).query(sample)[1]
+        nearest = _tree(centres).query(sample)[1]
         size = np.bincount(nearest, minlength=len(centres))
         total = np.stack([np.bincount(nearest, sample[:, axis], len(centres)) for axis in range(3)], axis=1)
         centres = np.where(size[:, None] > 0, total / np.maximum(size, 1)[:, None], centres)
-    lock = cKDTree(centres).query(roots)[1]
+    lock = _tree(centres).query(roots)[1]
     return np.unique(lock, return_inverse=True)[1].astype(np.int32).ravel()
 
 
@@ -82,7 +81,7 @@ def neighbours(rest: np.ndarray, radius: float = 0.01, count: int = 5) -> np.nda
     """
     strands, vertices = rest.shape[:2]
     points = np.asarray(rest, np.float64).reshape(-1, 3)
-    tree = cKDTree(points)
+    tree = _tree(points)
     found = np.full((len(points), count), -1, np.int32)
     todo, asked = np.arange(len(points)), 2 * count + 4
     while len(todo):
@@ -119,7 +118,7 @@ def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
         if len(members) < 2:
             continue
         # Of a large lock only the strands with the nearest roots are looked at along their length.
-        near = cKDTree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * MATES))[1]
+        near = _tree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * MATES))[1]
         apart = np.linalg.norm(rest[members[near]] - rest[members][:, None], axis=-1).mean(axis=-1)
         apart[members[near] == members[:, None]] = np.inf
         apart[apart > MATE_RADIUS] = np.inf
@@ -128,3 +127,10 @@ def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
         mates = np.where(close, np.take_along_axis(members[near], first, 1), -1)
         found[members, : mates.shape[1]] = mates
     return found
+
+
+def _tree(points: np.ndarray):
+    """Points by nearness. SciPy takes longer to import than all else that a network needs to run."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points)

@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import scipy_rotation
 
 G = 9.81
 """Size of gravity [m/s^2]."""
@@ -132,6 +132,7 @@ class Clip:
 
 def _blend(a: np.ndarray, b: np.ndarray, fraction: float) -> np.ndarray:
     """Transforms (J, 4, 4) between a and b; rotation, scale and translation each on their own."""
+    Rotation = scipy_rotation()
     scale_a, scale_b = (np.linalg.norm(m[:, :3, :3], axis=1, keepdims=True) for m in (a, b))
     turn_a = Rotation.from_matrix(a[:, :3, :3] / scale_a)
     turn = (turn_a.inv() * Rotation.from_matrix(b[:, :3, :3] / scale_b)).as_rotvec() * fraction

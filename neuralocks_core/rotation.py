@@ -2,7 +2,6 @@
 """Rotations as 3x3 matrices, and from and to quaternions (w, x, y, z) and rotation vectors; affine transforms."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from neuralocks_core.errors import NeuralocksError
 
@@ -17,14 +16,14 @@ class Mirrored(NeuralocksError):
 def to_quaternion(matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) wxyz, w >= 0, of rotation matrices (..., 3, 3)."""
     matrices = np.asarray(matrices, float)
-    flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    flat = scipy_rotation().from_matrix(matrices.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
     return flat.reshape(*matrices.shape[:-2], 4)
 
 
 def from_quaternion(quaternions: np.ndarray) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of quaternions (..., 4) wxyz, which need not be of unit length."""
     quaternions = np.asarray(quaternions, float)
-    flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
+    flat = scipy_rotation().from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
     return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
@@ -53,13 +52,13 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def to_vector(matrices: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3)."""
     matrices = np.asarray(matrices, float)
-    return Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec().reshape(*matrices.shape[:-2], 3)
+    return scipy_rotation().from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec().reshape(*matrices.shape[:-2], 3)
 
 
 def from_vector(vectors: np.ndarray) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) [rad]."""
     vectors = np.asarray(vectors, float)
-    return Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*vectors.shape[:-1], 3, 3)
+    return scipy_rotation().from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*vectors.shape[:-1], 3, 3)
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -141,3 +140,10 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
         return 1.5 * once - 0.5 * once @ (np.swapaxes(once, -1, -2) @ once)
     u, _, vt = np.linalg.svd(linear)
     return u @ vt
+
+
+def scipy_rotation() -> type:
+    """SciPy's rotations: they take longer to import than all else that a network needs to run."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation

@@ -100,6 +100,23 @@ def attach(
     return found
 
 
+def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement) -> tuple[str, str] | None:
+    """The joint that a binding says carries the groom, and whose binding that is; None where none says so.
+
+    Raises:
+        NeuralocksError: a binding cannot be used.
+    """
+    if bound_skeleton(prim) == rig.path:
+        indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
+        joint, whose = _carrier(rig, _shares(rig, indices, weights), exact=True)[0], prim
+    elif (seat := find_seat(prim, rig, placement, NEAR)) is not None:
+        mesh = seat.mesh
+        joint, whose = _carrier(rig, _shares(rig, mesh.indices[seat.points], mesh.weights[seat.points]))[0], mesh.prim
+    else:
+        return None
+    return rig.source.names[joint], str(whose.GetPath())
+
+
 def of_another(
     prim: Usd.Prim, rigs: list[StageRig], others: list[StageRig], placement: Placement, head: str | None
 ) -> StageRig | None:

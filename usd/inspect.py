@@ -36,9 +36,10 @@ from .notes import (
 )
 from .placement import Placement
 from .recorded import recorded, recorded_cuts
-from .rig_source import StageRig, find_skeletons, read_each_rig
+from .rig_source import StageRig, find_skeletons
 from .rig_stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from .stage import frame_range
+from .unnamed_head import read_each_rig
 
 
 def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:

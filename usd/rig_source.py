@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.cuts import find_cuts
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.humanoid import Humanoid, find_humanoid
+from neuralocks_core.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, transformed
 
@@ -120,6 +120,7 @@ def read_rig(
     joints=None,
     cuts: list[float] | None = None,
     skins: Skins | None = None,
+    headless: bool = False,
 ) -> StageRig:
     """Read a skeleton, its meshes and its motion.
 
@@ -132,8 +133,10 @@ def read_rig(
         joints: semantic joint -> joint path or its last part, where names do not tell.
         cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
         skins: of the stage, if they were looked for already.
+        headless: read it without a head, and without any other joint's meaning, where no joint is named like one.
 
     Raises:
+        NoHead: no joint is named like a head.
         NeuralocksError: something in it cannot be used; the message names the prim.
     """
     source = JointSource(prim)
@@ -142,7 +145,12 @@ def read_rig(
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
-    humanoid = _humanoid(source, by_hand)
+    try:
+        humanoid = _humanoid(source, by_hand)
+    except NoHead:
+        if not headless:
+            raise
+        humanoid = Humanoid({})
     to_bind = to_bind_world(source, border, posed, humanoid)
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
@@ -181,22 +189,6 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
 
 
-def read_each_rig(
-    stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, *, cuts=None, **options
-) -> tuple[list[StageRig], list[NeuralocksError]]:
-    """`read_rig` of several skeletons: those that can be used, and what is wrong with the others. `cuts` are those of all, or
-    a dictionary of them by path.
-    """
-    rigs, errors, skins = [], [], find_skins(stage)
-    for prim in prims:
-        try:
-            own = cuts.get(str(prim.GetPath())) if isinstance(cuts, dict) else cuts
-            rigs.append(read_rig(stage, prim, border, head, cuts=own, skins=skins, **options))
-        except NeuralocksError as error:
-            errors.append(error)
-    return rigs, errors
-
-
 def _time_codes(source: JointSource, border: Border) -> np.ndarray:
     """Where the animation is read (T,): at its samples, and at every frame in gaps wider than CLOSE."""
     frame = border.frame
@@ -230,4 +222,4 @@ def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
     try:
         return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
     except NeuralocksError as error:
-        raise NeuralocksError(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
+        raise type(error)(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None

@@ -31,7 +31,8 @@ from .notes import (
 )
 from .placement import Placement
 from .prim_paths import prim_path
-from .rig_source import StageRig, find_skeletons, read_each_rig
+from .rig_source import StageRig, find_skeletons
+from .unnamed_head import read_each_rig
 
 
 @dataclass(frozen=True)

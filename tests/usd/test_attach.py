@@ -6,6 +6,8 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from usd.bake import bake
+from usd.baked import read_baked
 from usd.inspect import inspect
 from usd.stage import read_shot
 
@@ -30,6 +32,31 @@ def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
     assert bound.grooms[0].joint == "hips/spine/neck/head"
     said = set(bound.notes) - set(read_shot(path).notes)
     assert len(said) == 1 and "--head neck is not used" in said.pop(), "nor is what it would have spoiled a matter"
+
+
+def _without_a_head_by_name(path):
+    path.write_text(path.read_text().replace("spine/neck", "spine/Hals").replace("Hals/head", "Hals/Kopf"))
+    return path
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
+    named = read_shot(write_shot(tmp_path, Recipe(bound=bound), "named")).grooms[0]
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound=bound)))
+    found = read_shot(path).grooms[0]
+    assert found.joint == "hips/spine/Hals/Kopf"
+    assert found.attachment.character.humanoid.joints == named.attachment.character.humanoid.joints
+    assert np.array_equal(found.groom.points, named.groom.points)
+    (skeleton,) = inspect(path)["skeletons"]
+    assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found by"]
+
+
+def test_a_bake_tells_the_head_that_its_user_named(tmp_path):
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
+    with pytest.raises(NeuralocksError, match="no joint is named like a head; name it with --head JOINT"):
+        read_shot(path)
+    bake(path, tmp_path / "bake.usda", head="Kopf", frames="1:2")
+    assert read_baked(tmp_path / "bake.usda").shot.grooms[0].joint == "hips/spine/Hals/Kopf"
 
 
 def test_each_groom_finds_its_own_character(tmp_path):

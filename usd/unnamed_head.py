@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The skeletons of a stage, those too whose names do not tell the head: it is then the joint that carries the hair."""
+
+from dataclasses import replace
+
+from pxr import Usd
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.humanoid import NoHead
+
+from .attach import bound_joint
+from .border import Border
+from .curves import find_curves, rest_points, without_points
+from .placement import Placement
+from .recorded import recorded
+from .rig_source import StageRig, read_rig
+from .surface import find_skins
+
+
+def read_each_rig(
+    stage: Usd.Stage, prims: list[Usd.Prim], border: Border, head: str | None = None, *, cuts=None, **options
+) -> tuple[list[StageRig], list[NeuralocksError]]:
+    """`read_rig` of several skeletons: those that can be used, and what is wrong with the others.
+
+    Where no joint is named like a head, it is the one that a bake of this stage's hair was made with, or that most of the
+    hair follows by its own binding or by that of the mesh on which it sits.
+
+    Args:
+        stage, border, head, options: as for `read_rig`.
+        prims: the Skeletons.
+        cuts: those of all, or a dictionary of them by path.
+    """
+    rigs, errors, skins = [], [], find_skins(stage)
+    for prim in prims:
+        own = cuts.get(str(prim.GetPath())) if isinstance(cuts, dict) else cuts
+        facts = {**options, "cuts": own, "skins": skins}
+        try:
+            try:
+                rigs.append(read_rig(stage, prim, border, head, **facts))
+            except NoHead:
+                found = _carrying(read_rig(stage, prim, border, headless=True, **facts))
+                if found is None:
+                    raise
+                rigs.append(_explained(read_rig(stage, prim, border, found[0], **facts), found[1]))
+        except NeuralocksError as error:
+            errors.append(error)
+    return rigs, errors
+
+
+def _carrying(rig: StageRig) -> tuple[str, str] | None:
+    """The joint that carries the groom of most points, and how that is known; None where nothing says so."""
+    curves = find_curves(rig.source.prim.GetStage())
+    empty = without_points(curves)
+    for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):
+        told = recorded(prim).get("joint")
+        if isinstance(told, str) and told in rig.source.names:
+            return told, f"told by the bake of {prim.GetPath()}"
+        try:
+            found = bound_joint(prim, rig, Placement(prim))
+        except NeuralocksError:  # said where this groom is read
+            continue
+        if found is not None:
+            return found[0], f"by the binding of {found[1]}"
+    return None
+
+
+def _explained(rig: StageRig, why: str) -> StageRig:
+    humanoid = rig.character.humanoid
+    humanoid = replace(humanoid, reasons={**humanoid.reasons, "head": why})
+    return replace(rig, character=replace(rig.character, humanoid=humanoid))
