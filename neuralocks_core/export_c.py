@@ -25,7 +25,8 @@ MADE = "Made by `neuralocks rig export-c`"
 def made_here(path) -> bool:
     """Whether a file is a header, or a worked example, that `export_c` wrote."""
     try:
-        return MADE in Path(path).read_text(encoding="utf-8")[:1000]
+        with open(path, encoding="utf-8") as file:
+            return MADE in file.read(1000)
     except UnicodeDecodeError:
         return False
 
@@ -39,12 +40,17 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         prefix: of every name in it, so that several models can live in one program.
 
     Raises:
-        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, or the model reads what the
-            header does not compute.
+        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, the example's place is taken
+            by another file, or the model reads what the header does not compute.
     """
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
         raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
+    if re.search(r'["\\\x00-\x1f]', path.name):
+        raise NeuralocksError(f"{path.name!r}: no #include can name it; choose a name without quotes and backslashes")
+    beside = example_beside(path)
+    if beside.is_file() and not made_here(beside):
+        raise NeuralocksError(f"{beside}: would be written over by the worked example; move it, or name another header")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
         raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
     known = rig_spec(model.dynamic)
@@ -52,7 +58,7 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
     for target, text in (
         (path, header_text(model, prefix)),
-        (example_beside(path), _example(model, path.name, prefix)),
+        (beside, _example(model, path.name, prefix)),
     ):
         with atomic_write(target) as part:
             part.write_text(text, encoding="utf-8", newline="\n")

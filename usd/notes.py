@@ -47,7 +47,7 @@ def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: 
         stage: the shot.
         rigs: skeletons that carry what was baked.
         out: the layer.
-        codes: its time codes, ascending.
+        codes: the time codes that were asked for, ascending.
     """
     return [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])] + out_of_place(stage, out)
 

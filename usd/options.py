@@ -35,7 +35,7 @@ Materials = Annotated[
     ),
 ]
 Cuts = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         "--cuts", help="First frames after cuts, such as 25,49: all hair starts anew; found if left out, or 'none'."
     ),
@@ -47,10 +47,13 @@ Jobs = Annotated[
 ]
 
 
-def cut_codes(text: str | None) -> list[float] | None:
-    """Time codes of `--cuts`: none for 'none', None where they are to be found."""
-    if text is None or text.strip().lower() == "none":
-        return None if text is None else []
+def cut_codes(given: list[str] | None) -> list[float] | None:
+    """Time codes of `--cuts`, given once or several times: none for 'none', None where they are to be found."""
+    if not given:
+        return None
+    text = ",".join(given)
+    if text.strip().lower() == "none":
+        return []
     try:
         return [float(code) for code in text.split(",")]
     except ValueError:

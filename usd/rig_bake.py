@@ -94,7 +94,8 @@ def bake_rig(
     hair, moved = _read(shot, skeleton, head, model, cuts, joints)
     source = hair.source.source
     check_not_input(out, hair.stage)
-    codes = _codes(hair, frames, subframes)
+    wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
+    codes = _with_samples(hair, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
@@ -103,7 +104,7 @@ def bake_rig(
     notes += hair.source.loop_notes(moved) if loop else []
     if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
-    notes += written_notes(hair.stage, [hair.source], out, codes)
+    notes += written_notes(hair.stage, [hair.source], out, wanted)
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
@@ -146,10 +147,9 @@ def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
     return [f"{hair.source.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
 
 
-def _codes(hair: RiggedHair, frames, subframes) -> list[float]:
+def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
     """What was asked for and the animation's own samples: the body must come out sample for sample."""
     own = _rotation_samples(hair)
-    wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
     # A frame and a sample at the same time, up to rounding, are one.
     apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
     return sorted({*apart, *own})

@@ -154,10 +154,17 @@ def weight_notes(source: StageRig) -> list[str]:
         size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
         if len(values) % size or not len(values):
             continue
-        off = np.abs(values.reshape(-1, size).sum(axis=1) - 1) > 0.01
-        if off.any():
+        path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
+        free, off = total < 1e-9, np.abs(total - 1) > 0.01
+        if free.any():
+            first = source.source.names[mesh.indices[int(free.argmax()), 0]].split("/")[-1]
             notes.append(
-                f"{mesh.prim.GetPath()}: weights of {int(off.sum())} of {len(off)} vertices do not sum to one; "
+                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights; read as if they were bound to the "
+                f"first joint that they name, such as '{first}', bind them in the rig"
+            )
+        if (off & ~free).any():
+            notes.append(
+                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one; "
                 "read as if they did, normalise them in the rig"
             )
     return notes

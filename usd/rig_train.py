@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import as_path, cannot_write
+from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
 from neuralocks_core.progress import Progress
 
 from .rig_stage import check_patterns, read_rigged_hair, rigged_notes
@@ -92,8 +92,9 @@ def _check_writable(out: Path) -> None:
     if out.is_dir():
         raise NeuralocksError(f"{out}: is a folder; give a file name")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+        made = make_way(out)
         with tempfile.TemporaryFile(dir=out.parent):
             pass
     except OSError as error:
         raise cannot_write(out, error) from None
+    remove_empty(made)

@@ -11,6 +11,7 @@ from usd.bake import bake
 from usd.baked import read_baked
 from usd.cli import app
 from usd.inspect import inspect
+from usd.options import cut_codes
 from usd.recorded import recorded
 
 from .shots import Recipe, samples, write_shot
@@ -115,6 +116,12 @@ def test_the_reference_starts_anew_too(bakes):
     for name in ("given", "late"):
         assert np.abs(moved[name][-length:] - moved["after"]).max() < 2e-3
     assert np.abs(moved["none"][-length:] - moved["after"]).max() > 0.02
+
+
+def test_cuts_may_be_given_at_once_or_one_by_one():
+    assert cut_codes(["5,7"]) == cut_codes(["5", "7"]) == [5, 7]
+    assert cut_codes(["none"]) == []
+    assert cut_codes(None) is cut_codes([]) is None
 
 
 def test_what_no_cut_can_be_is_refused(shots, tmp_path, model):

@@ -306,6 +306,22 @@ def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
     assert hair.rig.weights.sum(axis=1) == pytest.approx(1)
 
 
+def test_vertices_without_weights_are_told_as_such(tmp_path):
+    hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.0))
+    (note,) = weight_notes(hair.source)
+    assert "have no weights; read as if they were bound to the first joint" in note
+
+
+def test_a_range_that_the_animation_does_not_reach_is_told(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    assert any(
+        "none of it within 5000 to 5003" in n
+        for n in bake_rig(shot, tmp_path / "a.usda", model, frames="5000:5003").notes
+    )
+    assert not any("none of it" in note for note in bake_rig(shot, tmp_path / "b.usda", model).notes)
+
+
 def test_a_model_for_another_rig_is_refused(tmp_path):
     """By name, before anything is written."""
     shot = small_shot(tmp_path / "shot.usda")
