@@ -13,7 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .cli_bake import bake_command, join_command, simulate_command
 from .cli_rig import app as rig_app
-from .cli_train import train_command
+from .cli_train import one_by_one, train_command
 from .command import command_of, note, print_json
 from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs
 
@@ -41,7 +41,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    app(arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    app(one_by_one(words) if words[:1] == ["train"] else words)
 
 
 def _version(wanted: bool) -> None:

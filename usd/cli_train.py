@@ -14,14 +14,29 @@ from .command import note
 from .options import Head, Joints, Out, Seed, Skeleton, pairs
 from .stopping import stopped
 
+SEVERAL = ("--groom", "--motion")
+"""Options that take as many words as follow: a shell's `--motion clips/*.bvh`."""
+
+
+def one_by_one(words: list[str]) -> list[str]:
+    """`--groom A B` as `--groom A --groom B`."""
+    option, result = None, []
+    for word in words:
+        if word.startswith("-"):
+            option = word if word in SEVERAL else None
+        elif option and result[-1] != option:
+            result.append(option)
+        result.append(word)
+    return result
+
 
 def train_command(
     character: Annotated[Path, typer.Option(help="USD character: skeleton, skinned mesh, blend shapes.")],
     out: Out,
-    groom: Annotated[
-        list[str] | None, typer.Option(help="USD groom, or 'library' for the procedural styles; repeat for more.")
+    groom: Annotated[list[str] | None, typer.Option(help="USD grooms, or 'library' for the procedural styles.")] = None,
+    motion: Annotated[
+        list[str] | None, typer.Option(help="BVH or USD motions; made-up motion is always added.")
     ] = None,
-    motion: Annotated[list[str] | None, typer.Option(help="BVH or USD motion; made-up motion is always added.")] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
     steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
     begin: Annotated[

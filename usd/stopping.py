@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ctrl-C ends a command whatever it meets: USD, while it loads its modules, swallows it or makes an error of it, and VTK
-may crash.
+"""Ctrl-C, or a farm's SIGTERM, ends a command whatever it meets: USD, while it loads its modules, swallows it or makes an
+error of it, and VTK may crash.
 """
 
 import signal
@@ -10,14 +10,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 INTERRUPTED = 130
+"""Exit status after Ctrl-C; as shells have it, 128 and the signal's number."""
+_ENDS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+"""Signals that end a command, and who handles them where nobody else does."""
 
 _pressed = threading.Event()
 _deferring = False
+_status = INTERRUPTED
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Ctrl-C in this block, and whatever error it led to, ends the program in one word; blocks may lie in each other."""
+    """Ctrl-C or SIGTERM in this block, and whatever error it led to, ends the program in one word; blocks may lie in each
+    other.
+    """
     with _heeded():
         try:
             yield
@@ -26,7 +32,7 @@ def stoppable() -> Iterator[None]:
                 raise
             _pressed.clear()  # the block around this one has nothing more to say
             print("stopped", file=sys.stderr)
-            raise SystemExit(INTERRUPTED) from None
+            raise SystemExit(_status) from None
 
 
 @contextmanager
@@ -56,20 +62,23 @@ def check() -> None:
 
 @contextmanager
 def _heeded() -> Iterator[None]:
-    """In this block every Ctrl-C is remembered, besides being raised as KeyboardInterrupt."""
-    own = threading.current_thread() is threading.main_thread()
-    own = own and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if own:
-        signal.signal(signal.SIGINT, _remember)
+    """In this block every signal that ends a command is remembered, besides being raised as KeyboardInterrupt."""
+    main = threading.current_thread() is threading.main_thread()
+    own = {number: handler for number, handler in _ENDS.items() if main and signal.getsignal(number) == handler}
+    for number in own:
+        signal.signal(number, _remember)
     try:
         yield
     finally:
+        for number, handler in own.items():
+            signal.signal(number, handler)
         if own:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
             _pressed.clear()
 
 
 def _remember(number, frame) -> None:
+    global _status
+    _status = 128 + number
     _pressed.set()
     if not _deferring:
         raise KeyboardInterrupt

@@ -7,6 +7,9 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.curves import left_as_they_are, read_groom
+from usd.groom import import_groom
+
+from .shots import Recipe, write_shot
 
 COUNTS = [2, 3, 2]
 POINTS = np.arange(21, dtype=np.float32).reshape(7, 3)
@@ -76,6 +79,35 @@ def test_caches_may_repeat_their_counts_but_not_change_them():
     curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)
     with pytest.raises(NeuralocksError, match="/Hair: its curveVertexCounts at time code 3 are not those at rest"):
         read_groom(curves.GetPrim(), np.eye(4), [])
+
+
+def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
+    """Root UVs and widths also where a file has none; colours, numbers and guides of other tools as they were."""
+    source = write_shot(tmp_path, Recipe(bound="none", strands=5, vertices=4), "source")
+    stage = Usd.Stage.Open(str(source))
+    prim = stage.GetPrimAtPath("/Hero/Hair")
+    api, names = UsdGeom.PrimvarsAPI(prim), Sdf.ValueTypeNames
+    told = {
+        "groom_id": (names.IntArray, "uniform", 1, [70, 71, 72, 73, 74]),
+        "groom_closest_guides": (names.IntArray, "uniform", 3, list(range(15))),
+        "groom_color": (names.Float3Array, "vertex", 1, [(0.1, 0.2, 0.3 + i) for i in range(20)]),
+        "groom_unfit": (names.IntArray, "uniform", 1, [1, 2]),
+    }
+    for name, (kind, scope, size, value) in told.items():
+        api.CreatePrimvar(name, kind, scope, size).Set(value)
+    stage.GetRootLayer().Save()
+    import_groom(source, tmp_path / "groom.usda")
+    groom = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+    written = UsdGeom.PrimvarsAPI(groom.GetPrimAtPath("/Groom/Hair"))
+    told.pop("groom_unfit")
+    for name, (kind, scope, size, value) in told.items():
+        primvar = written.GetPrimvar(name)
+        assert (primvar.GetTypeName(), primvar.GetInterpolation(), primvar.GetElementSize()) == (kind, scope, size)
+        assert np.allclose(np.array(primvar.Get()), value)
+    assert not written.GetPrimvar("groom_unfit")
+    uv = np.array(written.GetPrimvar("groom_root_uv").Get())
+    assert uv.shape == (5, 2) and len(np.unique(uv, axis=0)) == 5 and 0 <= uv.min() and uv.max() <= 1
+    assert written.GetPrimvar("groom_width").Get()[0] == pytest.approx(0.01), "0.1 mm, in centimetres"
 
 
 def test_normals_are_said_to_stay_behind():

@@ -61,6 +61,21 @@ def test_ctrl_c_ends_a_command_whatever_it_meets(work, capsys):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_a_farm_ends_a_command_as_ctrl_c_does(capsys):
+    """So it has time to take away what is half written."""
+    app = typer.Typer()
+
+    def work():
+        """As a scheduler does that needs the machine."""
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    command_of(app)("work")(work)
+    with pytest.raises(SystemExit) as caught:
+        app([])
+    assert (caught.value.code, capsys.readouterr().err) == (128 + signal.SIGTERM, "stopped\n")
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
 def test_ctrl_c_waits_while_modules_load(capsys):
     """They stay half made where it breaks into their loading, and what is loaded next may crash."""
     loaded = []

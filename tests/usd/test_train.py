@@ -12,6 +12,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RegressionOptions
+from usd.cli_train import one_by_one
 from usd.grow import grow
 from usd.train import begins_with
 from usd.training import MOST_STRANDS, read_clip, training_scene
@@ -55,3 +56,11 @@ def test_what_a_training_should_know_is_told_before_it(tmp_path):
     stage.GetPrimAtPath("/Hero/Rig").GetRelationship("skel:animationSource").SetTargets([])
     layer.Save()
     assert len(read_clip(str(path), scene.character).times) > 1
+
+
+def test_options_take_as_many_words_as_follow():
+    """As the shell's own `--motion clips/*.bvh` gives them."""
+    words = one_by_one("train --groom a.usd b.usd --motion c.bvh -o m --groom d.usd e.usd --resume".split())
+    assert (
+        " ".join(words) == "train --groom a.usd --groom b.usd --motion c.bvh -o m --groom d.usd --groom e.usd --resume"
+    )
