@@ -128,6 +128,12 @@ def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     missing = [name for name in joints if name not in rig.character.humanoid]
     if not missing:
         return []
+    head = rig.character.humanoid.get("head")
+    if head is not None and rig.source.parents[head] < 0:
+        return [
+            f"{rig.path}: nothing carries its head joint '{rig.source.names[head]}', so hair does not feel how neck and body "
+            "turn against it; export it with the body's skeleton as one"
+        ]
     return [
         f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint"
     ]
