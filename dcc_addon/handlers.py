@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
-from .live_strands import EDITING, known, live_hairs, show_all_rest
+from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .scene import blur
 from .scene.carried import bodies_of
@@ -34,6 +34,8 @@ def on_update(scene, graph):
     for thing in changed:
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)
+    objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
+    show_rest_left([o.original for o in objects.values()])
     names = {a.name_full for a in live.carriers(scene)}
     if not names:
         return
@@ -44,7 +46,6 @@ def on_update(scene, graph):
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
-    objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
     if names & objects.keys():
         background.doubt()
     if names & objects.keys() or any(_other_strands(o.original) for o in objects.values()):

@@ -116,7 +116,6 @@ def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | No
     prepared = session.hairs.get(name)
     if prepared is not None and not known(hair):
         _let_go(prepared.of)
-        curves.complete_rest(hair.data)
         session.doubtful.add(name)
     path = model_path(hair)
     if prepared is not None and prepared.file != (path, stamp(path)):
@@ -153,10 +152,14 @@ def _let_go(of: tuple) -> None:
     """Give curves their rest shape back that a live hair object had before it was given others, unless they are moved
     by another one now.
     """
-    moved = {thing.data for thing in bpy.data.objects if thing.type == "CURVES" and thing.neuralocks_hair.live}
     for left in bpy.data.hair_curves:
-        if identity(left) == of[0] and left not in moved:
+        if identity(left) == of[0] and left not in _moved():
             curves.restore_rest(left)
+
+
+def _moved() -> set:
+    """Curves of all live hair objects of the file."""
+    return {thing.data for thing in bpy.data.objects if thing.type == "CURVES" and thing.neuralocks_hair.live}
 
 
 def _recipe(hair, sampled, wanted: tuple):
@@ -217,6 +220,14 @@ def rest(hair) -> None:
     """Live is over for this hair: rest shape and modifiers as before, nothing kept."""
     session.forget(hair.name_full)
     show_rest(hair)
+
+
+def show_rest_left(things) -> None:
+    """Give curves among these objects their rest shape back that nothing live moves: live hair was joined to them, say."""
+    for thing in things:
+        if thing.type == "CURVES" and thing.data.library is None and curves.has_rest(thing.data):
+            if thing.data not in _moved():
+                curves.restore_rest(thing.data)
 
 
 def show_all_rest() -> None:

@@ -33,7 +33,7 @@ def counts(data) -> np.ndarray:
 
 def points(data) -> np.ndarray:
     """Points at rest, (P, 3) float32 in the object's space, whether the hair is live or not."""
-    return _read(data, REST if has_rest(data) else "position")
+    return _rest(data) if has_rest(data) else _read(data, "position") + 0.0
 
 
 def shown(data) -> np.ndarray:
@@ -94,37 +94,27 @@ def keep_rest(data) -> None:
             "Relations > Make Single User > Object & Data)"
         )
     if has_rest(data):
+        if _without_rest(_read(data, REST)).any():  # strands that were joined are about to be moved, too
+            _keep(data, _rest(data))
         return
     kind(data)
     stale = data.attributes.get(REST)
     if stale is not None:  # the strands were edited since: the old rest shape fits them no longer
         data.attributes.remove(stale)
-    values = _read(data, "position")
-    attribute = data.attributes.new(REST, "FLOAT_VECTOR", "POINT")
-    attribute.data.foreach_set("vector", values.ravel())
+    data.attributes.new(REST, "FLOAT_VECTOR", "POINT")
+    _keep(data, _read(data, "position"))
 
 
 def move_rest(data, matrix: np.ndarray) -> None:
     """Move the rest shape that is kept aside by a transform (4, 4)."""
-    moved = transformed(_read(data, REST), matrix)
-    data.attributes[REST].data.foreach_set("vector", np.ascontiguousarray(moved, np.float32).ravel())
-
-
-def complete_rest(data) -> None:
-    """Strands that were joined to live hair have no rest shape yet, zeros that is: they are at rest as they are."""
-    if has_rest(data):
-        values = _read(data, REST)
-        bare = ~values.any(axis=1)
-        if bare.any():
-            values[bare] = _read(data, "position")[bare]
-            data.attributes[REST].data.foreach_set("vector", values.ravel())
+    _keep(data, transformed(_rest(data), matrix))
 
 
 def restore_rest(data) -> bool:
     """Put the points back to rest and forget the copy; whether there was one."""
     if not has_rest(data):
         return False
-    write(data, _read(data, REST))
+    write(data, _rest(data))
     data.attributes.remove(data.attributes[REST])
     data.update_tag()
     return True
@@ -206,3 +196,26 @@ def _read(data, name: str) -> np.ndarray:
     if attribute is not None and len(values):
         attribute.data.foreach_get("vector", values.ravel())
     return values
+
+
+def _rest(data) -> np.ndarray:
+    """The rest shape that is kept aside. Strands that were joined to live hair, or it to them, have none yet, zeros that
+    is: they are at rest as they are.
+    """
+    values = _read(data, REST)
+    bare = _without_rest(values)
+    if bare.any():
+        values[bare] = _read(data, "position")[bare]
+    return values + 0.0
+
+
+def _keep(data, values: np.ndarray) -> None:
+    """Write the rest shape. A point at the origin gets negative zeros, which tell it from one that has no rest yet."""
+    values = np.array(values, np.float32)
+    values[~values.any(axis=1)] = -0.0
+    data.attributes[REST].data.foreach_set("vector", values.ravel())
+
+
+def _without_rest(values: np.ndarray) -> np.ndarray:
+    """Which points of a rest shape were never written."""
+    return ~(values.any(axis=1) | np.signbit(values[:, 0]))

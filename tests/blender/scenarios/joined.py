@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair objects that an artist joins, which Blender can since 5.2: no groom is lost, whichever of them was live."""
+
+from pathlib import Path
+from unittest import SkipTest
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, apart, make_live, messages
+
+
+def joined_to_resting(folder: Path) -> None:
+    """Live hair joined to hair that is not live comes to rest; saved or made live, all strands keep their groom."""
+    from dcc_addon.scene import curves
+
+    if bpy.app.version < (5, 2):
+        raise SkipTest("curves cannot be joined yet")
+    strands, grooms = _joined()
+    assert not strands.neuralocks_hair.live and not curves.has_rest(strands.data)
+    assert apart(curves.shown(strands.data), grooms) == 0.0
+    strands.neuralocks_hair.live = True
+    bpy.context.scene.frame_set(12)
+    assert not messages(), messages()
+    assert apart(curves.shown(strands.data), grooms) > 1e-3 and apart(curves.points(strands.data), grooms) == 0.0
+    strands.neuralocks_hair.live = False
+    assert apart(curves.shown(strands.data), grooms) == 0.0
+
+    scenes.empty()
+    strands, grooms = _joined(followed=False)
+    assert curves.has_rest(strands.data)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "joined.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "joined.blend"))
+    data = bpy.data.objects["Hair"].data
+    assert not curves.has_rest(data) and apart(curves.shown(data), grooms) == 0.0
+
+
+def root_at_the_origin(_folder: Path) -> None:
+    """A point at the very origin of its object rests there, and is not taken for one that has no rest shape."""
+    from dcc_addon.scene import curves
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    root = curves.shown(strands.data)[0].copy()
+    curves.write(strands.data, curves.shown(strands.data) - root)
+    strands.location = root
+    groom = curves.points(strands.data)
+    assert not groom[0].any()
+    make_live(rig, strands)
+    bpy.context.scene.frame_set(9)
+    bpy.context.scene.frame_set(14)
+    assert curves.shown(strands.data)[0].any() and apart(curves.points(strands.data), groom) == 0.0
+    strands.neuralocks_hair.live = False
+    assert apart(curves.shown(strands.data), groom) == 0.0
+
+
+def _joined(followed: bool = True):
+    """Resting hair to which moved hair was joined, and the grooms of both; `followed`: the add-on has heard of it."""
+    from dcc_addon.handlers import on_update
+    from dcc_addon.scene import curves
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands, other = scenes.hair(rig, 20), scenes.hair(rig, 15, name="Other", length=0.2)
+    other.neuralocks_hair.model = strands.neuralocks_hair.model = MODEL
+    make_live(rig, other)
+    bpy.context.scene.frame_set(9)
+    grooms = np.concatenate([curves.points(strands.data), curves.points(other.data)])
+    for thing in bpy.data.objects:
+        thing.select_set(thing in (strands, other))
+    bpy.context.view_layer.objects.active = strands
+    if not followed:
+        bpy.app.handlers.depsgraph_update_post.remove(on_update)
+    try:
+        bpy.ops.object.join()
+        bpy.context.view_layer.update()
+    finally:
+        if not followed:
+            bpy.app.handlers.depsgraph_update_post.append(on_update)
+    return strands, grooms
