@@ -22,6 +22,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Disable it: hair at rest, no handler, timer, process or class left behind."""
+    operators.base.stop()
     background.cancel()
     preparing.stop()
     operators.training.stop()

@@ -8,12 +8,22 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..live import refresh
 from ..scene.sampling import sample, stepping
 from ..services.panel_errors import for_the_panel
 from ..session import session
 
 SLICE = 0.06
 """Longest time between two chances to cancel [s]."""
+
+_running: list["Stepwise"] = []
+"""The operator at work over several slices, one at most."""
+
+
+def stop() -> None:
+    """End what is at work, for the add-on goes: Blender takes the operator away and does not tell it."""
+    if _running:
+        _running[0].cancel(bpy.context)
 
 
 class Hardened:
@@ -75,11 +85,12 @@ class Stepwise(Hardened):
         if session.working:
             self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
             return {"CANCELLED"}
-        self._steps = None
+        self._steps, self._scene = None, context.scene
         problem = self.guarded(lambda: setattr(self, "_steps", self.steps(context)))
         if problem == {"CANCELLED"}:
             return problem
         session.working = self.bl_label
+        _running[:] = [self]
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0, 1000)
@@ -89,32 +100,34 @@ class Stepwise(Hardened):
     def modal(self, context, event):
         if event.type == "ESC":
             self._close()
-            self._finish(context)
+            self._end(context)
             self.report({"WARNING"}, "Cancelled")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         self._message, self._done = None, False
-        if self.steps_frames:
-            with stepping(context.scene):
-                result = self.guarded(lambda: self._slice(context))
-        else:
-            result = self.guarded(lambda: self._slice(context))
+        result = self.guarded(lambda: self._stepped(context))
         if result == {"CANCELLED"} or self._done:
-            self._finish(context)
+            self._end(context)
             return result
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
         """Blender ends the work itself, when another file is opened or the window closes."""
         self._close()
-        Stepwise._finish(self, context)
+        self._finish(context)
 
     def _close(self):
         try:
             self._steps.close()
         except ReferenceError:  # the scene whose frame would come back is gone
             pass
+
+    def _stepped(self, context):
+        if not self.steps_frames:
+            return self._slice(context)
+        with stepping(self._scene):  # another one may be shown by now
+            return self._slice(context)
 
     def _slice(self, context):
         end = time.perf_counter() + SLICE
@@ -128,12 +141,17 @@ class Stepwise(Hardened):
             return stop.value
         return None
 
+    def _end(self, context):
+        self._finish(context)
+        refresh(context.scene)  # nothing that was moved meanwhile has been followed
+
     def _finish(self, context):
         session.working = ""
+        _running.clear()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+        for workspace in bpy.data.workspaces:  # another one may be shown by now
+            workspace.status_text_set(None)
         session.sampling = None
 
 

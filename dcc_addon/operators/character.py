@@ -78,10 +78,6 @@ class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
             yield done, total, f"Sampling the motion of {name}"
         return f"{name}: motion sampled"
 
-    def _finish(self, context):
-        super()._finish(context)
-        refresh(context.scene)
-
     def execute(self, context):
         result = super().execute(context)
         refresh(context.scene, wait=True)

@@ -2,6 +2,7 @@
 """What an artist does while longer work goes on, which takes events as ever."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 
@@ -36,3 +37,88 @@ def touched_meanwhile(folder: Path) -> None:
     strands.neuralocks_hair.live = False
     at_frame(5, lambda: bpy.data.objects.remove(strands))
     refused(lambda: bake(filepath=str(folder / "gone.usdc")), "deleted or renamed")
+
+
+def disabled_meanwhile(folder: Path) -> None:
+    """The add-on is disabled while a bake is at work: it ends, and enabled anew all works."""
+    import dcc_addon
+    from dcc_addon.operators.bake import bake_steps
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    make_live(rig, scenes.hair(rig, 20))
+    bpy.context.scene.frame_set(9)
+    _begun(bake_steps(bpy.context, rig, [bpy.data.objects["Hair"]], str(folder / "bake.usdc")))
+    assert session.paused and session.working
+    dcc_addon.unregister()
+    assert not session.paused and not session.working and bpy.context.scene.frame_current == 9
+    dcc_addon.register()
+    rig, strands = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    make_live(rig, strands)
+    assert apart(points_at(strands, 9), points_at(strands, 14)) > 1e-3 and not messages(), messages()
+
+
+def slider_meanwhile(folder: Path) -> None:
+    """A slider that is moved while a bake samples is followed when it has ended; frames are those of the scene that it
+    began in, whichever is shown by then.
+    """
+    from dcc_addon.operators.bake import bake_steps
+    from dcc_addon.scene import curves
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    scene.frame_set(9)
+    before = curves.shown(strands.data)
+    work = _begun(bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc")))
+    strands.neuralocks_hair.motion = 0.2
+    assert apart(curves.shown(strands.data), before) == 0.0
+    _ended(work)
+    after = scenes.points(strands)
+    assert apart(curves.shown(strands.data), before) > 1e-3 and apart(after, points_at(strands, 9)) == 0.0
+
+    other = bpy.data.scenes.new("Other")
+    work = _begun(_numbered(scene))
+    work.steps_frames = True
+    scene.frame_set(9)
+    bpy.context.window.scene = other
+    _ended(work)
+    assert scene.frame_current == 9 and other.frame_current == 1
+
+
+def _numbered(scene):
+    """Work that leaves the scene at another frame with each step."""
+    for frame in range(10, 15):
+        scene.frame_set(frame)
+        yield frame, 15, "Counting"
+
+
+def _begun(steps):
+    """The work of an operator, begun as in a window."""
+    from dcc_addon.operators import base
+    from dcc_addon.session import session
+
+    class Work(base.Stepwise):
+        bl_label = "Work"
+
+        def report(self, kind, text):
+            assert "ERROR" not in kind, text
+
+    work, manager = Work(), bpy.context.window_manager
+    work._timer, work._steps = manager.event_timer_add(0.01, window=bpy.context.window), steps
+    work._scene, session.working = bpy.context.scene, work.bl_label
+    base._running[:] = [work]
+    next(steps)
+    return work
+
+
+def _ended(work) -> None:
+    """Tick until it is done."""
+    shown = SimpleNamespace(status_text_set=lambda text: None)
+    while work.modal(
+        SimpleNamespace(window_manager=bpy.context.window_manager, workspace=shown, scene=bpy.context.scene),
+        SimpleNamespace(type="TIMER"),
+    ) == {"RUNNING_MODAL"}:
+        pass
