@@ -7,6 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
 from ..scene import armature as armature_reader
+from ..scene.attach import check_own
 from ..scene.binding import carrier
 from ..scene.sampling import sample
 from ..services import rig as rig_service
@@ -36,6 +37,7 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
             hair = next((o for o in hairs if _carrier(o) == armature), hairs[0] if hairs else None)
         settings.armature, settings.hair = armature, hair
         if hair is not None and hair.neuralocks_hair.armature is None:
+            check_own(hair)
             hair.neuralocks_hair.armature = _carrier(hair) or armature
         return f"Character {armature.name_full}" + (
             f", hair {hair.name_full}" if hair else ", no hair Curves in this scene"

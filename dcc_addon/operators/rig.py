@@ -69,7 +69,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.
-        stretched = frames * (context.scene.render.frame_map_old / context.scene.render.frame_map_new)
+        stretched = frames * (scene.render.frame_map_old / scene.render.frame_map_new)
         armature.neuralocks_character.rig_live = False
         rest(armature)
         action = actions.bake_keys(armature, bones.bones, stretched, turns, own)
@@ -132,9 +132,13 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     def work(self, context):
         from neuralocks_core.export_c import example_beside, export_c, made_here
 
+        if not self.filepath.strip():
+            raise NeuralocksError("Export: no file is named; choose where the header is written")
         armature = shown_armature(context)
-        model = RigModel.load(model_path(armature, "rig"))
         out = Path(absolute(self.filepath))
+        if out.is_dir():
+            raise NeuralocksError(f"{self.filepath}: this is a folder; name the header that is to be written in it")
+        model = RigModel.load(model_path(armature, "rig"))
         check_ours([out, example_beside(out)], made_here)
         export_c(model, out)
         return f"C header written to {out}"

@@ -44,7 +44,9 @@ class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
     bl_label = "Reset Hair Look"
 
     def work(self, context):
-        settings = shown_hair(context).neuralocks_hair
+        hair = shown_hair(context)
+        check_own(hair)
+        settings = hair.neuralocks_hair
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             settings.property_unset(name)
         from ..live import refresh

@@ -11,6 +11,7 @@ from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
 from ..scene.redraw import redraw
@@ -77,8 +78,9 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         running = job()
         if running is not None and running.running:
             raise NeuralocksError("Training: one is running already; wait for it or cancel it")
-        armature = shown_armature(context)
+        armature, scene = shown_armature(context), context.scene
         target = shown_hair(context, armature) if self.kind == "strands" else armature
+        check_own(target)  # it is given the model
         python, name, wanted = training_python(), armature.name_full, target.name_full
         asking = Threaded(lambda _: problem(python), "Looking for what training needs", leave=True)
         _checked[python] = yield from asking.steps()
@@ -89,12 +91,12 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         stop()
         folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
         character = Path(folder.name) / "character.usdc"
-        write_shot(character, armature, context.scene, sampled, [target] if self.kind == "strands" else [])
+        write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
         settings = {
             "kind": self.kind,
             "character": str(character),
             "out": _out(target.name_full),
-            "minutes": context.scene.neuralocks.train_minutes,
+            "minutes": scene.neuralocks.train_minutes,
             "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
@@ -163,11 +165,23 @@ def finish() -> str | None:
             target.neuralocks_hair.model = running.out
         else:
             target.neuralocks_character.rig_model = running.out
+        _remember()
         message = f"{target.name_full}: trained"
     session.messages["training"] = message
     stop()
     refresh(bpy.context.scene)
     return message
+
+
+def _remember() -> None:
+    """A step to undo: without one the next undo, of whatever was done before, would take the model away."""
+    if bpy.app.background:
+        return
+    try:
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.ops.ed.undo_push(message="Trained model")
+    except (RuntimeError, IndexError, AttributeError):  # no window, or one that takes none now
+        pass
 
 
 def watch() -> float | None:

@@ -201,6 +201,15 @@ def new_folder(folder: Path) -> None:
             refused(lambda write=write: write(filepath=elsewhere), "cannot be written")
 
 
+def no_file(folder: Path) -> None:
+    """A header is not written under an empty name, or over a folder."""
+    rig, export = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.ops.neuralocks.export_c
+    bpy.context.scene.neuralocks.armature = rig
+    refused(lambda: export(filepath=" "), "no file is named")
+    for path in (".", str(folder)):
+        refused(lambda path=path: export(filepath=path), "this is a folder")
+
+
 def not_ours(folder: Path) -> None:
     """What an artist has made himself is not written over, be it what is written beside a bake; what was baked before
     is.

@@ -93,6 +93,12 @@ def linked(folder: Path) -> None:
     # What is done to linked data is not saved.
     refused(bpy.ops.neuralocks.bake_attach, "linked from library.blend")
     refused(bpy.ops.neuralocks.assign, "linked from library.blend")
+    refused(bpy.ops.neuralocks.train, "linked from library.blend")
+    refused(lambda: bpy.ops.neuralocks.train(kind="rig"), "linked from library.blend")
+    refused(bpy.ops.neuralocks.reset_look, "linked from library.blend")
+    strands.neuralocks_hair.armature = None
+    refused(bpy.ops.neuralocks.find, "linked from library.blend")
+    assert strands.neuralocks_hair.armature is None
     assert not strands.modifiers
     assert apart(points_at(strands, 1), groomed) < 1e-6
 
