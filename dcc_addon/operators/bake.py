@@ -20,7 +20,7 @@ from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
 from ..services.names import identifier
 from ..services.overwriting import check_ours
-from ..services.threaded import Threaded
+from ..services.threaded import Threaded, loading
 from ..session import session
 from .base import Stepwise, sampling, shown_armature, shown_hair
 
@@ -65,9 +65,6 @@ def bake_steps(context, armature, hairs, path: str):
 
     The same functions that the command line calls, on a stage that holds the numbers of the live view.
     """
-    from usd.bake import bake
-    from usd.own_layers import is_own
-
     scene = context.scene
     full = output_path(path)
     first, last = frame_range(scene)
@@ -80,9 +77,13 @@ def bake_steps(context, armature, hairs, path: str):
         looks.setdefault(_look(hair), []).append(hair.name_full)
     stem = Path(full)
     outs = [stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{n + 1}{stem.suffix}") for n in range(len(looks))]
-    check_ours([*outs, *map(shot_beside, outs)], is_own)
     character, subframes = armature.name_full, scene.neuralocks.subframes
-    sampled = yield from sampling(context, armature, share=0.5)
+    yield from loading("usd.bake", "usd.own_layers", "usd.scene_writer")
+    from usd.bake import bake
+    from usd.own_layers import is_own
+
+    check_ours([*outs, *map(shot_beside, outs)], is_own)
+    sampled = yield from sampling(context, named(character), share=0.5)
     baked = {}
     for number, (look, names) in enumerate(sorted(looks.items())):
         group, out = [named(name) for name in names], outs[number]
@@ -206,9 +207,10 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
 
 def _card(path: str):
     """Steps of measuring a bake; returns the lines of its card."""
-    from usd.evaluate import evaluate
-
     from ..services.card import lines_of
+
+    yield from loading("usd.evaluate")
+    from usd.evaluate import evaluate
 
     measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
     return lines_of((yield from measuring.steps()))

@@ -14,12 +14,14 @@ from ..live_rig import bind, rest, show_rest
 from ..models import model_path
 from ..scene import actions
 from ..scene.attach import check_own
+from ..scene.export import write_shot
 from ..scene.lookup import find, named
 from ..scene.paths import FILE, absolute
 from ..scene.sampling import ensure
 from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.overwriting import check_ours
+from ..services.threaded import loading
 from ..session import session
 from .bake import frame_range, output_path, shot_beside
 from .base import Hardened, Stepwise, sampling, shown_armature
@@ -100,22 +102,21 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
 
     def steps(self, context):
-        from usd.own_layers import is_own
-        from usd.rig_bake import bake_rig
-
-        from ..scene.export import write_shot
-
-        armature, scene = shown_armature(context), context.scene
-        settings, name = armature.neuralocks_character, armature.name_full
+        name, scene = shown_armature(context).name_full, context.scene
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
         shot = shot_beside(out)
+        yield from loading("usd.own_layers", "usd.rig_bake", "usd.scene_writer")
+        from usd.own_layers import is_own
+        from usd.rig_bake import bake_rig
+
         check_ours([out, shot], is_own)
-        sampled = yield from sampling(context, armature)
+        sampled = yield from sampling(context, named(name))
         bind(find(name), sampled)  # says what is wrong before anything is written
         write_shot(shot, find(name), scene, sampled, [])
         head, model = sampled.character.skeleton.names[sampled.character.head], model_path(find(name), "rig")
+        settings = find(name).neuralocks_character
         bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 

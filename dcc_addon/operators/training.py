@@ -15,7 +15,7 @@ from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
 from ..scene.redraw import redraw
-from ..services.threaded import Threaded
+from ..services.threaded import Threaded, loading
 from ..services.training_job import TrainingJob, default_python, problem
 from ..session import session
 from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
@@ -86,7 +86,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         _checked[python] = yield from asking.steps()
         if _checked[python]:
             raise NeuralocksError(_checked[python])
-        sampled = yield from sampling(context, armature)
+        yield from loading("usd.scene_writer")
+        sampled = yield from sampling(context, named(name))
         armature, target = named(name), named(wanted)
         stop()
         folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Work in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
 
+import importlib
+import sys
 import threading
 
 from neuralocks_core.errors import NeuralocksError
@@ -70,3 +72,10 @@ class Threaded:
         if self._cancelled:
             raise NeuralocksError("cancelled")
         self.done = done / max(total, 1)
+
+
+def loading(*modules: str):
+    """Steps (0, 1, message) of importing modules that take seconds to load at first, the USD libraries say."""
+    if not all(module in sys.modules for module in modules):
+        load = Threaded(lambda _: [importlib.import_module(module) for module in modules], "Loading USD", leave=True)
+        yield from load.steps(0.0, 0.0)

@@ -136,7 +136,8 @@ def loaded_meanwhile(folder: Path) -> None:
     shown = points_at(strands, 9)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     steps = bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
-    next(steps)
+    while not session.paused:
+        next(steps)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     try:
         steps.close()
@@ -151,7 +152,8 @@ def loaded_meanwhile(folder: Path) -> None:
     manager = SimpleNamespace(event_timer_remove=ended.append, progress_end=lambda: ended.append("progress"))
     running = Stepwise()
     running._timer, running._steps = "timer", bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
-    next(running._steps)
+    while not session.paused:
+        next(running._steps)
     assert session.paused == 1
     running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
     assert session.paused == 0 and ended == ["timer", "progress"]

@@ -65,6 +65,7 @@ def slider_meanwhile(folder: Path) -> None:
     """
     from dcc_addon.operators.bake import bake_steps
     from dcc_addon.scene import curves
+    from dcc_addon.session import session
 
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
@@ -73,6 +74,7 @@ def slider_meanwhile(folder: Path) -> None:
     scene.frame_set(9)
     before = curves.shown(strands.data)
     work = _begun(bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc")))
+    assert session.paused
     strands.neuralocks_hair.motion = 0.2
     assert apart(curves.shown(strands.data), before) == 0.0
     _ended(work)
@@ -110,7 +112,8 @@ def _begun(steps):
     work._timer, work._steps = manager.event_timer_add(0.01, window=bpy.context.window), steps
     work._scene, session.working = bpy.context.scene, work.bl_label
     base._running[:] = [work]
-    next(steps)
+    while next(steps)[2] == "Loading USD":
+        pass
     return work
 
 
