@@ -70,7 +70,7 @@ def _baked(shot: Path, folder: Path, model, frames: int, plain: bool) -> dict:
     out.unlink()
     print(
         f"  {frames} frames: {result['seconds'] / frames:.2f} s a frame, {size / 1e6:.0f} MB written, "
-        f"{result['memory']:.0f} MB above the shot",
+        f"{result['memory']:.0f} MiB above the shot",
         flush=True,
     )
     return result
@@ -188,7 +188,7 @@ def _spent(start: float, busy: float) -> dict:
 
 
 def _forget_peak() -> float:
-    """What this process holds now [MB]; what it once held more than that is forgotten where the system can."""
+    """What this process holds now [MiB]; what it once held more than that is forgotten where the system can."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
         return _status("VmRSS")
@@ -197,7 +197,7 @@ def _forget_peak() -> float:
 
 
 def _peak() -> float:
-    """Largest memory of this process [MB], since `_forget_peak` on Linux."""
+    """Largest memory of this process [MiB], since `_forget_peak` on Linux."""
     try:
         return _status("VmHWM")
     except OSError:
