@@ -225,9 +225,10 @@ def rest(hair) -> None:
 def show_rest_left(things) -> None:
     """Give curves among these objects their rest shape back that nothing live moves: live hair was joined to them, say."""
     for thing in things:
-        if thing.type == "CURVES" and thing.data.library is None and curves.has_rest(thing.data):
-            if thing.data not in _moved():
-                curves.restore_rest(thing.data)
+        if thing.type != "CURVES" or thing.neuralocks_hair.live:
+            continue
+        if thing.data.library is None and curves.has_rest(thing.data) and thing.data not in _moved():
+            curves.restore_rest(thing.data)
 
 
 def show_all_rest() -> None:

@@ -74,10 +74,7 @@ def attach(
     bound = bound_skeleton(prim)
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
-        points = rest_points(prim)
-        indices, weights = joint_influences(prim, len(points), rig.source)
-        shares = _shares(rig, indices, weights)
-        joint, why = _carrier(rig, shares, exact=True)
+        joint, why, shares = _by_own_binding(prim, rig)
         notes += _spread(rig, path, joint, shares)
         found = Attachment(
             rig=rig,
@@ -100,21 +97,18 @@ def attach(
     return found
 
 
-def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement) -> tuple[str, str] | None:
-    """The joint that a binding says carries the groom, and whose binding that is; None where none says so.
+def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: bool) -> tuple[str, str] | None:
+    """The joint that a binding says carries the groom, and whose binding that is; None where none says so. The binding of
+    the mesh on which the groom sits counts where it is `seated`.
 
     Raises:
         NeuralocksError: a binding cannot be used.
     """
     if bound_skeleton(prim) == rig.path:
-        indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
-        joint, whose = _carrier(rig, _shares(rig, indices, weights), exact=True)[0], prim
-    elif (seat := find_seat(prim, rig, placement, NEAR)) is not None:
-        mesh = seat.mesh
-        joint, whose = _carrier(rig, _shares(rig, mesh.indices[seat.points], mesh.weights[seat.points]))[0], mesh.prim
-    else:
-        return None
-    return rig.source.names[joint], str(whose.GetPath())
+        return rig.source.names[_by_own_binding(prim, rig)[0]], str(prim.GetPath())
+    if seated and (seat := find_seat(prim, rig, placement, NEAR)) is not None:
+        return rig.source.names[_by_seat(seat)[0]], str(seat.mesh.prim.GetPath())
+    return None
 
 
 def of_another(
@@ -140,9 +134,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
     seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
     rig, mesh = seat.rig, seat.mesh
-    points = seat.points
-    shares = _shares(rig, mesh.indices[points], mesh.weights[points])
-    joint, why = _carrier(rig, shares)
+    joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
     notes += _spread(rig, path, joint, shares) + moved_away(path, rig, seat.roots)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
@@ -189,6 +181,18 @@ def _trunk(rig: StageRig) -> float:
     """Distance of the carrying joint from the hips [m]."""
     bind = rig.character.skeleton.bind[:, :3, 3]
     return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
+
+
+def _by_own_binding(prim: Usd.Prim, rig: StageRig) -> tuple[int, str, np.ndarray]:
+    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in it."""
+    shares = _shares(rig, *joint_influences(prim, len(rest_points(prim)), rig.source))
+    return *_carrier(rig, shares, exact=True), shares
+
+
+def _by_seat(seat: Seat) -> tuple[int, str, np.ndarray]:
+    """The same for a groom that sits on a mesh, by the skin under its roots."""
+    shares = _shares(seat.rig, seat.mesh.indices[seat.points], seat.mesh.weights[seat.points])
+    return *_carrier(seat.rig, shares), shares
 
 
 def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -14,9 +14,9 @@ INTERRUPTED = 130
 _ENDS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 """Signals that end a command, and who handles them where nobody else does."""
 
-_pressed = threading.Event()
+_number = 0
+"""Of the signal that came, 0 for none."""
 _deferring = False
-_status = INTERRUPTED
 
 
 @contextmanager
@@ -24,15 +24,19 @@ def stoppable() -> Iterator[None]:
     """Ctrl-C or SIGTERM in this block, and whatever error it led to, ends the program in one word; blocks may lie in each
     other.
     """
+    global _number
     with _heeded():
         try:
             yield
         except BaseException as error:
             if not (stopped() or isinstance(error, KeyboardInterrupt)):
                 raise
-            _pressed.clear()  # the block around this one has nothing more to say
+            status, _number = (
+                128 + _number if _number else INTERRUPTED,
+                0,
+            )  # the block around this one has nothing more to say
             print("stopped", file=sys.stderr)
-            raise SystemExit(_status) from None
+            raise SystemExit(status) from None
 
 
 @contextmanager
@@ -51,7 +55,7 @@ def deferred() -> Iterator[None]:
 
 def stopped() -> bool:
     """Whether Ctrl-C was pressed in a stoppable block."""
-    return _pressed.is_set()
+    return _number != 0
 
 
 def check() -> None:
@@ -63,6 +67,7 @@ def check() -> None:
 @contextmanager
 def _heeded() -> Iterator[None]:
     """In this block every signal that ends a command is remembered, besides being raised as KeyboardInterrupt."""
+    global _number
     main = threading.current_thread() is threading.main_thread()
     own = {number: handler for number, handler in _ENDS.items() if main and signal.getsignal(number) == handler}
     for number in own:
@@ -73,12 +78,11 @@ def _heeded() -> Iterator[None]:
         for number, handler in own.items():
             signal.signal(number, handler)
         if own:
-            _pressed.clear()
+            _number = 0
 
 
 def _remember(number, frame) -> None:
-    global _status
-    _status = 128 + number
-    _pressed.set()
+    global _number
+    _number = number
     if not _deferring:
         raise KeyboardInterrupt

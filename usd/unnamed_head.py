@@ -23,31 +23,38 @@ def read_each_rig(
     """`read_rig` of several skeletons: those that can be used, and what is wrong with the others.
 
     Where no joint is named like a head, it is the one that a bake of this stage's hair was made with, or that most of the
-    hair follows by its own binding or by that of the mesh on which it sits.
+    hair follows by its own binding; or, where no other skeleton has a head, by that of the mesh on which it sits. So a hat
+    or a prop near by takes no hair from the head under it.
 
     Args:
         stage, border, head, options: as for `read_rig`.
         prims: the Skeletons.
         cuts: those of all, or a dictionary of them by path.
     """
-    rigs, errors, skins = [], [], find_skins(stage)
+    rigs, errors, unnamed, skins = [], [], [], find_skins(stage)
     for prim in prims:
         own = cuts.get(str(prim.GetPath())) if isinstance(cuts, dict) else cuts
         facts = {**options, "cuts": own, "skins": skins}
         try:
-            try:
-                rigs.append(read_rig(stage, prim, border, head, **facts))
-            except NoHead:
-                found = _carrying(read_rig(stage, prim, border, headless=True, **facts))
-                if found is None:
-                    raise
-                rigs.append(_explained(read_rig(stage, prim, border, found[0], **facts), found[1]))
+            rigs.append(read_rig(stage, prim, border, head, **facts))
+        except NoHead as error:
+            unnamed.append((prim, facts, error))
         except NeuralocksError as error:
             errors.append(error)
-    return rigs, errors
+    alone = not rigs
+    for prim, facts, no_head in unnamed:
+        try:
+            found = _carrying(read_rig(stage, prim, border, headless=True, **facts), seated=alone)
+            if found is None:
+                raise no_head
+            rigs.append(_explained(read_rig(stage, prim, border, found[0], **facts), found[1]))
+        except NeuralocksError as error:
+            errors.append(error)
+    order = [str(prim.GetPath()) for prim in prims]
+    return sorted(rigs, key=lambda rig: order.index(rig.path)), errors
 
 
-def _carrying(rig: StageRig) -> tuple[str, str] | None:
+def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
     """The joint that carries the groom of most points, and how that is known; None where nothing says so."""
     curves = find_curves(rig.source.prim.GetStage())
     empty = without_points(curves)
@@ -56,7 +63,7 @@ def _carrying(rig: StageRig) -> tuple[str, str] | None:
         if isinstance(told, str) and told in rig.source.names:
             return told, f"told by the bake of {prim.GetPath()}"
         try:
-            found = bound_joint(prim, rig, Placement(prim))
+            found = bound_joint(prim, rig, Placement(prim), seated)
         except NeuralocksError:  # said where this groom is read
             continue
         if found is not None:

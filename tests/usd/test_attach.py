@@ -51,6 +51,26 @@ def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
     assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found by"]
 
 
+def test_a_hat_takes_no_hair_from_the_head_under_it(tmp_path):
+    """Its skeleton has no joint named like a head, and hair sits on its mesh as well as on the skin."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    layer = stage.GetRootLayer()
+    for name, copy in (("Rig", "A_Hat"), ("Skin", "A_Felt")):
+        Sdf.CopySpec(layer, f"/Hero/{name}", layer, f"/Hero/{copy}")
+    hat = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/A_Hat"))
+    joints = [joint.replace("neck", "band").replace("head", "crown") for joint in hat.GetJointsAttr().Get()]
+    hat.GetJointsAttr().Set(joints)
+    stage.GetPrimAtPath("/Hero/A_Hat/Motion").GetAttribute("joints").Set(joints)
+    UsdSkel.BindingAPI(hat.GetPrim()).GetAnimationSourceRel().SetTargets(["/Hero/A_Hat/Motion"])
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/A_Felt")).GetSkeletonRel().SetTargets(["/Hero/A_Hat"])
+    layer.Save()
+    shot = read_shot(path)
+    assert shot.grooms[0].attachment.rig.path == "/Hero/Rig"
+    assert any("/Hero/A_Hat: no joint is named like a head" in note for note in shot.notes)
+    assert read_shot(path, skeleton="/Hero/A_Hat").grooms[0].joint == "hips/spine/band/crown"
+
+
 def test_a_bake_tells_the_head_that_its_user_named(tmp_path):
     path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
     with pytest.raises(NeuralocksError, match="no joint is named like a head; name it with --head JOINT"):
