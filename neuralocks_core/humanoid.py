@@ -2,8 +2,8 @@
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
 The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
-capital), parts by their usual names, and the trunk by hierarchy: the upper chest is where the ways from the head and
-from the arms meet.
+capital), parts by their usual names (limbs by `limb_shapes` where none is named like one), and the trunk by hierarchy: the
+upper chest is where the ways from the head and from the arms meet.
 """
 
 from collections.abc import Mapping
@@ -13,6 +13,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.joint_names import leaf, sides_and_keys
+from neuralocks_core.limb_shapes import limbs_by_shape
 
 PARTS = {
     "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder"),
@@ -85,7 +86,8 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     Args:
         names: joint paths (J), separated by `/`.
         parents: (J,) parent indices, -1 for roots.
-        positions: bind positions (J, 3), which tell the head from what else hangs on the neck.
+        positions: bind positions (J, 3), which tell the head from what else hangs on the neck, and limbs whose names say
+            nothing.
         by_hand: semantic name -> joint path or its last part; overrides what is found.
 
     Raises:
@@ -113,6 +115,8 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     put("head", *_find_head(names, sides, keys, parents, positions))
     if "head" not in joints:
         raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
+    if positions is not None:
+        _find_unnamed_limbs(joints, put, names, sides, parents, positions)
     _find_trunk(joints, put, names, keys, parents)
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
@@ -176,6 +180,20 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
     if found["shoulder"] is not None and found["shoulder"] == found["upper_arm"]:
         found["shoulder"] = None
     return {part: joint for part, joint in found.items() if joint is not None}
+
+
+def _find_unnamed_limbs(joints, put, names, sides, parents, positions) -> None:
+    """Arms where no arm, and legs where no leg was found."""
+    lacking = [
+        {"arm": ("shoulder", "upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}[limb]
+        for limb in ("arm", "leg")
+        if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))
+    ]
+    if lacking:
+        way = _ancestors(joints["head"], parents)
+        for name, joint in limbs_by_shape(way, parents, positions, sides).items():
+            if any(name.endswith(part) for parts in lacking for part in parts):
+                put(name, joint, f"by its place, '{leaf(names[joint])}'")
 
 
 def _find_head(names, sides, keys, parents, positions):

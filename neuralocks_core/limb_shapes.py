@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arms and legs of rigs whose names do not tell them: the pairs of chains that leave the trunk as mirror images."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ALIKE = 0.15
+"""Two chains are mirror images if their ends lie symmetric to the trunk within this share of the way between them."""
+LONG = 0.3
+"""A limb is at least this share of the way from the head down to the lowest joint long."""
+LEVEL = 0.5
+"""A leg's last bone is a foot, and points where the character looks, if at least this share of it is level."""
+COLLAR = 0.13
+"""An arm's first joint is the collar bone's if it is nearer to the middle than this share of the arm's reach."""
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two mirrored chains: joints from the trunk to the farthest tip."""
+
+    rank: int  # of the trunk joint that they leave, counted from the head
+    chains: tuple[list[int], list[int]]
+    span: np.ndarray  # from the second one's end to the first one's
+    low: float  # height of the ends
+
+
+def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, int]:
+    """Limb joints of both sides, by semantic name; empty where there are none or their sides cannot be told.
+
+    Legs are the pair of chains that ends lowest, arms the widest of those that leave the trunk nearer to the head. Left and
+    right are told by the names' sides where there are any, else by where the toes point, else as if the character looked
+    along +Z where it stands along Y, and along -Y where it stands along Z, as exporters have it.
+
+    Args:
+        way: the head and its ancestors, to the root.
+        parents: (J,) parent indices, -1 for roots.
+        positions: bind positions (J, 3), in any unit and up axis.
+        sides: 'left', 'right' or '' of each joint, as names tell it.
+    """
+    parents, at = np.asarray(parents, int), np.asarray(positions, float)
+    rise = at[way[0]] - at[way[-1]]
+    height = np.linalg.norm(rise)
+    if not np.isfinite(at).all() or height == 0:
+        return {}
+    up = rise / height
+    pairs = _pairs(way, parents, at, up)
+    legs = min((p for p in pairs if p.low < (at[way[-1]] + at[way[0]]) @ up / 2), key=lambda p: p.low, default=None)
+    upper = [p for p in pairs if p is not legs and (legs is None or p.rank <= legs.rank)]
+    arms = max(upper, key=lambda p: np.linalg.norm(p.span), default=None)
+    found = {}
+    for pair, parts in (
+        (arms, ("shoulder", "upper_arm", "lower_arm", "hand")),
+        (legs, ("", "upper_leg", "lower_leg", "foot")),
+    ):
+        if pair is None or (first := _first_side(pair, legs, at, up, sides)) is None:
+            continue
+        second = "right" if first == "left" else "left"
+        for side, chain in zip((first, second), pair.chains, strict=True):
+            joints = _named(chain, parents, at, pair.span / 2, parts)
+            found |= {f"{side}_{part}": joint for part, joint in joints.items()}
+    return found
+
+
+def _pairs(way: list[int], parents, at: np.ndarray, up: np.ndarray) -> list[_Pair]:
+    """All pairs of long, mirrored chains of three joints or more along the trunk."""
+    children = [np.flatnonzero(parents == joint) for joint in range(len(parents))]
+    least = LONG * (at[way[0]] @ up - (at @ up).min())
+    pairs = []
+    for rank, trunk in enumerate(way[1:]):
+        chains = [_to_the_tip(child, children, at) for child in children[trunk] if child not in way]
+        chains = [c for c in chains if len(c) >= 3 and np.linalg.norm(np.diff(at[c], axis=0), axis=1).sum() >= least]
+        for i, one in enumerate(chains):
+            for other in chains[i + 1 :]:
+                span = at[one[-1]] - at[other[-1]]
+                wide = np.linalg.norm(span)
+                middle = (at[one[-1]] + at[other[-1]]) / 2 - at[trunk]
+                even = max(abs(middle @ span) / max(wide, 1e-12), abs(span @ up)) <= ALIKE * wide
+                if even and wide > 0:
+                    low = min(at[one[-1]] @ up, at[other[-1]] @ up)
+                    pairs.append(_Pair(rank, (one, other), span, low))
+    return pairs
+
+
+def _to_the_tip(joint: int, children, at: np.ndarray) -> list[int]:
+    """The way from this joint to the joint below it that is farthest from it."""
+    best, stack = [joint], [[joint]]
+    while stack:
+        chain = stack.pop()
+        if np.linalg.norm(at[chain[-1]] - at[joint]) > np.linalg.norm(at[best[-1]] - at[joint]):
+            best = chain
+        stack += [[*chain, int(child)] for child in children[chain[-1]]]
+    return [int(joint) for joint in best]
+
+
+def _first_side(pair: _Pair, legs: _Pair | None, at: np.ndarray, up: np.ndarray, sides) -> str | None:
+    """Side of the pair's first chain; None where nothing tells it."""
+    told = [{sides[joint] for joint in chain} - {""} for chain in pair.chains]
+    if len(told[0] ^ told[1]) == 2 and all(len(one) == 1 for one in told):
+        return told[0].pop()
+    ahead = np.cross(pair.span, up)
+    ahead /= np.linalg.norm(ahead)  # where the character looks if the first chain is the left one
+    if legs is not None:
+        foot = np.mean([at[chain[-1]] - at[chain[-2]] for chain in legs.chains], axis=0)
+        if abs(foot @ ahead) > LEVEL * np.linalg.norm(foot):
+            return "left" if foot @ ahead > 0 else "right"
+    usual = np.array([0, 0, 1.0]) if abs(up[1]) >= abs(up[2]) else np.array([0, -1.0, 0])
+    if abs(usual @ ahead) < np.sqrt(0.5):
+        return None
+    return "left" if usual @ ahead > 0 else "right"
+
+
+def _named(chain: list[int], parents, at: np.ndarray, reach: np.ndarray, parts) -> dict[str, int]:
+    """Joints by part: the limb's two long bones are those of which the shorter one is longest; a hand ends it."""
+    collar, upper, lower, end = parts
+    fingers = next((i for i in range(2, len(chain)) if np.sum(parents == chain[i]) >= 3), len(chain) - 1)
+    bones = np.linalg.norm(np.diff(at[chain[: fingers + 1]], axis=0), axis=1)
+    trunk = at[chain[0]] - at[parents[chain[0]]]
+    first = int(bool(collar) and fingers >= 3 and abs(trunk @ reach) < COLLAR * (reach @ reach))
+    start = first + int(np.argmax(np.minimum(bones[first:-1], bones[first + 1 :])))
+    joints = {upper: chain[start], lower: chain[start + 1], end: chain[start + 2]}
+    if collar and start:
+        joints[collar] = chain[start - 1]
+    return joints
