@@ -43,11 +43,11 @@ class BoundarySpec:
     """
 
     dt: float = 1 / 30
-    bins: tuple[int, ...] = (1,) * 12 + (2,) * 8 + (4,) * 8
+    bins: tuple[int, ...] = (1,) * 12 + (2,) * 8 + (4,) * 5
     pose_joints: tuple[str, ...] = POSE_JOINTS
     linear: str = "gravity"
     chest: bool = True
-    taper: float = 0.7
+    taper: float = 0.65
 
     def __post_init__(self):
         object.__setattr__(self, "bins", tuple(index(b) for b in self.bins))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,8 @@ class Beginning:
         """
         deep = self._graphs["frame.onnx"].layers
         has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
-        has["boundary"] = BoundarySpec.from_json(self._meta.get("boundary"))
+        read = BoundarySpec.from_json(self._meta.get("boundary"))
+        has["boundary"] = spec if _reads_all_of(read, spec) else read
         has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
         wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}
         return [name for name, value in wanted.items() if has[name] != value]
@@ -89,14 +91,19 @@ class Beginning:
         return coder.eval().requires_grad_(False)
 
     def fill(self, net: StrandNet) -> None:
-        """Make `net`, normalised already, give the model's answers. What its normalisation left out, since it did not vary, is
-        read again: the model has learned from motion in which it did.
+        """Make `net`, normalised already, give the model's answers, as if nothing had been in the part of the history that
+        only the model reads. What the normalisation left out, since it did not vary, is read again: the model has learned
+        from motion in which it did.
         """
         frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
         layers = dict(frame.layers)
         with self._fits():
             strand = self._graphs["strand.onnx"].layers["strand_part"]
-            linear = layers.pop("frame_part" if net.encoder is None else "flat")
+            reading = "frame_part" if net.encoder is None else "flat"
+            for name in [reading, *[n for n in layers if n != reading][:1]]:
+                # The oldest of the history comes last.
+                layers[name] = (layers[name][0][: len(net.frame_scale)], layers[name][1])
+            linear = layers.pop(reading)
             _read_again(net.strand_scale, strand)
             _read_again(net.frame_scale, linear, *list(layers.values())[:1])
             constant = _unfold(net.strand, *strand, net.strand_mean, net.strand_scale)
@@ -134,6 +141,12 @@ def kept_coder(work: Path) -> StrandAutoencoder:
         return Beginning(work / BEGINNING).coder()
     checkpoint.load(saved, {"coder": coder})
     return coder.eval().requires_grad_(False)
+
+
+def _reads_all_of(spec: BoundarySpec, wanted: BoundarySpec) -> bool:
+    """Whether a network that reads `spec` reads what `wanted` tells, faded otherwise perhaps, and older history at most."""
+    newest = spec.bins[: len(wanted.bins)]
+    return bool(newest) == bool(spec.bins) and replace(spec, bins=newest, taper=wanted.taper) == wanted
 
 
 def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) -> None:

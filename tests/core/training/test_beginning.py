@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A training that begins with a model: the same answers as the model at first, and better ones of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,14 +25,14 @@ from neuralocks_core.training.train import train_strands
 SPEC = BoundarySpec()
 
 
-def _normalised(motion, seed):
+def _normalised(motion, seed, spec=SPEC):
     """A network of random weights and inputs of any mean and size, one of which never varies."""
     torch.manual_seed(seed)
-    net = StrandNet(SPEC.size, motion=motion)
+    net = StrandNet(spec.size, motion=motion)
     strands = torch.randn(50, 70) * torch.linspace(0.1, 3, 70) + torch.randn(70)
-    frames = torch.randn(50, SPEC.size) * torch.linspace(0.01, 5, SPEC.size) + torch.randn(SPEC.size)
+    frames = torch.randn(50, spec.size) * torch.linspace(0.01, 5, spec.size) + torch.randn(spec.size)
     strands[:, 69], frames[:, 0] = 0.3, 0.7
-    net.set_normalisation(strands, frames, SPEC.slices["history"])
+    net.set_normalisation(strands, frames, spec.slices["history"])
     return net, strands, frames
 
 
@@ -62,6 +64,20 @@ def test_the_network_answers_as_the_model_does(tmp_path, motion, principal):
     assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("motion", ["linear", "encoder", "modulated"])
+def test_with_a_shorter_history_the_network_answers_as_the_model_does_where_nothing_was_before(tmp_path, motion):
+    path = _written(tmp_path / "a.neuralocks", motion)
+    short = replace(SPEC, bins=SPEC.bins[:-3], taper=0.2)
+    net, strands, frames = _normalised(motion, 1, short)
+    beginning = Beginning(path)
+    beginning.check(short, RegressionOptions(motion=motion))
+    beginning.fill(net)
+    longer = torch.nn.functional.pad(frames[:1], (0, SPEC.size - short.size)).numpy()
+    wanted = _offsets(model.read(path).graphs, strands.numpy(), longer)
+    answer = _offsets(strand_graphs(beginning.coder(), net, "direction"), strands.numpy(), frames[:1].numpy())
+    assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
 def _offsets(graphs, strands, frame):
     edges = np.tile(np.float32([0, -0.01, 0]), (len(strands), 24))
     inputs = {"anchor": 0 * edges, "edges": edges, **_run(graphs["strand.onnx"], {"strand": strands})}
@@ -81,6 +97,9 @@ def _run(graph, inputs):
         ({"output": "displacement"}, SPEC, "output"),
         ({"motion": "linear", "static": True}, SPEC, "static, motion"),
         ({}, BoundarySpec(bins=(1,) * 30), "boundary"),
+        ({}, replace(SPEC, bins=(*SPEC.bins, 4)), "boundary"),
+        ({}, replace(SPEC, bins=()), "boundary"),
+        ({}, replace(SPEC, bins=SPEC.bins[:5], chest=False), "boundary"),
     ],
 )
 def test_a_model_of_another_kind_is_refused_before_anything_is_simulated(tmp_path, changes, spec, differs):
