@@ -66,11 +66,12 @@ class Inputs:
     """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
 
     def __init__(self, model, real, strands: int):
-        from neuralocks_core.strand_session import StrandSession, strand_inputs
+        from neuralocks_core.strand_session import strand_inputs
+        from neuralocks_core.strands import scalp_local
 
         take = np.arange(strands) % len(real.rest)
-        session = StrandSession(model, real)
-        self.strand = strand_inputs(real, session.codes)[take]
+        codes = model.run("encoder.onnx", "code", shape=scalp_local(real).reshape(len(real.rest), -1))
+        self.strand = strand_inputs(real, codes)[take]
         edges = np.zeros_like(real.rest)
         edges[:, 1:] = np.diff(real.rest, axis=1)
         self.edges = edges.reshape(len(edges), OUTPUTS)[take]

@@ -11,7 +11,7 @@ from .session import session
 OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}
 """A choice made for a library override is saved with it."""
 SETTING = {"options": set()} | OVERRIDABLE
-"""Not to be animated: hair of one frame remembers two seconds of motion, and a bake has one look."""
+"""Not to be animated: hair of one frame remembers the motion before it, and a bake has one look."""
 KEPT = {"options": {"HIDDEN"}} | OVERRIDABLE
 """What is not for the artist's eyes."""
 

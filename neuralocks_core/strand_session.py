@@ -20,7 +20,6 @@ class StrandSession:
 
     Attributes:
         strands: the groom.
-        codes: latent codes z_rest, (S, 32).
         strand_part: the first layer's part of each strand, (S, 256) float32.
         anchor_offsets: the answers that an anchored model's are measured from, (S, 72) float32; see `anchor`.
     """
@@ -29,8 +28,7 @@ class StrandSession:
         self.model, self.strands = model, strands
         count = len(strands.rest)
         shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
-        self.codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
-        inputs = strand_inputs(strands, self.codes)
+        inputs = strand_inputs(strands, self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32))
         self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
         self.anchor_offsets = np.zeros((count, 3 * K), np.float32)
         self._anchored_at: np.ndarray | None = None

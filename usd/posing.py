@@ -48,7 +48,6 @@ class GroomPoser:
             self._placer = GroomPlacer(item)
             self._session = StrandSession(model, self._placer.strands)
             self._session.anchor(self._sampler.held_bind(self._material))
-            self._session.codes = None  # needed for the first layer only; 15 MB of a large groom
             if resolve and character.body is not None:
                 self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
                 self._resolver.prepare()
