@@ -9,6 +9,8 @@ ALIKE = 0.15
 """Two chains are mirror images if their ends lie symmetric to the trunk within this share of the way between them."""
 LONG = 0.3
 """A limb is at least this share of the way from the head down to the lowest joint long."""
+UPRIGHT = 0.7
+"""Legs go along the trunk if this share of them does. An animal's do not, and it has no arms."""
 LEVEL = 0.5
 """A leg's last bone is a foot, and points where the character looks, if at least this share of it is level."""
 COLLAR = 0.13
@@ -46,6 +48,8 @@ def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, int]:
     up = rise / height
     pairs = _pairs(way, parents, at, up)
     legs = min((p for p in pairs if p.low < (at[way[-1]] + at[way[0]]) @ up / 2), key=lambda p: p.low, default=None)
+    if legs is not None and not _upright(legs, at, up):
+        return {}
     upper = [p for p in pairs if p is not legs and (legs is None or p.rank <= legs.rank)]
     arms = max(upper, key=lambda p: np.linalg.norm(p.span), default=None)
     found = {}
@@ -80,6 +84,12 @@ def _pairs(way: list[int], parents, at: np.ndarray, up: np.ndarray) -> list[_Pai
                     low = min(at[one[-1]] @ up, at[other[-1]] @ up)
                     pairs.append(_Pair(rank, (one, other), span, low))
     return pairs
+
+
+def _upright(legs: _Pair, at: np.ndarray, up: np.ndarray) -> bool:
+    """Whether the legs go along the trunk."""
+    way = np.mean([at[chain[0]] - at[chain[-1]] for chain in legs.chains], axis=0)
+    return way @ up > UPRIGHT * np.linalg.norm(way)
 
 
 def _to_the_tip(joint: int, children, at: np.ndarray) -> list[int]:

@@ -91,6 +91,18 @@ def test_sides_in_names_win_and_without_any_hint_there_are_none():
     assert limbs(turn=about_y(90)) == {}
 
 
+def test_an_animal_on_four_legs_has_no_arms():
+    bent = {"pelvis": (0, 0.6, -0.5), "waist": (0, 0.65, -0.2), "breast": (0, 0.65, 0.3), "throat": (0, 0.7, 0.5)}
+    bent |= {"top": (0, 0.8, 0.6), "root": (0, 0.6, -0.55)}
+    legs = {
+        f"{side}_{name}{joint}": (f"{side}_{name}{joint - 1}" if joint else on, (sign * 0.12, 0.6 - 0.28 * joint, z))
+        for side, sign in (("l", 1), ("r", -1))
+        for name, on, z in (("fore", "breast", 0.3), ("hind", "pelvis", -0.5))
+        for joint in range(3)
+    }
+    assert limbs({name: (JOINTS[name][0], place) for name, place in bent.items()} | legs) == {}
+
+
 def test_a_trunk_alone_and_broken_places_have_no_limbs():
     trunk = {name: JOINTS[name] for name in ("root", "pelvis", "waist", "breast", "throat", "top")}
     assert limbs(trunk) == {}
