@@ -13,6 +13,7 @@ from pxr import Usd
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.humanoid import find_humanoid
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.rotation import transformed
 
 from .curves import moment, rest_points
@@ -92,7 +93,7 @@ def attach(
             found = _by_name(prim, rigs, placement, head)
             notes += [] if found.far else floats(prim, found.rig, placement)
     name = rig_joint(found)
-    if head and name.split("/")[-1] != head.split("/")[-1]:
+    if head and leaf(name) != leaf(head):
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
     return found
 
@@ -203,7 +204,7 @@ def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarr
 
 def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
     """What to say of hair that one joint cannot carry: fur all over a body."""
-    names = [name.split("/")[-1] for name in rig.source.names]
+    names = [leaf(name) for name in rig.source.names]
     # What hangs below a head is its face; what hangs below a spine is everything.
     own = (
         rig.character.skeleton.below(joint)

@@ -152,11 +152,12 @@ def export_c(
     prefix: Annotated[str, typer.Option(help="Prefix of all names in it.")] = "nl_hair",
 ) -> None:
     """Write one self-contained C99 header, usable from C++, and a worked example beside it."""
+    from neuralocks_core.export_c import example_beside
     from neuralocks_core.export_c import export_c as write
     from neuralocks_core.rig.network import RigModel
 
     path = write(RigModel.load(model), out, prefix)
-    typer.echo(f"{path} and {path.with_name(path.stem + '_example.c')}")
+    typer.echo(f"{path} and {example_beside(path)}")
 
 
 @command("export-onnx", usd=False)

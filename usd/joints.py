@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.rotation import from_quaternion
 
 from .placement import Placement
@@ -109,7 +110,7 @@ class JointSource:
                 raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is no path; rename it")
             if name in seen:
                 # Exporters put '_' for each letter that they do not take: all names of a Japanese rig become alike.
-                lost = not any(letter.isalnum() for letter in name.rsplit("/", 1)[-1])
+                lost = not any(letter.isalnum() for letter in leaf(name))
                 remedy = (
                     "export it with Unicode names allowed, or rename its bones" if lost else "make joint paths unique"
                 )

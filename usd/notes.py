@@ -12,6 +12,7 @@ from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.boundary import POSE_JOINTS, joints_read
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.groom import Groom
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.rig.hair_names import says_hair
 
 from .attach import Attachment, rig_joint
@@ -110,7 +111,7 @@ def another_carries(path: str, rig: StageRig) -> str:
 def too_far(prim: Usd.Prim, found: Attachment) -> str:
     """The note on curves that are not taken for hair because they start too far from any head."""
     return (
-        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{rig_joint(found).split('/')[-1]}' of {found.rig.path} "
+        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(rig_joint(found))}' of {found.rig.path} "
         f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}, so it is not taken for hair; "
         "if it is, name it with --groom"
     )
@@ -157,7 +158,7 @@ def another_head(rig: StageRig) -> list[str]:
         heads = [name for name in above if "head" in name.lower()]
         if heads and says_hair(own):
             return [
-                f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{names[head].rsplit('/', 1)[-1]}', so it is not moved; "
+                f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{leaf(names[head])}', so it is not moved; "
                 f"take that head with --head {heads[-1]}"
             ]
     return []

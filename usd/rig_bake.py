@@ -11,6 +11,7 @@ from pxr import UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
@@ -137,7 +138,7 @@ def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
         return []
     if source.ignored:
         raise NeuralocksError(source.ignored)
-    name = character.skeleton.names[character.head].rsplit("/", 1)[-1]
+    name = leaf(character.skeleton.names[character.head])
     turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
     if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
         raise NeuralocksError(
@@ -176,7 +177,7 @@ def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
 
 def _name_notes(source) -> list[str]:
     """Blender names a bone after the last part of its joint's path, and cuts that at 63 characters."""
-    leaves = [name.rsplit("/", 1)[-1] for name in source.names]
+    leaves = [leaf(name) for name in source.names]
     long = next((n for n in leaves if len(n) > 63), None)
     if long:
         return [f"{source.path}: joint '{long}' has more than 63 characters; Blender cuts its name"]

@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import fits
 from neuralocks_core.rig.network import rig_spec
@@ -157,7 +158,7 @@ def weight_notes(source: StageRig) -> list[str]:
         path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
         free, off = total < 1e-9, np.abs(total - 1) > 0.01
         if free.any():
-            first = source.source.names[mesh.indices[int(free.argmax()), 0]].split("/")[-1]
+            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
             notes.append(
                 f"{path}: {int(free.sum())} of {len(free)} vertices have no weights; read as if they were bound to the "
                 f"first joint that they name, such as '{first}', bind them in the rig"
@@ -187,7 +188,7 @@ def check_orients(source: StageRig, chains: HairChains) -> None:
     bind, names = source.source.bind, source.source.names
     for joint in np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)])):
         linear = bind[joint, :3, :3]
-        name = names[joint].rsplit("/", 1)[-1]
+        name = leaf(names[joint])
         if np.linalg.det(linear) * np.linalg.det(bind[source.character.head, :3, :3]) < 0:
             raise NeuralocksError(
                 f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"

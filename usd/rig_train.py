@@ -7,6 +7,7 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
+from neuralocks_core.joint_names import leaf
 from neuralocks_core.progress import Progress
 
 from .rig_stage import check_patterns, read_rigged_hair, rigged_notes
@@ -82,7 +83,7 @@ def train_rig(
     model.training["character"] = character.name
     who = hair.source.character
     read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
-    model.training["reads"] = {name: path.rsplit("/", 1)[-1] for name, path in read.items()}
+    model.training["reads"] = {name: leaf(path) for name, path in read.items()}
     model.save(out)
     return model
 

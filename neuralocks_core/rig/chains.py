@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.joint_names import leaf
 
 SAME_AXES = 1e-5
 """Axes that differ by less are the same: one rig read in two programs."""
@@ -112,7 +113,7 @@ class HairChains:
         """
         places: dict[str, list[int]] = {}
         for index in np.flatnonzero(below):
-            places.setdefault(names[index].rsplit("/", 1)[-1], []).append(int(index))
+            places.setdefault(leaf(names[index]), []).append(int(index))
         double = next((name for name in self.names if len(places.get(name, ())) > 1), None)
         if double:
             raise NeuralocksError(f"model: several joints below the head are named '{double}'; rename all but one")
