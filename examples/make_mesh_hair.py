@@ -24,7 +24,8 @@ from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.motion import Clip
 from neuralocks_core.puppet import Puppet
 from neuralocks_core.rotation import to_quaternion
-from usd.border import Border, open_stage, row_matrix
+from usd.arrays import row_matrix
+from usd.border import Border, open_stage
 from usd.joints import JointSource
 from usd.rig_source import read_rig
 

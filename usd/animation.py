@@ -8,7 +8,8 @@ from neuralocks_core import rotation
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 
-from .border import Border, quaternions
+from .arrays import quaternions, vectors
+from .border import Border
 
 
 def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Clip) -> UsdSkel.Animation:
@@ -34,7 +35,7 @@ def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Cli
     animation.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1)] * len(character.skeleton.names)))
     codes = 1.0 + clip.times * border.rate
     _samples(animation.CreateRotationsAttr(), codes, turns, quaternions)
-    _samples(animation.CreateTranslationsAttr(), codes, places, lambda p: Vt.Vec3fArray.FromNumpy(np.float32(p)))
+    _samples(animation.CreateTranslationsAttr(), codes, places, vectors)
     return animation
 
 

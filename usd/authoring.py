@@ -4,9 +4,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel, Vt
+from pxr import Usd, UsdGeom, UsdSkel
 
-from .border import row_matrices, row_matrix
+from .arrays import floats, integers, row_matrices, row_matrix, vectors
 
 
 @dataclass(frozen=True)
@@ -34,19 +34,18 @@ def author_curves(stage: Usd.Stage, path, points, counts, widths, spline: Spline
         spline: how the vertices are interpolated.
     """
     curves = UsdGeom.BasisCurves.Define(stage, path)
-    points, widths = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(widths, np.float32)
+    points, widths = np.asarray(points, np.float32), np.asarray(widths, np.float32)
     curves.CreateTypeAttr(spline.type)
     if spline.type == "cubic":
         curves.CreateBasisAttr(spline.basis)
     curves.CreateWrapAttr(spline.wrap)
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(counts, np.int32)))
-    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths))
+    curves.CreatePointsAttr(vectors(points))
+    curves.CreateCurveVertexCountsAttr(integers(counts))
+    curves.CreateWidthsAttr(floats(widths))
     each = {1: UsdGeom.Tokens.constant, len(counts): UsdGeom.Tokens.uniform}
     curves.SetWidthsInterpolation(each.get(len(widths), UsdGeom.Tokens.vertex))
     reach = np.float32(widths.max() / 2)
-    extent = np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])
-    curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent))
+    curves.CreateExtentAttr(vectors([points.min(axis=0) - reach, points.max(axis=0) + reach]))
     return curves
 
 
@@ -79,6 +78,5 @@ def bind_to(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndarray) 
 def author_influences(binding: UsdSkel.BindingAPI, indices: np.ndarray, weights: np.ndarray) -> None:
     """Joint indices and weights (V, I) of a mesh's vertices."""
     width = indices.shape[1]
-    indices, weights = np.ascontiguousarray(indices, np.int32), np.ascontiguousarray(weights, np.float32)
-    binding.CreateJointIndicesPrimvar(False, width).Set(Vt.IntArray.FromNumpy(indices.ravel()))
-    binding.CreateJointWeightsPrimvar(False, width).Set(Vt.FloatArray.FromNumpy(weights.ravel()))
+    binding.CreateJointIndicesPrimvar(False, width).Set(integers(indices))
+    binding.CreateJointWeightsPrimvar(False, width).Set(floats(weights))

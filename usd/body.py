@@ -4,11 +4,12 @@
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.files import as_path
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
 
+from .arrays import integers, vectors
 from .authoring import author_influences, author_skeleton, bind_to
 from .border import check_layer_name, write_stage
 
@@ -48,23 +49,19 @@ def _author(stage, body: StatisticalBody) -> None:
     author_influences(binding, skin.joint_indices, skin.joint_weights)
     _blend_shapes(stage, binding, skin.shapes)
     # A skinned mesh moves beyond its own points: the root's extent is the answer that usdview and the validators read.
-    low, high = skin.points.min(axis=0), skin.points.max(axis=0)
-    UsdGeom.Boundable(root).CreateExtentAttr([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
+    UsdGeom.Boundable(root).CreateExtentAttr(vectors([skin.points.min(axis=0), skin.points.max(axis=0)]))
 
 
 def _mesh(stage, body):
-    points = np.float32(body.character.body.points)
     mesh = UsdGeom.Mesh.Define(stage, MESH)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(body.faces), body.faces.shape[1], np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.int32(body.faces).ravel()))
+    mesh.CreatePointsAttr(vectors(body.character.body.points))
+    mesh.CreateFaceVertexCountsAttr(integers(np.full(len(body.faces), body.faces.shape[1])))
+    mesh.CreateFaceVertexIndicesAttr(integers(body.faces))
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
     # Normals would have to be skinned too; a subdivision surface is shaded smoothly without any.
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.catmullClark)
-    color = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-    color.Set(Vt.Vec3fArray.FromNumpy(np.float32(body.colors)))
-    scalp = Vt.IntArray.FromNumpy(np.int32(body.scalp))
-    UsdGeom.Subset.CreateGeomSubset(mesh, "scalp", UsdGeom.Tokens.face, scalp, "hair")
+    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex).Set(vectors(body.colors))
+    UsdGeom.Subset.CreateGeomSubset(mesh, "scalp", UsdGeom.Tokens.face, integers(body.scalp), "hair")
     return mesh
 
 
@@ -74,8 +71,8 @@ def _blend_shapes(stage, binding, shapes) -> None:
         shape = UsdSkel.BlendShape.Define(stage, f"{MESH}/{name}")
         # Only points that move by a hundredth of a millimetre are stored.
         moved = np.flatnonzero(np.abs(offsets).max(axis=1) > 1e-5)
-        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.float32(offsets[moved])))
-        shape.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(np.int32(moved)))
+        shape.CreateOffsetsAttr(vectors(offsets[moved]))
+        shape.CreatePointIndicesAttr(integers(moved))
         paths.append(Sdf.Path(str(shape.GetPath())))
     binding.CreateBlendShapesAttr(list(shapes))
     binding.CreateBlendShapeTargetsRel().SetTargets(paths)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, Vt
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
@@ -178,25 +178,3 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
         del stage
         check()
     return path
-
-
-def column_matrix(matrix: Gf.Matrix4d) -> np.ndarray:
-    """A USD matrix (row vectors) as (4, 4) for column vectors."""
-    return np.array(matrix, float).T
-
-
-def row_matrix(matrix: np.ndarray) -> Gf.Matrix4d:
-    """A (4, 4) transform for column vectors as a USD matrix."""
-    return Gf.Matrix4d(np.asarray(matrix, float).T.tolist())
-
-
-def row_matrices(matrices: np.ndarray) -> Vt.Matrix4dArray:
-    """(N, 4, 4) transforms for column vectors as USD matrices."""
-    return Vt.Matrix4dArray.FromNumpy(np.ascontiguousarray(np.swapaxes(np.asarray(matrices, float), -1, -2)))
-
-
-def quaternions(wxyz: np.ndarray) -> Vt.QuatfArray:
-    """Quaternions (J, 4) wxyz as USD keeps them, with the imaginary part first; made one by one, those of a long shot
-    would take seconds.
-    """
-    return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(wxyz, -1, axis=1), np.float32))

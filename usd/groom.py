@@ -14,6 +14,7 @@ from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands import root_uv
 
+from .arrays import floats, integers
 from .authoring import POLYLINES, Spline, author_curves
 from .border import LAYERS, Border, check_not_input, open_stage, write_stage
 from .curves import find_curves, read_groom
@@ -121,16 +122,16 @@ def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINE
     def per_strand(name: str, kind, values) -> None:
         api.CreatePrimvar(name, kind, uniform).Set(values)
 
-    per_strand("groom_id", names.IntArray, Vt.IntArray.FromNumpy(np.arange(groom.strand_count, dtype=np.int32)))
+    per_strand("groom_id", names.IntArray, integers(np.arange(groom.strand_count)))
     if groom.guides is not None:
-        per_strand("groom_guide", names.IntArray, Vt.IntArray.FromNumpy(groom.guides.astype(np.int32)))
+        per_strand("groom_guide", names.IntArray, integers(groom.guides))
     if groom.group is not None:
-        per_strand("groom_group_id", names.IntArray, Vt.IntArray.FromNumpy(np.ascontiguousarray(groom.group)))
+        per_strand("groom_group_id", names.IntArray, integers(groom.group))
     uv = _guessed_uv(groom) if groom.root_uv is None else groom.root_uv
     uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(uv))
     per_strand("groom_root_uv", names.Float2Array, uv)
     per_strand("st", names.TexCoord2fArray, uv)
-    centimetres = Vt.FloatArray.FromNumpy(np.float32(100) * groom.widths)
+    centimetres = floats(np.float32(100) * groom.widths)
     api.CreatePrimvar("groom_width", names.FloatArray, curves.GetWidthsInterpolation()).Set(centimetres)
     for name, kind, value in (
         ("groom_version_major", names.Int, 1),

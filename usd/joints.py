@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.joint_names import leaf
 from neuralocks_core.rotation import from_quaternion
 
+from .arrays import wxyz
 from .placement import Placement
 
 STRETCH = 0.003
@@ -214,7 +215,7 @@ class JointSource:
                         f"{self.animation.GetPath()}: {count} {attribute.GetName()} at time code {time:g} for {self._width} joints; "
                         "author one each"
                     )
-                target[row] = _wxyz(values) if quaternions else np.asarray(values, float)
+                target[row] = wxyz(values) if quaternions else np.asarray(values, float)
         self._check(time_codes, translation, turn, scale)
         self._note_lengths(time_codes, turn[:, columns], joints)
         result[:, joints, :3, :3] = from_quaternion(turn[:, columns]) * scale[:, columns, None, :]
@@ -243,11 +244,3 @@ class JointSource:
             f"{self.animation.GetPath()}: the rotation of joint '{self.names[joints[column]]}' at time code "
             f"{time_codes[row]:g} is not of unit length, which UsdSkel shows as a stretch; normalise the rotations"
         )
-
-
-def _wxyz(values) -> np.ndarray:
-    """Quaternions (J, 4) wxyz of a Vt.QuatfArray, whose buffer holds the imaginary part first."""
-    raw = np.asarray(values)
-    if raw.ndim == 2 and raw.shape[1] == 4:
-        return np.roll(raw.astype(float), 1, axis=1)
-    return np.array([(q.GetReal(), *q.GetImaginary()) for q in values], float)

@@ -12,6 +12,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes, transformed
 
+from .arrays import vectors
 from .border import Border
 from .curves import rest_points, widest_sample
 from .damage import named
@@ -58,7 +59,7 @@ class OverrideWriter:
         points = Sdf.AttributeSpec(over, "points", names.Point3fArray)
         if UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(Usd.TimeCode.Default()) is None:
             # Else the first baked sample would be the shape at rest to whoever reads the bake.
-            points.default = Vt.Vec3fArray.FromNumpy(_at_default(item))
+            points.default = vectors(_at_default(item))
         # What the shot says of motion is not that of these points: a renderer would blur by it.
         authored = {name for name in ("velocities", "accelerations") if item.prim.GetAttribute(name).HasAuthoredValue()}
         if velocities:
@@ -87,7 +88,7 @@ class OverrideWriter:
         if name == "points":
             pad = self._reach[item.prim.GetPath()]
             low, high = _corners(np.array(corners))
-            values = {"extent": Vt.Vec3fArray.FromNumpy(np.stack([low - pad, high + pad])), **values}
+            values = {"extent": vectors([low - pad, high + pad]), **values}
         self._file.put(item.prim.GetPath(), time_code, values)
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from pxr import Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 
-from .border import column_matrix
+from .arrays import column_matrix
 
 
 class Placement:

@@ -11,8 +11,9 @@ from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.files import as_path
 
+from .arrays import floats, integers, quaternions, row_matrix, vectors
 from .authoring import Spline, author_curves, author_influences, author_skeleton, bind_to
-from .border import quaternions, row_matrix, write_stage
+from .border import write_stage
 from .recorded import KEY
 
 ROOT = "/Character"
@@ -134,29 +135,28 @@ def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
         animation.CreateBlendShapesAttr(shapes)
         weights = animation.CreateBlendShapeWeightsAttr()
     for row, frame in enumerate(map(float, scene.frames)):
-        translations.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(scene.translation[row], np.float32)), frame)
+        translations.Set(vectors(scene.translation[row]), frame)
         rotations.Set(quaternions(scene.rotation[row]), frame)
         scales.Set(Vt.Vec3hArray.FromNumpy(np.ascontiguousarray(scene.scale[row], np.float16)), frame)
         if shapes:
-            weights.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(scene.shape[row], np.float32)), frame)
+            weights.Set(floats(scene.shape[row]), frame)
     return animation
 
 
 def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> None:
     mesh = UsdGeom.Mesh.Define(stage, f"{ROOT}/{skin.name}")
-    points = np.ascontiguousarray(skin.points, np.float32)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(skin.triangles), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(skin.triangles, np.int32).ravel()))
+    mesh.CreatePointsAttr(vectors(skin.points))
+    mesh.CreateExtentAttr(vectors([skin.points.min(axis=0), skin.points.max(axis=0)]))
+    mesh.CreateFaceVertexCountsAttr(integers(np.full(len(skin.triangles), 3)))
+    mesh.CreateFaceVertexIndicesAttr(integers(skin.triangles))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     binding = bind_to(skeleton, mesh.GetPrim(), np.eye(4))
     author_influences(binding, skin.joint_indices, skin.joint_weights)
     targets = []
     for name, offsets in skin.shapes.items():
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(f"shape_{name}"))
-        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(offsets, np.float32)))
-        shape.CreateNormalOffsetsAttr(Vt.Vec3fArray.FromNumpy(np.zeros_like(offsets, np.float32)))
+        shape.CreateOffsetsAttr(vectors(offsets))
+        shape.CreateNormalOffsetsAttr(vectors(np.zeros_like(offsets)))
         targets.append(shape.GetPath())
     if targets:
         binding.CreateBlendShapesAttr(list(skin.shapes))

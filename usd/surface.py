@@ -11,8 +11,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import inside_out
 from neuralocks_core.rotation import transformed
 
+from .arrays import column_matrix
 from .blend_shapes import Knots, at_knot, knot_weights, read_blend_shapes
-from .border import column_matrix
 from .joints import JointSource
 from .placement import Placement
 
