@@ -116,6 +116,13 @@ def inverse(transform: np.ndarray) -> np.ndarray:
     return result
 
 
+def relative_to_parents(world: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """Transforms of joints (..., J, 4, 4) relative to their parents' (J,), -1 for a root, out of those in the world."""
+    local, below = world.copy(), parents >= 0
+    local[..., below, :, :] = np.linalg.inv(world[..., parents[below], :, :]) @ world[..., below, :, :]
+    return local
+
+
 def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
     """Rotation (..., 3, 3) of transforms (..., 4, 4) after scale is divided out.
 

@@ -27,7 +27,7 @@ def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Cli
     world = border.from_core @ clip.joints
     # A joint's own axes keep unit length in the stage's unit; only its place is scaled.
     world[..., :3, :3] = rotation.rotation_part(world, path)
-    local = _local(world, character.skeleton.parents)
+    local = rotation.relative_to_parents(world, character.skeleton.parents)
     turns = rotation.continuous(rotation.to_quaternion(local[..., :3, :3]))
     places = local[..., :3, 3]
     animation = UsdSkel.Animation.Define(stage, path)
@@ -37,14 +37,6 @@ def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Cli
     _samples(animation.CreateRotationsAttr(), codes, turns, quaternions)
     _samples(animation.CreateTranslationsAttr(), codes, places, vectors)
     return animation
-
-
-def _local(world, parents):
-    """Transforms relative to the parent joint, (T, J, 4, 4)."""
-    local = world.copy()
-    below = parents >= 0
-    local[:, below] = np.linalg.inv(world[:, parents[below]]) @ world[:, below]
-    return local
 
 
 def _samples(attribute, codes, values, pack):

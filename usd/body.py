@@ -7,6 +7,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.files import as_path
+from neuralocks_core.rotation import relative_to_parents
 from neuralocks_core.statistical_body import StatisticalBody, statistical_body
 
 from .arrays import integers, vectors
@@ -42,8 +43,8 @@ def _author(stage, body: StatisticalBody) -> None:
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind("component")
     joints = body.character.skeleton
-    parents = np.array([joints.bind[p] if p >= 0 else np.eye(4) for p in joints.parents])
-    skeleton = author_skeleton(stage, SKELETON, joints.names, joints.bind, np.linalg.inv(parents) @ joints.bind)
+    rest = relative_to_parents(joints.bind, joints.parents)
+    skeleton = author_skeleton(stage, SKELETON, joints.names, joints.bind, rest)
     mesh = _mesh(stage, body)
     binding, skin = bind_to(skeleton, mesh.GetPrim(), np.eye(4)), body.character.body
     author_influences(binding, skin.joint_indices, skin.joint_weights)

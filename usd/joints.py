@@ -10,7 +10,7 @@ from pxr import Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.joint_names import leaf
-from neuralocks_core.rotation import from_quaternion
+from neuralocks_core.rotation import from_quaternion, relative_to_parents
 
 from .arrays import wxyz
 from .placement import Placement
@@ -142,8 +142,7 @@ class JointSource:
                 if parent >= 0:
                     bind[joint] = bind[parent] @ bind[joint]
         if rest is None:
-            above = np.where((self.parents >= 0)[:, None, None], bind[self.parents], np.eye(4))
-            rest = np.linalg.inv(above) @ bind
+            rest = relative_to_parents(bind, self.parents)
         return bind, rest
 
     def _matrices(self, attribute: Usd.Attribute) -> np.ndarray | None:

@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
-from neuralocks_core.rotation import quaternion_product, rotation_part, to_quaternion
+from neuralocks_core.rotation import quaternion_product, relative_to_parents, rotation_part, to_quaternion
 
 from .damage import named
 from .joints import JointSource
@@ -56,8 +56,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
             layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
     spec = Sdf.AttributeSpec(prim, "rotations", names.QuatfArray)
     places = [order.index(source.names[j]) for j in joints]
-    local = np.linalg.inv(source.bind[source.parents[joints]]) @ source.bind[joints]
-    bind = to_quaternion(rotation_part(local))
+    bind = to_quaternion(rotation_part(relative_to_parents(source.bind, source.parents)[joints]))
     attribute = own.GetRotationsAttr() if own else None
     for code, turn in zip(codes, turns):
         values = _joined(attribute, code, rest["rotations"])
