@@ -17,7 +17,6 @@ from .amounts import check_number
 from .border import check_layer_name
 from .notes import written_notes
 from .posing import GroomPoser
-from .prim_paths import prim_path
 from .recorded import cut_facts
 from .samples import write_samples
 from .stage import Shot, StageGroom, read_shot
@@ -90,7 +89,7 @@ def bake(
         NeuralocksError: what cannot be baked, in one line. Nothing is left under the output's name.
     """
     began = time.monotonic()
-    out, skeleton = as_path(out, "out"), prim_path(skeleton, "skeleton")
+    out = as_path(out, "out")
     check_layer_name(out)
     jobs = _jobs(jobs)
     strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
@@ -100,11 +99,7 @@ def bake(
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
-    inputs = {
-        "model": _digest(strand_model),
-        "material": look.log_ratios().tolist(),
-        "carried": [skeleton, head, joints or {}, cuts],
-    }
+    inputs = {"model": _digest(strand_model), "material": look.log_ratios().tolist()}
 
     def poser(item: StageGroom) -> GroomPoser:
         return GroomPoser(item, strand_model, look, **options)

@@ -56,7 +56,7 @@ def write_samples(
         out: `.usdc`, `.usd` or `.usda`.
         codes: ascending time codes.
         poser: makes the poser of a groom; called only if something is left to compute.
-        inputs: plain values that, with the shot's files and this program's, determine every sample.
+        inputs: plain values that, with the shot, its files and this program's, determine every sample.
         facts: what the file tells of how it was made, see `recorded`.
         velocities: write velocities.
         progress: called with (done, total, message).
@@ -70,7 +70,7 @@ def write_samples(
     """
     check_not_input(out, shot.stage)
     _check_space(out, shot, len(codes), velocities)
-    inputs = {**inputs, "velocities": velocities, "grooms": [item.path for item in shot.grooms]}
+    inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
         return _write(shot, codes, poser, spool, facts, velocities, progress or silent)
@@ -80,6 +80,13 @@ def write_samples(
         else:
             spool.discard()
         raise
+
+
+def _carried(item: StageGroom) -> list:
+    """What its samples depend on of how a groom was read: by which joints of what, from where, and with which cuts."""
+    found, character = item.attachment, item.attachment.character
+    joints = {name: int(joint) for name, joint in character.humanoid.items()}
+    return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
 
 
 def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:

@@ -64,7 +64,7 @@ def simulate(
     cuts = given_cuts(cuts)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, cuts=cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
-    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes, "cuts": cuts}
+    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
         return _SimulatedPoser(item, codes, shot.first, look, count, volume, progress)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writing samples: only shot, model and time matter, and kills leave no trace."""
 
+import importlib.util
 import signal
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 from usd.bake import bake
+from usd.simulate import simulate
+from usd.stage import read_shot
 
 from .shots import Recipe, samples, write_shot
 
@@ -87,3 +90,22 @@ def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, m
         bake(shot, out, model, progress=stop)
     own.write_text("another")
     assert bake(shot, out, model).resumed == 0
+
+
+def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
+    """Neither by a bake nor by a simulation, and whoever read it: hair would swing about another joint from there on."""
+    path, out = write_shot(tmp_path, Recipe(bound="none")), tmp_path / "bake.usdc"
+    makers = [lambda shot, **options: bake(shot, out, model, **options)]
+    if importlib.util.find_spec("warp"):
+        makers.append(lambda shot, **options: simulate(shot, out, strands=4, **options))
+
+    def stop(done, total, message):
+        if done == 4 and message.startswith("/"):
+            raise KeyboardInterrupt
+
+    for make in makers:
+        for other in ({"head": "neck"}, {"cuts": [3]}):
+            for again, taken in (({}, 0), (other, 1)):
+                with pytest.raises(KeyboardInterrupt):
+                    make(path, **other, progress=stop)
+                assert (make(read_shot(path, **again)).resumed > 0) == taken
