@@ -9,6 +9,7 @@ import numpy as np
 
 from neuralocks_core.character import Body, Character
 from neuralocks_core.collider import Collider
+from neuralocks_core.going_in import depths_along
 from neuralocks_core.motion import Clip
 from neuralocks_core.near_body import NearBody, PosedBody
 from neuralocks_core.rotation import inverse
@@ -26,6 +27,8 @@ STILL = 1e-3
 """Skin that moves by less than this against the head [m] stands still."""
 STEP, ROOM = 0.1, 0.1
 """The part of the body that hair can reach, a ball, is that much larger [m]: to the next multiple of STEP, and ROOM."""
+DEEP = 0.02
+"""A strand that rests deeper than this [m] is looked at in every frame: what follows may lie where nothing is known."""
 BATCH = 2048
 """Strands looked at together."""
 PUSHED = 1024
@@ -87,7 +90,7 @@ class Resolver:
         edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
         body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
         hit = list(each(lambda s: body.violated(rest[s] + displacement[s], clear[s] - SLACK) + s.start, parts))
-        hit = np.concatenate(hit)
+        hit = np.union1d(np.concatenate(hit), self._deep)
         hit = hit[self.strands.valid[hit]]
 
         def push(rows: np.ndarray) -> None:
@@ -104,9 +107,15 @@ class Resolver:
     def clear(self) -> np.ndarray:
         """Distance (S, 24) float32 [m] that each vertex must keep."""
         joints = self.character.skeleton.bind
-        rest = self._posed(joints, self._constant, *_corners(self.strands.rest))
-        parts = [rest.distance(self.strands.rest[i : i + 2048])[0] for i in range(0, len(self.strands.rest), 2048)]
-        return clearance(np.concatenate(parts))
+        points = self.strands.rest
+        rest = self._posed(joints, self._constant, *_corners(points))
+        return clearance(
+            np.concatenate([rest_distance(points[i : i + BATCH], rest) for i in range(0, len(points), BATCH)])
+        )
+
+    @cached_property
+    def _deep(self) -> np.ndarray:
+        return np.flatnonzero((self.clear[:, CLAMPED:] < -DEEP).any(axis=1))
 
     def serves(self, clip: Clip) -> bool:
         """Whether a resolver made for this clip would give the same results."""
@@ -145,6 +154,11 @@ def _corners(points: np.ndarray) -> np.ndarray:
     return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
 
 
+def rest_distance(points: np.ndarray, body: PosedBody) -> np.ndarray:
+    """Signed distance (S, K) float32 [m] of strands (S, K, 3) at rest, measured as `resolved` does."""
+    return _measured(np.ascontiguousarray(points.transpose(1, 2, 0)), body)[0].T
+
+
 def clearance(rest_distance: np.ndarray) -> np.ndarray:
     """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
 
@@ -177,22 +191,35 @@ def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarr
     keep = np.ascontiguousarray(clear.T, float)
     now, todo = wanted, np.arange(len(points))
     normal, height = np.zeros(wanted.shape), np.full(keep.shape, -np.inf)
+    # Strands that no round frees are left as they were least deep.
+    least, best = np.full(len(points), np.inf), wanted.copy()
     for done in range(ROUNDS + 1):
         here = now[CLAMPED:][:, :, todo]
-        distance, way = body.distance(here.transpose(0, 2, 1).astype(np.float32))
-        distance = distance.astype(float)
+        distance, way = _measured(here, body)
         # The first time a strand is given its margin; after that half of it is enough.
-        left = (distance < keep[CLAMPED:, todo] - 0.5 * MARGIN * (done > 0)).any(axis=0)
-        todo = todo[left]
+        lack = (keep[CLAMPED:, todo] - distance).max(axis=0)
+        left = lack > (0.5 * MARGIN if done else SLACK)
+        todo, lack = todo[left], lack[left]
+        better = lack < least[todo]
+        least[todo[better]], best[:, :, todo[better]] = lack[better], now[:, :, todo[better]]
         if not len(todo) or done == ROUNDS:
             break
-        here, distance, way = here[:, :, left], distance[:, left], way[:, left].transpose(0, 2, 1).astype(float)
+        here, distance, way = here[:, :, left], distance[:, left], way[:, :, left]
         surface = (here * way).sum(axis=1) - distance
         normal[CLAMPED:, :, todo] = way
-        height[CLAMPED:, todo] = np.where(distance < NEAR, surface + keep[CLAMPED:, todo] * 1.02 + 2e-5, -np.inf)
+        height[CLAMPED:, todo] = np.where(distance < NEAR, surface + keep[CLAMPED:, todo] + 4e-5, -np.inf)
         # What is still inside was deep: from where it lies now the way out is clearer than from where it came.
         now[:, :, todo] = _laid(now[:, :, todo], lengths[:, todo], normal[:, :, todo], height[:, todo])
+    now[:, :, todo] = best[:, :, todo]
     return now.transpose(2, 0, 1).astype(np.float32)
+
+
+def _measured(points: np.ndarray, body: PosedBody) -> tuple[np.ndarray, np.ndarray]:
+    """Signed distance (K, n) [m] of strands (K, 3, n) and its direction (K, 3, n), deep in the body too."""
+    distance, way = body.distance(points.transpose(0, 2, 1).astype(np.float32))
+    distance, way = distance.astype(float), way.transpose(0, 2, 1).astype(float)
+    depths_along(points, distance, way)
+    return distance, way
 
 
 def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: np.ndarray) -> np.ndarray:

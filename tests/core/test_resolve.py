@@ -10,7 +10,7 @@ from neuralocks_core.collider import Collider
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.near_body import NearBody
-from neuralocks_core.resolve import MARGIN, Resolver, clearance, resolved
+from neuralocks_core.resolve import MARGIN, Resolver, clearance, resolved, rest_distance
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.strands import strand_set
 from tests.core import rigs
@@ -100,6 +100,60 @@ def test_hair_that_rests_inside_is_not_pushed_beyond_its_rest(body):
     clear = clearance(body.distance(before)[0])
     np.testing.assert_array_equal(resolved(before, body, clear), before)
     assert not len(body.violated(before, clear - np.float32(1e-5)))
+
+
+def chords(count=60, seed=6):
+    """Straight strands that go in at one side of the sphere and out at the other, 50 to 90 mm below the skin."""
+    away = np.random.default_rng(seed).normal(size=(count, 2, 3))
+    away /= np.linalg.norm(away, axis=2, keepdims=True)
+    middle, side = away[:, 0], np.cross(away[:, 0], away[:, 1])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    along = np.linspace(-0.12, 0.13, 24)[None, :, None]
+    return (np.linspace(0.01, 0.05, count)[:, None, None] * middle[:, None] + along * side[:, None]).astype(np.float32)
+
+
+def test_hair_that_rests_deep_inside_is_left_there(body):
+    """However deep: where nothing is known of the body, hair is not taken for free, and not dragged out."""
+    before = chords()
+    exact, found = EXACT.distance(before)[0], rest_distance(before, body)
+    deep = exact < -0.01
+    assert found[deep].max() < -0.005 and (np.minimum(found, 0) - np.minimum(exact, 0) < 5e-3).all()
+    clear = clearance(found)
+    np.testing.assert_array_equal(resolved(before, body, clear), before)
+    moved = before + np.float32(0.004) * np.random.default_rng(7).normal(size=(60, 1, 3)).astype(np.float32)
+    moved[:, :2] = before[:, :2]
+    after = resolved(moved, body, clear)
+    assert np.median(np.linalg.norm(after - moved, axis=2).max(axis=1)) < 0.01
+    assert EXACT.distance(after)[0][exact < -0.045].max() < -0.02
+
+
+@pytest.mark.parametrize("rests", [-0.005, -0.02, -0.034])
+def test_hair_comes_back_to_the_depth_at_which_it_rests(body, rests):
+    before = strands(turn=0.5)
+    away = before / np.linalg.norm(before, axis=2, keepdims=True)
+    around = np.float32(0.1 + rests) * away
+    clear = clearance(np.full((60, 24), rests))
+    lowered = around - np.float32(0.004) * away * (np.arange(24) > 2)[:, None]
+    after = resolved(lowered, body, clear)
+    assert body.distance(lowered)[0].min() < rests - 0.003
+    # Nearer than half a margin is near enough; where a strand has to turn back sharply the rounds do not suffice.
+    assert np.quantile((rests - body.distance(after)[0][:, 2:]).max(axis=1), 0.9) < 0.55 * MARGIN
+
+
+def test_no_strand_is_left_deeper_than_it_was():
+    """Curls in a thin body, where the way out is now to one side and now to the other: they are not made worse."""
+    thin = np.float32([1, 1, 0.2])
+    body = near_body(True, trimesh.Trimesh(HEAD.vertices * thin, HEAD.faces)).posed(np.eye(4)[None], None, LOW, HIGH)
+    edges = np.random.default_rng(8).normal(size=(2000, 23, 3))
+    edges = 0.5 * edges + 0.3 * np.cumsum(edges, axis=1)
+    edges *= 0.012 / np.linalg.norm(edges, axis=2, keepdims=True)
+    roots = strands(2000)[:, :1] * thin
+    before = np.concatenate([roots, roots + np.cumsum(edges, axis=1)], axis=1).astype(np.float32)
+    clear = clearance(np.full((2000, 24), -0.004))
+    after = resolved(before, body, clear)
+    was, left = ((clear - body.distance(points)[0])[:, 2:].max(axis=1) for points in (before, after))
+    assert (left > 0.002).any(), "all were freed: nothing is tested"
+    assert (left < was + 2e-4)[left > 0.5 * MARGIN + 2e-5].all()
 
 
 @pytest.mark.parametrize("shift", [0.0005, 0.002, 0.01])
