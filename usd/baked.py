@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.film import Scene
 from neuralocks_core.rotation import transformed
 
-from .recorded import recorded_cuts
+from .recorded import recorded_cuts, recorded_joint
 from .stage import Shot, StageGroom, read_shot
 
 MOST_BODY_POINTS = 400_000
@@ -87,12 +87,14 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
 
-    Arguments are as for `bake`. Grooms that have no samples beside some that do are left out, with a note.
+    Arguments are as for `bake`; a joint that its user named as the head is told by the bake. Grooms that have no samples beside some that do are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
     """
     shot = read_shot(path, grooms, skeleton, head, joints)
+    if head is None and (head := _named_head(shot)):
+        shot = read_shot(path, grooms, skeleton, head, joints)
     told = [(item.attachment.rig.path, recorded_cuts(item.prim)) for item in shot.grooms]
     told = {path: cuts for path, cuts in told if cuts is not None}
     if told:
@@ -108,3 +110,10 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
     codes = sorted({code for item in items for code in sampled[item.path]})
     return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left)), np.array(codes))
+
+
+def _named_head(shot: Shot) -> str | None:
+    """The joint that hair was baked with where names find another one; None where they agree, or no single one is told."""
+    told = {recorded_joint(item.prim) for item in shot.grooms if recorded_joint(item.prim) not in (None, item.joint)}
+    known = {name for rig in shot.rigs for name in rig.source.names}
+    return told.pop() if len(told) == 1 and told <= known else None

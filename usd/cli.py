@@ -122,7 +122,7 @@ def evaluate_command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a bake's report card. Its material is known from the bake; give --groom, --skeleton, --head and --joint again."""
+    """Print a bake's report card. Its material and head are known from the bake; give --groom, --skeleton and --joint again."""
     from neuralocks_core.report import check_plot
 
     from .bake import as_material

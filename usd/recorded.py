@@ -36,6 +36,12 @@ def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
     return told if isinstance(told, list) else None
 
 
+def recorded_joint(prim: Usd.Prim) -> str | None:
+    """Path of the joint that a groom's bake was carried by, None where it is not told."""
+    told = recorded(prim).get("joint")
+    return told if isinstance(told, str) else None
+
+
 def recorded_material(prim: Usd.Prim) -> Material | None:
     """The material of a bake, None where it is not told.
 

@@ -12,7 +12,7 @@ from .attach import bound_joint
 from .border import Border
 from .curves import find_curves, rest_points, without_points
 from .placement import Placement
-from .recorded import recorded
+from .recorded import recorded_joint
 from .rig_source import StageRig, read_rig
 from .surface import find_skins
 
@@ -59,8 +59,8 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
     curves = find_curves(rig.source.prim.GetStage())
     empty = without_points(curves)
     for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):
-        told = recorded(prim).get("joint")
-        if isinstance(told, str) and told in rig.source.names:
+        told = recorded_joint(prim)
+        if told in rig.source.names:
             return told, f"told by the bake of {prim.GetPath()}"
         try:
             found = bound_joint(prim, rig, Placement(prim), seated)

@@ -8,6 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.bake import bake
 from usd.baked import read_baked
+from usd.evaluate import evaluate
 from usd.inspect import inspect
 from usd.stage import read_shot
 
@@ -77,6 +78,17 @@ def test_a_bake_tells_the_head_that_its_user_named(tmp_path):
         read_shot(path)
     bake(path, tmp_path / "bake.usda", head="Kopf", frames="1:2")
     assert read_baked(tmp_path / "bake.usda").shot.grooms[0].joint == "hips/spine/Hals/Kopf"
+
+
+def test_a_bake_tells_the_head_where_another_joint_is_named_like_one(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="none"))
+    bake(path, tmp_path / "bake.usda", head="neck", frames="1:3")
+    again = read_baked(tmp_path / "bake.usda")
+    assert again.shot.grooms[0].joint == "hips/spine/neck"
+    assert not any("--head" in note for note in again.shot.notes)
+    named = read_baked(tmp_path / "bake.usda", head="hips/spine/neck/head")
+    assert named.shot.grooms[0].joint == "hips/spine/neck/head", "what the user says now wins"
+    assert evaluate(tmp_path / "bake.usda").to_json() == evaluate(tmp_path / "bake.usda", head="neck").to_json()
 
 
 def test_each_groom_finds_its_own_character(tmp_path):
