@@ -10,6 +10,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands import root_uv
@@ -77,8 +78,8 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     else:
         from neuralocks_core import formats
 
-        groom, notes = formats.read_with_notes(source, unit, up)
-        found = [Authored(groom)]
+        groom, look, notes = formats.read_with_look(source, unit, up)
+        found = [Authored(groom, primvars=_primvars(look))]
     write_grooms(out, found)
     return [each.groom for each in found], notes
 
@@ -151,6 +152,19 @@ def _guessed_uv(groom: Groom) -> np.ndarray:
     centre = (low + high) / 2
     centre[1] = low[1] - BELOW  # hair grows on the upper half
     return root_uv(roots, centre)
+
+
+def _primvars(look: Look) -> tuple[Primvar, ...]:
+    """Colours as renderers and viewports know them."""
+    names, found = Sdf.ValueTypeNames, []
+    for name, kind, values, array in (
+        ("displayColor", names.Color3fArray, look.color, Vt.Vec3fArray),
+        ("displayOpacity", names.FloatArray, look.opacity, Vt.FloatArray),
+    ):
+        if values is not None:
+            scope = UsdGeom.Tokens.constant if len(values) == 1 else UsdGeom.Tokens.vertex
+            found.append(Primvar(name, kind, scope, 1, array.FromNumpy(np.ascontiguousarray(values))))
+    return tuple(found)
 
 
 @names_damage

@@ -10,15 +10,16 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
+from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.raw import RawGroom, bad_file, floats
 from neuralocks_core.groom import Groom
 
-_SEGMENTS, _POINTS, _THICKNESS = 1, 2, 4
+_SEGMENTS, _POINTS, _THICKNESS, _TRANSPARENCY, _COLOR = 1, 2, 4, 8, 16
 _HEADER = struct.Struct("<4sIIIIfffff88s")
 
 
 def read(content: bytes, subject: str) -> RawGroom:
-    """Parse a .hair file (Z up). Transparency and colour are not kept.
+    """Parse a .hair file (Z up).
 
     Args:
         content: the whole file.
@@ -29,7 +30,7 @@ def read(content: bytes, subject: str) -> RawGroom:
     """
     if len(content) < _HEADER.size:
         raise bad_file(subject, f"has {len(content)} bytes but the header has {_HEADER.size}", "it is truncated")
-    _, strands, total, flags, segments, thickness, *_ = _HEADER.unpack_from(content)
+    _, strands, total, flags, segments, thickness, transparency, *color, _ = _HEADER.unpack_from(content)
     if strands == 0 or total == 0:
         raise bad_file(subject, f"holds {strands} strands and {total} points", "export one with hair in it")
     if not flags & _POINTS:
@@ -52,10 +53,19 @@ def read(content: bytes, subject: str) -> RawGroom:
     widths = np.array([thickness], np.float32)
     if flags & _THICKNESS:
         widths = floats(content, at, total, subject, "thickness")
-    return RawGroom(points, counts, widths, up="Z")
+        at += 4 * total
+    transparency = np.array([transparency], np.float32)
+    if flags & _TRANSPARENCY:
+        transparency = floats(content, at, total, subject, "transparency")
+        at += 4 * total
+    # Of a header that was left at zero, black is no colour that somebody chose.
+    color = np.array([color], np.float32) if any(color) else None
+    if flags & _COLOR:
+        color = floats(content, at, 3 * total, subject, "colours").reshape(-1, 3)
+    return RawGroom(points, counts, widths, color=color, transparency=transparency, up="Z")
 
 
-def write(path: str | Path, groom: Groom, unit: float = 0.01, up: str = "Z") -> None:
+def write(path: str | Path, groom: Groom, unit: float = 0.01, up: str = "Z", look: Look | None = None) -> None:
     """Write a groom as .hair, under its final name only when complete.
 
     Args:
@@ -63,6 +73,7 @@ def write(path: str | Path, groom: Groom, unit: float = 0.01, up: str = "Z") -> 
         groom: strands of 1 to 65,536 vertices.
         unit: metres per unit of the file.
         up: "Y" or "Z", the file's upward axis.
+        look: its colours.
 
     Raises:
         NeuralocksError: a strand does not fit the format, or the file cannot be written.
@@ -77,24 +88,23 @@ def write(path: str | Path, groom: Groom, unit: float = 0.01, up: str = "Z") -> 
     widths = groom.widths
     if len(widths) == groom.strand_count and len(widths) > 1:
         widths = np.repeat(widths, groom.counts)
-    each = len(widths) > 1
     scale = np.float32(1.0 / unit)
-    flags = _SEGMENTS | _POINTS | (_THICKNESS if each else 0)
+    color = np.zeros((1, 3), np.float32) if look is None or look.color is None else look.color
+    clear = np.zeros(1, np.float32) if look is None or look.opacity is None else 1 - look.opacity
+    of_points = ((_THICKNESS, widths * scale), (_TRANSPARENCY, clear), (_COLOR, color))
+    each = [(flag, values) for flag, values in of_points if len(values) > 1]
     header = _HEADER.pack(
         b"HAIR",
         groom.strand_count,
         len(points),
-        flags,
+        sum((flag for flag, _ in each), _SEGMENTS | _POINTS),
         0,
         float(widths[0] * scale),
-        0,
-        0,
-        0,
-        0,
+        float(clear[0]),
+        *color[0].tolist(),
         b"neuralocks",
     )
     blocks = [header, (groom.counts - 1).astype("<u2").tobytes(), (points * scale).astype("<f4").tobytes()]
-    if each:
-        blocks.append((widths * scale).astype("<f4").tobytes())
+    blocks += [values.astype("<f4").tobytes() for _, values in each]
     with atomic_write(path) as part, open(part, "wb") as file:
         file.writelines(blocks)

@@ -22,6 +22,10 @@ class RawGroom:
     """(P,), (S,) or (1,) in the file's units, or None."""
     root_uv: np.ndarray | None = None
     """(S, 2) or None."""
+    color: np.ndarray | None = None
+    """(P, 3), or (1, 3) for all, from 0 to 1, or None."""
+    transparency: np.ndarray | None = None
+    """(P,), or (1,) for all, from 0 to 1, or None."""
     unit: float | None = None
     """Metres per unit where the format prescribes one."""
     up: str = "Y"

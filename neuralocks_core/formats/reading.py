@@ -10,6 +10,7 @@ import numpy as np
 from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats import cemyuksel, counted, tressfx, tressfx_text
+from neuralocks_core.formats.look import Look, checked_look
 from neuralocks_core.formats.raw import RawGroom, bad_file
 from neuralocks_core.formats.units import UNITS, metres_per_unit, upward_axis
 from neuralocks_core.groom import LARGEST_COORDINATE, Groom
@@ -43,6 +44,14 @@ def read_with_notes(
     path: str | Path, unit: str | float | None = None, up: str | None = None
 ) -> tuple[Groom, list[str]]:
     """The same as `read`, with its errors, and one line for each thing that was assumed or left out."""
+    groom, _, notes = read_with_look(path, unit, up)
+    return groom, notes
+
+
+def read_with_look(
+    path: str | Path, unit: str | float | None = None, up: str | None = None
+) -> tuple[Groom, Look, list[str]]:
+    """The same as `read_with_notes`, and the file's colours."""
     path = Path(path)
     wanted = None if unit is None else metres_per_unit(unit)
     wanted_axis = None if up is None else upward_axis(up)
@@ -75,11 +84,13 @@ def read_with_notes(
     if not (np.abs(points) <= LARGEST_COORDINATE).all():
         raise bad_file(str(path), f"points lie farther than {LARGEST_COORDINATE:g} m from the origin", "check --unit")
     groom = Groom(path.stem or "groom", points, raw.counts, widths, root_uv)
+    look, told = checked_look(raw.color, raw.transparency, str(path))
+    notes += told
     still = count_pointlike(groom)
     if still:
         fact = f"{still} of {groom.strand_count} strands have no two distinct points"
         notes.append(f"{path}: {fact}; they are kept, but will not move on their own")
-    return groom, notes
+    return groom, look, notes
 
 
 def _content(path: Path) -> bytes:

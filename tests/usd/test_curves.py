@@ -6,6 +6,9 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats import cemyuksel
+from neuralocks_core.formats.look import Look
+from neuralocks_core.groom import Groom
 from usd.curves import left_as_they_are, read_groom
 from usd.groom import import_groom
 
@@ -108,6 +111,33 @@ def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
     uv = np.array(written.GetPrimvar("groom_root_uv").Get())
     assert uv.shape == (5, 2) and len(np.unique(uv, axis=0)) == 5 and 0 <= uv.min() and uv.max() <= 1
     assert written.GetPrimvar("groom_width").Get()[0] == pytest.approx(0.01), "0.1 mm, in centimetres"
+
+
+@pytest.mark.parametrize(("rows", "scope"), [(1, "constant"), (12, "vertex")])
+def test_colors_of_a_hair_file_are_shown(tmp_path, rows, scope):
+    rng = np.random.default_rng(0)
+    look = Look(rng.uniform(0.1, 1, (rows, 3)).astype(np.float32), rng.uniform(0, 0.9, rows).astype(np.float32))
+    hair = Groom("Hair", 0.1 * rng.normal(size=(12, 3)), [4, 8])
+    cemyuksel.write(tmp_path / "hair.hair", hair, look=look)
+    import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
+    import_groom(tmp_path / "groom.usda", tmp_path / "again.usda")
+    for name in ("groom.usda", "again.usda"):
+        stage = Usd.Stage.Open(str(tmp_path / name))
+        curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Groom/hair"))
+        for primvar, values in (
+            (curves.GetDisplayColorPrimvar(), look.color),
+            (curves.GetDisplayOpacityPrimvar(), look.opacity),
+        ):
+            assert primvar.GetInterpolation() == scope
+            np.testing.assert_allclose(np.array(primvar.Get()), values, atol=1e-6)
+
+
+def test_a_hair_file_without_colors_gets_none(tmp_path):
+    cemyuksel.write(tmp_path / "hair.hair", Groom("hair", 0.1 * np.eye(3), [3]))
+    import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+    curves = UsdGeom.Gprim(stage.GetPrimAtPath("/Groom/hair"))
+    assert not curves.GetDisplayColorAttr().HasAuthoredValue() and not curves.GetDisplayOpacityAttr().HasAuthoredValue()
 
 
 def test_normals_are_said_to_stay_behind():

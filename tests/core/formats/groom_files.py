@@ -36,6 +36,16 @@ def hair():
     return header + np.array([3, 0, 2], "<u2").tobytes() + POINTS.tobytes()
 
 
+COLORS = np.random.default_rng(1).uniform(size=(8, 3)).astype("<f4")
+CLEAR = np.random.default_rng(2).uniform(size=8).astype("<f4")
+
+
+def hair_in_colors():
+    header = struct.pack("<4sIIIIfffff88s", b"HAIR", 3, 8, 31, 0, 1e-4, 0.5, 0.1, 0.2, 0.3, b"")
+    arrays = [POINTS, np.full(8, 1e-4, "<f4"), CLEAR, COLORS]
+    return header + np.array([3, 0, 2], "<u2").tobytes() + b"".join(array.tobytes() for array in arrays)
+
+
 def counted(columns):
     parts, at = [struct.pack("<i", 3)], 0
     for n in COUNTS:
@@ -51,6 +61,7 @@ FILES = {
     "v3.tfx": tressfx_v3(),
     "v4.tfx": tressfx_v4(),
     "a.hair": hair(),
+    "colors.hair": hair_in_colors(),
     "a.data": counted(3),
     "a.bin": counted(7),
 }

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core import formats
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats import cemyuksel
+from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands import strand_set
 from tests.core.formats.groom_files import COUNTS, FILES, POINTS, put, tressfx_text
@@ -96,6 +97,46 @@ def test_hair_round_trip(folder, counts, each, unit, up):
     np.testing.assert_allclose(back.points, groom.points, rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(back.widths, groom.widths, rtol=1e-5)
     assert [p.name for p in folder.glob(".*")] == []  # no scratch file left
+
+
+@given(
+    counts=st.lists(st.integers(2, 5), min_size=1, max_size=6),
+    colors=st.sampled_from(["none", "one", "each"]),
+    clear=st.sampled_from(["none", "one", "each"]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=30, deadline=None)
+def test_colors_round_trip(folder, counts, colors, clear, seed):
+    random, rows = np.random.default_rng(seed), {"one": 1, "each": sum(counts)}
+    color = None if colors == "none" else random.uniform(0.01, 1, (rows[colors], 3)).astype(np.float32)
+    opacity = None if clear == "none" else random.uniform(0, 0.99, rows[clear]).astype(np.float32)
+    groom = Groom("g", random.normal(size=(sum(counts), 3)) * 0.1, counts)
+    cemyuksel.write(folder / "look.hair", groom, look=Look(color, opacity))
+    _, look, notes = formats.read_with_look(folder / "look.hair", "cm")
+    assert not notes
+    for back, written in ((look.color, color), (look.opacity, opacity)):
+        assert (back is None) == (written is None)
+        if written is not None:
+            assert back.shape == written.shape and back.dtype == np.float32
+            np.testing.assert_allclose(back, written, atol=1e-7)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -0.1, 1.5, 255.0])
+@pytest.mark.parametrize(("at", "what"), [(-4, "colours"), (-4 - 12 * 8, "transparencies")])
+def test_colors_that_are_none_are_left_out(folder, bad, at, what):
+    content = bytearray(FILES["colors.hair"])
+    content[at : at + 4 if at + 4 else None] = np.float32(bad).tobytes()
+    groom, look, notes = formats.read_with_look(put(folder, "bad.hair", content), "cm")
+    assert len(groom.points) == 8 and (look.color is None, look.opacity is None) == (
+        what == "colours",
+        what != "colours",
+    )
+    assert [note for note in notes if f"its {what} are not all from 0 to 1; left out" in note]
+
+
+def test_a_header_that_was_left_at_zero_says_no_color(folder):
+    _, look, _ = formats.read_with_look(put(folder, "a.hair", FILES["a.hair"]))
+    assert look.color is None and look.opacity is None
 
 
 def test_thickness_that_is_no_number_is_left_out(folder):
