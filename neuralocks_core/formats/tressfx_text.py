@@ -40,7 +40,8 @@ def read(content: bytes, subject: str) -> RawGroom:
     points, counts, uv = array("f"), array("i"), array("f")
     left = 0
     while line:
-        words = line.split(None, 6)
+        # Exporters of ZBrush's curves put commas between the coordinates.
+        words = (line.replace(b",", b" ") if left else line).split(None, 6)
         if not words or words[0].startswith(b"#"):
             pass
         elif left and len(words) == 3:

@@ -42,6 +42,19 @@ def test_what_else_the_files_hold(folder):
     np.testing.assert_allclose(v4.widths, [1e-4, 2e-4], rtol=1e-6)
 
 
+def test_tressfx_text_may_have_commas_between_coordinates(folder):
+    lines = FILES["text.tfx"].decode().splitlines()
+
+    def edited(old, new):
+        changed = [line.replace(old, new) if line[0] in "-0123456789" else line for line in lines]
+        return put(folder, "commas.tfx", "\n".join(changed).encode())
+
+    plain = formats.read(put(folder, "text.tfx", FILES["text.tfx"]), "cm")
+    np.testing.assert_array_equal(formats.read(edited(" ", ", "), "cm").points, plain.points)
+    with pytest.raises(NeuralocksError, match="line 8 is not x y z"):  # a decimal comma
+        formats.read(edited(".", ","), "cm")
+
+
 def test_strands_without_length_are_reported(folder):
     _, notes = formats.read_with_notes(put(folder, "a.data", FILES["a.data"]))
     assert notes == [
