@@ -71,6 +71,7 @@ def on_undo(scene, *_):
     session.doubt()
     background.request()  # what is half sampled holds on to a scene that is no more
     live.refresh(scene)
+    show_rest_left(bpy.data.objects)  # hair as it was before the update that followed a join
 
 
 @persistent

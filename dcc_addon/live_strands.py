@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
-from . import edited, preparing
+from . import edited, joined, preparing
 from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
@@ -57,7 +57,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
             f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
         )
     if hair.mode in EDITING:
-        curves.restore_rest(hair.data)
+        _restore(hair)
         session.hairs.pop(hair.name_full, None)
         raise NeuralocksError(f"{hair.name_full}: the hair is being edited; live goes on when you leave the mode")
     sampled = session.rigs.get(armature.name_full)
@@ -68,6 +68,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         sampled.stale = session.wanting = True
         raise NeuralocksError(f"{armature.name_full}: its motion was sampled without this hair; press Sample Motion")
     place = world(hair, graph)
+    joined.settle(hair)
     edited.follow(hair, sampled, place)
     joints = pose(armature, sampled, scene, graph, moved)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
@@ -86,6 +87,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     curves.keep_rest(hair.data)
     mute_deformers(hair)
     edited.write(hair, points, place)
+    joined.remember(hair, prepared.made_of[0])
     hair.data.update_tag()
     session.messages.pop(hair.name_full, None)
 
@@ -228,13 +230,16 @@ def show_rest_left(things) -> None:
         if thing.type != "CURVES" or thing.neuralocks_hair.live:
             continue
         if thing.data.library is None and curves.has_rest(thing.data) and thing.data not in _moved():
-            curves.restore_rest(thing.data)
+            _restore(thing)
 
 
 def show_all_rest() -> None:
     """Give all curves of the file their rest shapes back, those too that live hair has left behind, in no scene or with
     no object.
     """
+    for thing in bpy.data.objects:
+        if thing.type == "CURVES":
+            joined.settle(thing)
     for data in bpy.data.hair_curves:
         if data.library is None:
             curves.restore_rest(data)
@@ -243,8 +248,14 @@ def show_all_rest() -> None:
 def show_rest(hair) -> None:
     """Give the hair its rest shape and its modifiers back; what was converted to another type has no rest shape."""
     if hair.type == "CURVES" and hair.data.library is None:
-        curves.restore_rest(hair.data)
+        _restore(hair)
     unmute_deformers(hair)
+
+
+def _restore(hair) -> None:
+    """Give the curves of an object their rest shape back, that of hair which was joined to them as well."""
+    joined.settle(hair)
+    curves.restore_rest(hair.data)
 
 
 def _give_up(hair, message: str) -> None:

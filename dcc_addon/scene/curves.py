@@ -105,9 +105,11 @@ def keep_rest(data) -> None:
     _keep(data, _read(data, "position"))
 
 
-def move_rest(data, matrix: np.ndarray) -> None:
-    """Move the rest shape that is kept aside by a transform (4, 4)."""
-    _keep(data, transformed(_rest(data), matrix))
+def move_rest(data, matrix: np.ndarray, part: slice = slice(None)) -> None:
+    """Move the rest shape that is kept aside, or that of some of the points, by a transform (4, 4)."""
+    values = _rest(data)
+    values[part] = transformed(values[part], matrix)
+    _keep(data, values)
 
 
 def restore_rest(data) -> bool:

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live hair that an artist joins to other hair, which Blender can since 5.2: it brings the points into the space of that,
+and leaves the rest shape, an attribute like any other, in the space of hair that is gone.
+"""
+
+import zlib
+from typing import NamedTuple
+
+import numpy as np
+
+from neuralocks_core.rotation import inverse, transformed
+
+from .edited import ROUNDING
+from .scene import curves
+from .scene.armature import matrix
+from .scene.lookup import identity
+from .session import session
+
+
+class Stood(NamedTuple):
+    """How a live hair object was when it was last written.
+
+    Attributes:
+        points: as shown, (P, 3) float32 in its own space.
+        world: where it stood (4, 4).
+        root: the first point of its rest shape.
+        rest: checksum of all of them.
+    """
+
+    points: np.ndarray
+    world: np.ndarray
+    root: np.ndarray
+    rest: int
+
+
+def remember(hair, rest: int) -> None:
+    """Note how hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
+    written = session.written[hair.name_full]
+    root = np.array(hair.data.attributes[curves.REST].data[0].vector, np.float32)
+    session.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
+
+
+def settle(hair) -> None:
+    """Bring the rest shapes of live hair that was joined to this into its space, where that is still to be done: also
+    after an undo, which goes back to what Blender itself had made of it.
+    """
+    data, written = hair.data, session.written.get(hair.name_full)
+    if written is not None and len(written.points) == len(data.points):
+        return
+    if data.library is not None or not session.stood or not curves.has_rest(data):
+        return
+    own, here = identity(hair), matrix(hair.matrix_world)
+    for stood in (stood for number, stood in session.stood.items() if number != own):
+        for part in _parts(data, stood):
+            change = inverse(here) @ stood.world
+            moved = transformed(stood.points, change)
+            # Copies have the same rest shape: by the points it is known which of them is where.
+            if np.abs(moved - curves.shown(data)[part]).max() <= ROUNDING * np.abs(moved).max():
+                curves.move_rest(data, change, part)
+                break
+
+
+def _parts(data, stood: Stood) -> list[slice]:
+    """Where points of a hair object have the very rest shape of hair that was joined to it."""
+    rest, count = curves.points(data), len(stood.points)
+    starts = np.flatnonzero((rest == stood.root).all(axis=1))
+    parts = [slice(start, start + count) for start in starts.tolist() if start + count <= len(rest)]
+    return [part for part in parts if zlib.crc32(np.ascontiguousarray(rest[part])) == stood.rest]
