@@ -21,6 +21,7 @@ from ..scene.paths import FILE, absolute
 from ..services.names import identifier
 from ..services.overwriting import check_ours
 from ..services.threaded import Threaded, loading
+from ..services.unfinished import undone_on_failure
 from ..session import session
 from .base import Stepwise, sampling, shown_armature, shown_hair
 
@@ -29,11 +30,14 @@ def output_path(path: str) -> str:
     """Absolute path of a bake.
 
     Raises:
-        NeuralocksError: it is relative to a file that is not saved, or its folder cannot be written.
+        NeuralocksError: it is relative to a file that is not saved, it is a folder, or its folder cannot be written.
     """
     if not path.strip():
         raise NeuralocksError("Output: no file is named; choose where the bake is written")
-    full = os.path.abspath(absolute(path))
+    chosen = absolute(path)
+    full = os.path.abspath(chosen)
+    if chosen.endswith(("/", os.sep)) or os.path.isdir(full):
+        raise NeuralocksError(f"{path}: this is a folder; name the file that is to be written in it")
     if not full.lower().endswith((".usd", ".usda", ".usdc")):
         full += ".usdc"
     folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # the others are made
@@ -85,29 +89,32 @@ def bake_steps(context, armature, hairs, path: str):
     check_ours([*outs, *map(shot_beside, outs)], is_own)
     sampled = yield from sampling(context, named(character), share=0.5)
     baked = {}
-    for number, (look, names) in enumerate(sorted(looks.items())):
-        group, out = [named(name) for name in names], outs[number]
-        others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
-        if others:
-            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-        shot = shot_beside(out)
-        prims = write_shot(shot, named(character), scene, sampled, group)
-        job = Threaded(
-            lambda say, shot=shot, out=out, look=look: bake(
-                shot,
-                out,
-                look.model,
-                frames=f"{first}:{last}",
-                subframes=subframes + 1,
-                material=list(look.material),
-                strength=look.motion,
-                resolve=look.resolve,
-                loop=sampled.clip.loop,
-                progress=say,
+    with undone_on_failure(*outs, *map(shot_beside, outs)):
+        for number, (look, names) in enumerate(sorted(looks.items())):
+            group, out = [named(name) for name in names], outs[number]
+            others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
+            if others:
+                raise NeuralocksError(
+                    f"{out}: {others[0]} plays this file, and is not in this bake; choose another file"
+                )
+            shot = shot_beside(out)
+            prims = write_shot(shot, named(character), scene, sampled, group)
+            job = Threaded(
+                lambda say, shot=shot, out=out, look=look: bake(
+                    shot,
+                    out,
+                    look.model,
+                    frames=f"{first}:{last}",
+                    subframes=subframes + 1,
+                    material=list(look.material),
+                    strength=look.motion,
+                    resolve=look.resolve,
+                    loop=sampled.clip.loop,
+                    progress=say,
+                )
             )
-        )
-        yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
-        baked |= {name: (str(out), prims[name]) for name in names}
+            yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
+            baked |= {name: (str(out), prims[name]) for name in names}
     return baked
 
 

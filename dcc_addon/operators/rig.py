@@ -22,6 +22,7 @@ from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.overwriting import check_ours
 from ..services.threaded import loading
+from ..services.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range, output_path, shot_beside
 from .base import Hardened, Stepwise, sampling, shown_armature
@@ -114,10 +115,11 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name))
         bind(find(name), sampled)  # says what is wrong before anything is written
-        write_shot(shot, find(name), scene, sampled, [])
         head, model = sampled.character.skeleton.names[sampled.character.head], model_path(find(name), "rig")
         settings = find(name).neuralocks_character
-        bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
+        with undone_on_failure(out, shot):
+            write_shot(shot, find(name), scene, sampled, [])
+            bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
         return f"{name}: hair bones written to {out}"
 
 

@@ -210,6 +210,19 @@ def no_file(folder: Path) -> None:
         refused(lambda path=path: export(filepath=path), "this is a folder")
 
 
+def into_a_folder(folder: Path) -> None:
+    """A bake needs the name of a file: beside a folder, under its name, nobody would look for it."""
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    strands, operators = scenes.hair(rig, 10), bpy.ops.neuralocks
+    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
+    (folder / "there").mkdir()
+    for write in (operators.bake, operators.bake_attach, operators.export_skel):
+        for path in (f"{folder}/there", f"{folder}/there/", f"{folder}/other/"):
+            refused(lambda write=write, path=path: write(filepath=path), path, "folder", "name the file")
+    assert [each.name for each in folder.iterdir()] == ["there"] and not any((folder / "there").iterdir())
+
+
 def not_ours(folder: Path) -> None:
     """What an artist has made himself is not written over, be it what is written beside a bake; what was baked before
     is.

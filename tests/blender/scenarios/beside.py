@@ -8,7 +8,7 @@ from unittest.mock import patch
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, apart, make_live, messages, points_at
+from tests.blender.checks import MODEL, apart, make_live, messages, points_at, refused
 
 
 def prepared_once(_folder: Path) -> None:
@@ -158,6 +158,44 @@ def loaded_meanwhile(folder: Path) -> None:
     running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
     assert session.paused == 0 and ended == ["timer", "progress"]
     assert apart(points_at(strands, 9), shown) == 0.0
+
+
+def cancelled(folder: Path) -> None:
+    """Of a bake that is cancelled or refused nothing stays, and what an earlier one wrote is as it was."""
+    from dcc_addon.operators.bake import bake_steps
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    one, two = scenes.hair(rig, 20, name="One"), scenes.hair(rig, 20, name="Two")
+    one.neuralocks_hair.model = two.neuralocks_hair.model = MODEL
+    two.neuralocks_hair.bend = 2.0
+    bpy.context.scene.neuralocks.armature, out = rig, str(folder / "new" / "bake.usdc")
+
+    def files():
+        return {path.name: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+
+    def cancel(hairs, at):
+        steps = bake_steps(bpy.context, rig, hairs, out)
+        while (step := next(steps))[0] / step[1] < at or "Baking" not in step[2]:
+            pass
+        assert any("shot" in name for name in files())
+        steps.close()
+
+    def refuse():
+        two.neuralocks_hair.model = "/nowhere.neuralocks"
+        refused(lambda: bpy.ops.neuralocks.bake(filepath=out), "no such")
+        two.neuralocks_hair.model = MODEL
+
+    for earlier in (False, True):
+        if earlier:
+            assert bpy.ops.neuralocks.bake(filepath=out) == {"FINISHED"}
+            bpy.context.scene.frame_end += 1  # the next ones differ
+        before = files()
+        assert bool(before) == earlier
+        for stop in (lambda: cancel([one], 0.5), lambda: cancel([one, two], 0.75), refuse):
+            stop()
+            now = files()
+            assert sorted(now) == sorted(before) and now == before, sorted(now)
 
 
 def prepared_together(_folder: Path) -> None:
