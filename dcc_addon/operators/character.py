@@ -9,6 +9,7 @@ from ..live import refresh
 from ..scene import armature as armature_reader
 from ..scene.attach import check_own
 from ..scene.binding import carrier
+from ..scene.instances import check_real
 from ..scene.sampling import sample
 from ..services import rig as rig_service
 from .base import Hardened, Stepwise, shown_armature
@@ -26,6 +27,8 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
         local = sorted(scene.objects, key=lambda thing: thing.library is not None)
         selected, chosen = context.selected_objects, [*context.selected_objects, *local]
         armatures, hairs = ([o for o in chosen if o.type == kind] for kind in ("ARMATURE", "CURVES"))
+        if not any(thing.type == "ARMATURE" for thing in selected):
+            check_real(selected if armatures else [*selected, *local])
         if not armatures:
             raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
         armature = armatures[0]

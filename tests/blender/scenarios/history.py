@@ -134,6 +134,51 @@ def linked(folder: Path) -> None:
     assert strands.neuralocks_hair.live and "neuralocks_rest" not in strands.data.attributes
 
 
+def instanced(folder: Path) -> None:
+    """A character that is an instance of a collection: it is told what that is, and each remedy that is named works."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 20)
+    scenes.collect("Character")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+
+    def instance(link: bool):
+        scenes.empty()
+        with bpy.data.libraries.load(str(folder / "library.blend"), link=link) as (_, wanted):
+            wanted.collections = ["Character"]
+        holder = bpy.data.objects.new("Instance", None)
+        holder.instance_type, holder.instance_collection = "COLLECTION", bpy.data.collections["Character"]
+        bpy.context.scene.collection.objects.link(holder)
+        bpy.context.view_layer.objects.active = holder
+        return holder
+
+    def override():
+        bpy.ops.object.make_override_library()
+
+    def make_real():
+        bpy.ops.object.duplicates_make_real(use_base_parent=True, use_hierarchy=True)
+
+    for link, remedy, words in (
+        (True, override, ("of library.blend", "Library Override")),
+        (True, make_real, ("of library.blend", "Make Instances Real")),
+        (False, make_real, ("'Character',", "Make Instances Real")),
+    ):
+        holder = instance(link)
+        refused(bpy.ops.neuralocks.find, "Instance", "instance of the collection 'Character'", *words)
+        other = scenes.armature("Other")
+        assert bpy.ops.neuralocks.find() == {"FINISHED"} and bpy.context.scene.neuralocks.armature == other
+        bpy.ops.object.select_all(action="DESELECT")
+        holder.select_set(True)
+        refused(bpy.ops.neuralocks.find, "Instance", *words)
+        bpy.data.objects.remove(other)
+        bpy.context.view_layer.objects.active = holder
+        remedy()
+        assert bpy.ops.neuralocks.find() == {"FINISHED"}
+        settings, here = bpy.context.scene.neuralocks, bpy.context.scene.objects
+        assert settings.armature.name in here and settings.hair.name in here
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+
 def beside_the_file(folder: Path) -> None:
     """A model named with // is beside the file in which it was named: the library of linked and overridden hair, and where
     this file was before it was saved in another folder; a copy there changes nothing here.
