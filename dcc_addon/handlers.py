@@ -10,6 +10,7 @@ from . import background, live
 from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .scene import blur
+from .scene.appended import remake
 from .scene.carried import bodies_of
 from .scene.layers import working_in
 from .scene.sampling import ensure
@@ -96,6 +97,12 @@ def after_save(*_):
 
 
 @persistent
+def after_import(context, *_):
+    """What was appended finds its models."""
+    _unseen(lambda: remake(context.import_items, SETTING.values()))
+
+
+@persistent
 def before_render(scene, *_):
     """A render must be right: sample now what is out of date, be it that only the pose drawn tells so, and say on the
     console, which is all that a render farm keeps, which hair will not move.
@@ -169,6 +176,7 @@ HANDLERS = {
     "save_pre": before_save,
     "save_post": after_save,
     "save_post_fail": after_save,
+    "blend_import_post": after_import,
     "render_init": before_render,
     "render_complete": after_render,
     "render_cancel": after_render,
@@ -176,7 +184,7 @@ HANDLERS = {
 
 
 def attach() -> None:
-    """Put the handlers on their lists; `save_post_fail` is younger than the oldest Blender."""
+    """Put the handlers on their lists; some are younger than the oldest Blender."""
     for name, handler in HANDLERS.items():
         calls = getattr(bpy.app.handlers, name, None)
         if calls is not None and handler not in calls:

@@ -3,7 +3,10 @@
 
 import os
 
+import bpy
+
 from neuralocks_core import model as model_file
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
 
 from .scene.paths import absolute, library_of
@@ -33,8 +36,27 @@ def stamp(found: str) -> tuple | None:
 def model_path(thing, kind: str = "strands") -> str:
     """Absolute path of the model that the panel names for a hair object, or for an armature with hair bones; the shipped
     one where it names none.
+
+    Raises:
+        NeuralocksError: it is named as beside a file, and is not there.
     """
     path = thing.path_resolve(SETTING[kind])
     if not path.strip():
         return str(model_file.shipped(kind))
-    return absolute(path, library_of(thing, SETTING[kind]))
+    library = library_of(thing, SETTING[kind])
+    found = absolute(path, library)
+    if path.startswith("//") and not os.path.exists(found):
+        raise NeuralocksError(
+            f"{thing.name_full}: no such model file: {os.path.normpath(found)}; {path} means beside "
+            f"{library.name if library else 'this file'}{_elsewhere(path)}; choose its model again"
+        )
+    return found
+
+
+def _elsewhere(path: str) -> str:
+    """Where a file that is named as beside this one is instead: beside a library of which something was made local."""
+    for library in bpy.data.libraries:
+        found = absolute(path, library)
+        if os.path.exists(found):
+            return f", and beside {library.name} there is {os.path.normpath(found)}"
+    return ", and what was appended or made local was named as beside its own file"

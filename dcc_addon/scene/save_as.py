@@ -21,21 +21,23 @@ class Remade:
                 path = thing.path_resolve(setting)
                 if path.startswith("//") and library_of(thing, setting) is None:
                     self._kept.append((thing.name, setting, path))
-                    _set(thing, setting, _relative(bpy.path.abspath(path), folder))
+                    set_path(thing, setting, relative(bpy.path.abspath(path), folder))
 
     def put_back(self) -> None:
         """Take that back if this is still the file that it was: after a copy was saved, or nothing was."""
         if bpy.data.filepath != self._source:
             return
         for name, setting, path in self._kept:
-            _set(bpy.data.objects[name, None], setting, path)
+            set_path(bpy.data.objects[name, None], setting, path)
 
 
-def _relative(path: str, folder: str) -> str:
+def relative(path: str, folder: str) -> str:
+    """An absolute path as it is named in a file in `folder`; itself on another drive."""
     same = os.path.splitdrive(path)[0] == os.path.splitdrive(folder)[0]
     return bpy.path.relpath(path, start=folder) if same else path
 
 
-def _set(thing, setting: str, path: str) -> None:
+def set_path(thing, setting: str, path: str) -> None:
+    """Write a setting that is given by its path from the object."""
     group, _, name = setting.partition(".")
     setattr(getattr(thing, group), name, path)

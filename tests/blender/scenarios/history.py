@@ -217,4 +217,48 @@ def beside_the_file(folder: Path) -> None:
     strands = strands.override_create()
     assert Path(model_path(strands)).samefile(model)
     strands.neuralocks_hair.model = "//other.neuralocks"
+    refused(lambda: model_path(strands), str(shots / "other.neuralocks"), "beside this file")
+    shutil.copy(MODEL, shots / "other.neuralocks")
     assert Path(model_path(strands)) == shots / "other.neuralocks"
+
+
+def appended(folder: Path) -> None:
+    """Appended hair finds the model that is beside its own file, where Blender tells of it; hair that is made local says
+    where it was looked for, and where it is.
+    """
+    from dcc_addon.models import model_path
+
+    library, shots = folder / "library", folder / "shots"
+    library.mkdir()
+    shots.mkdir()
+    model = shutil.copy(MODEL, library / "mine.neuralocks")
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    strands = scenes.hair(rig, 20)
+    strands.neuralocks_hair.model = rig.neuralocks_character.rig_model = "//mine.neuralocks"
+    bpy.ops.wm.save_as_mainfile(filepath=str(library / "library.blend"))
+
+    def bring(link: bool):
+        with bpy.data.libraries.load(str(library / "library.blend"), link=link) as (_, wanted):
+            wanted.objects = ["Hair"]
+        return bpy.data.objects["Hair"]
+
+    for saved in (True, False):
+        scenes.empty()
+        if saved:
+            bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
+        strands = bring(link=False)
+        if hasattr(bpy.app.handlers, "blend_import_post"):
+            named = "//../library/mine.neuralocks" if saved else str(model)
+            assert strands.neuralocks_hair.model == named, strands.neuralocks_hair.model
+            assert Path(model_path(strands)).samefile(model)
+            assert Path(model_path(strands.neuralocks_hair.armature, "rig")).samefile(model)
+        elif saved:
+            refused(lambda strands=strands: model_path(strands), str(shots / "mine.neuralocks"), str(model))
+
+    bpy.ops.wm.open_mainfile(filepath=str(shots / "shot.blend"))
+    strands = bring(link=True)
+    assert Path(model_path(strands)).samefile(model)
+    bpy.context.scene.collection.objects.link(strands)
+    strands.make_local()
+    strands = next(o for o in bpy.data.objects if o.type == "CURVES" and o.library is None)
+    refused(lambda: model_path(strands), str(shots / "mine.neuralocks"), "beside library.blend", str(model))

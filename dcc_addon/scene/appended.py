@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths of objects that are appended from another file: Blender remakes its own that begin with //, and not those of
+add-ons.
+"""
+
+import os
+
+import bpy
+
+from .paths import library_of
+from .save_as import relative, set_path
+
+
+def remake(items, settings) -> None:
+    """Let settings of appended objects that name a file beside the one they are from name the same file from here.
+
+    Args:
+        items: what Blender tells of an import, since 4.3.
+        settings: paths of the settings, from the object.
+    """
+    here = os.path.dirname(bpy.data.filepath)
+    for item in items:
+        thing, library = item.id, item.source_library
+        if item.append_action not in ("MAKE_LOCAL", "COPY_LOCAL") or library is None:
+            continue
+        if not isinstance(thing, bpy.types.Object) or thing.library is not None:
+            continue
+        for setting in settings:
+            path = thing.path_resolve(setting)
+            if path.startswith("//") and library_of(thing, setting) is None:
+                full = os.path.normpath(bpy.path.abspath(path, library=library))
+                set_path(thing, setting, relative(full, here) if here else full)
