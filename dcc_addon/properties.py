@@ -237,7 +237,8 @@ class SceneSettings(bpy.types.PropertyGroup):
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
         name="Sub-frames",
-        description="Samples between two frames, for motion blur",
+        description="Samples between two frames, for motion blur; a shutter that is open before the first frame, or after "
+        "the last, needs a bake that is a frame longer there",
         default=0,
         min=0,
         max=15,

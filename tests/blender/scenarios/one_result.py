@@ -150,6 +150,25 @@ def other_frames(folder: Path) -> None:
     assert not messages(), messages()
 
 
+def shutter_at_the_ends(folder: Path) -> None:
+    """A bake knows nothing beyond its frames, where Blender moves the character on; of one that is a frame longer, motion
+    blur of the first and the last frame is as it is live.
+    """
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig, (-5, 30))
+    strands = scenes.hair(rig, 20)
+    settings = scene.neuralocks
+    settings.subframes = 3
+    for longer in (False, True):
+        settings.use_scene_range, settings.frame_start, settings.frame_end = not longer, 0, 25
+        make_live(rig, strands)
+        assert bpy.ops.neuralocks.bake(filepath=str(folder / "blurred.usdc")) == {"FINISHED"}
+        for time in (0.75, 1.25, 24.25):
+            baked = baked_points(folder / "blurred.usdc", "/Character/Hair_Hair", time)
+            same = apart(baked, points_at(strands, int(time), time % 1)) < SAME
+            assert same == (longer or time == 1.25), (longer, time)
+
+
 def blender_export(folder: Path) -> None:
     """A bake of the scene as Blender itself exports it equals the live view."""
     needs_usd()
