@@ -89,6 +89,10 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     edited.write(hair, points, place)
     joined.remember(hair, prepared.made_of[0])
     hair.data.update_tag()
+    if graph.mode == "RENDER" and bpy.app.version < (4, 0):
+        # The render of an older Blender shows the points of the frame before, unless the object is made anew, too; with its
+        # animation, for it is copied as it is in the viewport, at another frame.
+        hair.update_tag(refresh={"OBJECT", "DATA", "TIME"})
     session.messages.pop(hair.name_full, None)
 
 

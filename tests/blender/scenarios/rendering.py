@@ -4,7 +4,6 @@
 import io
 from contextlib import redirect_stdout
 from pathlib import Path
-from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -115,9 +114,6 @@ def view_layers(folder: Path) -> None:
         drawn = scenes.points(strands, graph_of(scene, scene.view_layers["Char"]))
         assert apart(drawn, shown[8]) < 1e-6 and not messages(), (name, messages())
 
-    if bpy.app.version < (4, 0):
-        return  # as in `by_parts`
-
     class Witness(bpy.types.RenderEngine):
         bl_idname, bl_label = "WITNESS", "Witness"
 
@@ -149,8 +145,6 @@ def motion_blur(folder: Path) -> None:
     """Renderers take live hair for deformed, so they ask for it within the shutter, and get what is shown there; nothing
     is left on it afterwards, nor in a file that is saved meanwhile.
     """
-    if bpy.app.version < (4, 0):
-        raise SkipTest("between frames, hair in this Blender's renders is millimetres off")
     rig = scenes.armature()
     scenes.dance(rig)
     strands, plain, scene = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Plain"), bpy.context.scene
@@ -188,8 +182,6 @@ def by_parts(folder: Path) -> None:
     """A file is rendered in parts, as render farms do, and through the compositor of another scene, by a Blender that has
     just opened it: the hair is that of the whole in all of them; of hair that cannot move the console says so.
     """
-    if bpy.app.version < (4, 0):
-        return  # there the first frame after opening a file is 3 cm off, for a reason not found yet
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)
