@@ -3,6 +3,7 @@
 hair's rest shape then, so what was done to them is done to that.
 """
 
+import zlib
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,10 @@ from .session import session
 
 ROUNDING = 1e-5
 """Points that differ by less, relative to the largest coordinate, are the same."""
+
+
+KEPT = 7
+"""Earlier changes that are known again."""
 
 
 class Written(NamedTuple):
@@ -35,11 +40,36 @@ class Written(NamedTuple):
     modifiers: tuple[str, ...]
 
 
+class Followed(NamedTuple):
+    """What was done to points once, to be known again after an undo: that goes back to before it was done to their rest
+    shape, for Blender remembers each step before it tells of it.
+
+    Attributes:
+        of: the curves.
+        rest: checksum of the rest shape before.
+        points: (P, 3) float32 after.
+        change: the transform (4, 4).
+    """
+
+    of: object
+    rest: int
+    points: np.ndarray
+    change: np.ndarray
+
+
 def write(hair, points: np.ndarray, world: np.ndarray) -> None:
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them."""
     curves.write(hair.data, points)
     places = matrix(hair.matrix_basis), world
     session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys()))
+
+
+def changed(hair) -> bool:
+    """Whether something was done to the points since they were written."""
+    before, data = session.written.get(hair.name_full), hair.data
+    if before is None or before.of != identity(data) or len(before.points) != len(data.points):
+        return False
+    return not np.array_equal(curves.shown(data), before.points)
 
 
 def follow(hair, sampled, world: np.ndarray) -> None:
@@ -55,13 +85,13 @@ def follow(hair, sampled, world: np.ndarray) -> None:
     """
     name, data = hair.name_full, hair.data
     before = session.written.get(name)
-    if before is None or before.of != identity(data):
+    if not curves.has_rest(data):
         return
-    if not curves.has_rest(data) or len(before.points) != len(data.points):
+    if before is None and _follow_again(data):
+        sampled.stale = session.wanting = True  # it may have stood otherwise then
+    if not changed(hair):
         return
     now = curves.shown(data)
-    if np.array_equal(now, before.points):
-        return
     del session.written[name]
     # What is applied to the points is taken from the object's own transform; or, where its parent's was applied with it,
     # from where it stands in the world.
@@ -77,9 +107,27 @@ def follow(hair, sampled, world: np.ndarray) -> None:
             f"{name}: {[*gone, 'its points were changed'][0]} while it was moved, and that is lost, for Live puts the "
             "points back to rest; undo, and do it with Live off"
         )
+    session.followed[:] = [*session.followed[-KEPT:], Followed(before.of, _checksum(data), now, change)]
     curves.move_rest(data, change)
     session.doubtful.add(name)
     if name in sampled.bind_places:  # the hair is where it was, in another space
         back = inverse(change)
         sampled.bind_places[name] = sampled.bind_places[name] @ back
         sampled.motion.places[name] = sampled.motion.places[name] @ back
+
+
+def _follow_again(data) -> bool:
+    """Do to the rest shape what was done to the points, where an undo has brought these back; whether anything was ever
+    done to them.
+    """
+    own = [each for each in session.followed if each.of == identity(data)]
+    if own:
+        now, rest = curves.shown(data), _checksum(data)
+        again = [each.change for each in own if each.rest == rest and np.array_equal(each.points, now)]
+        if again:
+            curves.move_rest(data, again[0])
+    return bool(own)
+
+
+def _checksum(data) -> int:
+    return zlib.crc32(np.ascontiguousarray(curves.points(data)))

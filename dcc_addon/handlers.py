@@ -7,6 +7,7 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
+from .edited import changed
 from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .scene import blur
@@ -49,7 +50,7 @@ def on_update(scene, graph):
         session.failed.clear()
     if names & objects.keys():
         background.doubt()
-    if names & objects.keys() or any(_other_strands(o.original) for o in objects.values()):
+    if names & objects.keys() or any(_edited(o.original) for o in objects.values()):
         live.update(scene, graph)
     _catch_up()
 
@@ -162,9 +163,11 @@ def _catch_up() -> None:
         background.request()
 
 
-def _other_strands(thing) -> bool:
-    """Whether this is live hair that is being edited, or no longer, or was given other strands."""
-    return thing.type == "CURVES" and thing.neuralocks_hair.live and (thing.mode in EDITING or not known(thing))
+def _edited(thing) -> bool:
+    """Whether this is live hair that is being edited, or no longer, or was given other strands or points."""
+    if thing.type != "CURVES" or not thing.neuralocks_hair.live:
+        return False
+    return thing.mode in EDITING or not known(thing) or changed(thing)
 
 
 HANDLERS = {

@@ -6,6 +6,7 @@ and leaves the rest shape, an attribute like any other, in the space of hair tha
 import zlib
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 
 from neuralocks_core.rotation import inverse, transformed
@@ -40,6 +41,11 @@ def remember(hair, rest: int) -> None:
     session.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
 
 
+def forget(hair) -> None:
+    """Live is over for this hair."""
+    session.stood.pop(identity(hair), None)
+
+
 def settle(hair) -> None:
     """Bring the rest shapes of live hair that was joined to this into its space, where that is still to be done: also
     after an undo, which goes back to what Blender itself had made of it.
@@ -49,8 +55,9 @@ def settle(hair) -> None:
         return
     if data.library is not None or not session.stood or not curves.has_rest(data):
         return
-    own, here = identity(hair), matrix(hair.matrix_world)
-    for stood in (stood for number, stood in session.stood.items() if number != own):
+    there = {identity(thing) for scene in bpy.data.scenes for thing in scene.objects}
+    here = matrix(hair.matrix_world)
+    for stood in (stood for number, stood in session.stood.items() if number not in there):
         for part in _parts(data, stood):
             change = inverse(here) @ stood.world
             moved = transformed(stood.points, change)
@@ -63,6 +70,8 @@ def settle(hair) -> None:
 def _parts(data, stood: Stood) -> list[slice]:
     """Where points of a hair object have the very rest shape of hair that was joined to it."""
     rest, count = curves.points(data), len(stood.points)
+    if count >= len(rest):  # a copy of it that was moved
+        return []
     starts = np.flatnonzero((rest == stood.root).all(axis=1))
     parts = [slice(start, start + count) for start in starts.tolist() if start + count <= len(rest)]
     return [part for part in parts if zlib.crc32(np.ascontiguousarray(rest[part])) == stood.rest]

@@ -226,6 +226,7 @@ def rest(hair) -> None:
     """Live is over for this hair: rest shape and modifiers as before, nothing kept."""
     session.forget(hair.name_full)
     show_rest(hair)
+    joined.forget(hair)
 
 
 def show_rest_left(things) -> None:

@@ -58,6 +58,8 @@ class Session:
     hairs: dict[str, object] = field(default_factory=dict)
     written: dict[str, object] = field(default_factory=dict)
     """What the live view wrote to each hair object last; see `edited`."""
+    followed: list = field(default_factory=list)
+    """What was done to the points of live hair; see `edited`."""
     stood: dict[object, object] = field(default_factory=dict)
     """How live hair objects stood then, by identity, those that are gone too; see `joined`."""
     preparing: dict[str, Threaded] = field(default_factory=dict)
