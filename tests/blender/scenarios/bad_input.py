@@ -217,7 +217,7 @@ def into_a_folder(folder: Path) -> None:
     strands, operators = scenes.hair(rig, 10), bpy.ops.neuralocks
     bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
     (folder / "there").mkdir()
-    for write in (operators.bake, operators.bake_attach, operators.export_skel):
+    for write in (operators.bake, operators.export_skel):
         for path in (f"{folder}/there", f"{folder}/there/", f"{folder}/other/"):
             refused(lambda write=write, path=path: write(filepath=path), path, "folder", "name the file")
     assert [each.name for each in folder.iterdir()] == ["there"] and not any((folder / "there").iterdir())
