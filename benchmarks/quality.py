@@ -211,8 +211,8 @@ def table(rows: list[dict], by: str) -> None:
     names = [n for n in rows[0] if n not in ("kind", "style")]
     print(f"\n| {by} | " + " | ".join(names) + " |\n| --- |" + " ---: |" * len(names))
     for key, group in [*groups.items(), ("all", rows)]:
-        with np.errstate(all="ignore"):
-            means = [np.nanmean([row.get(n, np.nan) for row in group]) for n in names]
+        known = ([row[n] for row in group if not np.isnan(row.get(n, np.nan))] for n in names)
+        means = [np.mean(values) if values else np.nan for values in known]
         print(f"| {key} | " + " | ".join(f"{m:.3g}" for m in means) + " |")
 
 
