@@ -68,11 +68,14 @@ def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, int]:
 
 def _pairs(way: list[int], parents, at: np.ndarray, up: np.ndarray) -> list[_Pair]:
     """All pairs of long, mirrored chains of three joints or more along the trunk."""
-    children = [np.flatnonzero(parents == joint) for joint in range(len(parents))]
+    children: list[list[int]] = [[] for _ in parents]
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(joint)
     least = LONG * (at[way[0]] @ up - (at @ up).min())
     pairs = []
     for rank, trunk in enumerate(way[1:]):
-        chains = [_to_the_tip(child, children, at) for child in children[trunk] if child not in way]
+        chains = [_to_the_tip(child, children, parents, at) for child in children[trunk] if child not in way]
         chains = [c for c in chains if len(c) >= 3 and np.linalg.norm(np.diff(at[c], axis=0), axis=1).sum() >= least]
         for i, one in enumerate(chains):
             for other in chains[i + 1 :]:
@@ -92,15 +95,16 @@ def _upright(legs: _Pair, at: np.ndarray, up: np.ndarray) -> bool:
     return way @ up > UPRIGHT * np.linalg.norm(way)
 
 
-def _to_the_tip(joint: int, children, at: np.ndarray) -> list[int]:
+def _to_the_tip(joint: int, children, parents: np.ndarray, at: np.ndarray) -> list[int]:
     """The way from this joint to the joint below it that is farthest from it."""
-    best, stack = [joint], [[joint]]
+    below, stack = [], [joint]
     while stack:
-        chain = stack.pop()
-        if np.linalg.norm(at[chain[-1]] - at[joint]) > np.linalg.norm(at[best[-1]] - at[joint]):
-            best = chain
-        stack += [[*chain, int(child)] for child in children[chain[-1]]]
-    return [int(joint) for joint in best]
+        below.append(stack.pop())
+        stack += children[below[-1]]
+    way = [below[int(np.argmax(np.linalg.norm(at[below] - at[joint], axis=1)))]]
+    while way[-1] != joint:
+        way.append(int(parents[way[-1]]))
+    return way[::-1]
 
 
 def _first_side(pair: _Pair, legs: _Pair | None, at: np.ndarray, up: np.ndarray, sides) -> str | None:
