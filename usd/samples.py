@@ -99,13 +99,13 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
             behind.put(writer.groom, item, velocities, facts)
             store, made = _Store(spool, writer, item, number, plan), None
             for code in plan.codes:
-                held = []
                 if spool.holds(number, code, len(item.groom.points)):
                     resumed += code in plan.wanted
                 else:
                     made = made or poser(item)
-                    held.append(made.points(code))
-                behind.put(store.frame, code, held)
+                    # At once: points that waited for it would lie in memory beside those of the next frame.
+                    spool.write(number, code, made.points(code))
+                behind.put(store.frame, code)
                 done += 1
                 say(done, total, item.path)
             behind.put(store.finish)
@@ -115,16 +115,14 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
 
 
 class _Store:
-    """Takes one groom's points frame by frame: keeps them, writes them, and velocities once both sides are there."""
+    """Writes one groom's points frame by frame, and velocities once both sides are there."""
 
     def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, number: int, plan: Stencils):
         self._spool, self._writer, self._item, self._number, self._plan = spool, writer, item, number, plan
         self._order = Lagging(item.attachment.rig.border.frame)
 
-    def frame(self, code: float, held: list[np.ndarray]) -> None:
-        """The points (P, 3) of the next time code in the list; an empty list if they are in the spool already."""
-        if held:
-            self._spool.write(self._number, code, held.pop())
+    def frame(self, code: float) -> None:
+        """The next time code in the list, whose points are in the spool."""
         if code in self._plan.wanted:
             self._writer.sample(self._item, code, "points", self._points(code))
             self._differences(self._order.after(code))
