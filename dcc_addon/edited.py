@@ -64,7 +64,7 @@ def write(hair, points: np.ndarray, world: np.ndarray) -> None:
     session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys()))
 
 
-def changed(hair) -> bool:
+def touched(hair) -> bool:
     """Whether something was done to the points since they were written."""
     before, data = session.written.get(hair.name_full), hair.data
     if before is None or before.of != identity(data) or len(before.points) != len(data.points):
@@ -89,7 +89,7 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         return
     if before is None and _follow_again(data):
         sampled.stale = session.wanting = True  # it may have stood otherwise then
-    if not changed(hair):
+    if not touched(hair):
         return
     now = curves.shown(data)
     del session.written[name]

@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live
-from .edited import changed
+from .edited import touched
 from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .scene import blur
@@ -167,7 +167,7 @@ def _edited(thing) -> bool:
     """Whether this is live hair that is being edited, or no longer, or was given other strands or points."""
     if thing.type != "CURVES" or not thing.neuralocks_hair.live:
         return False
-    return thing.mode in EDITING or not known(thing) or changed(thing)
+    return thing.mode in EDITING or not known(thing) or touched(thing)
 
 
 HANDLERS = {

@@ -185,15 +185,12 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
 def _find_unnamed_limbs(joints, put, names, sides, parents, positions) -> None:
     """Arms where no arm, and legs where no leg was found."""
     lacking = [
-        {"arm": ("shoulder", "upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}[limb]
-        for limb in ("arm", "leg")
-        if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))
+        limb for limb in ("arm", "leg") if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))
     ]
     if lacking:
-        way = _ancestors(joints["head"], parents)
-        for name, joint in limbs_by_shape(way, parents, positions, sides).items():
-            if any(name.endswith(part) for parts in lacking for part in parts):
-                put(name, joint, f"by its place, '{leaf(names[joint])}'")
+        found = limbs_by_shape(_ancestors(joints["head"], parents), parents, positions, sides)
+        for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
+            put(name, joint, f"by its place, '{leaf(names[joint])}'")
 
 
 def _find_head(names, sides, keys, parents, positions):

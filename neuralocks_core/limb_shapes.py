@@ -27,8 +27,9 @@ class _Pair:
     low: float  # height of the ends
 
 
-def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, int]:
-    """Limb joints of both sides, by semantic name; empty where there are none or their sides cannot be told.
+def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, dict[str, int]]:
+    """Joints of both arms and both legs, 'arm' and 'leg' -> semantic name -> joint; without a pair that is not there, or whose
+    sides cannot be told.
 
     Legs are the pair of chains that ends lowest, arms the widest of those that leave the trunk nearer to the head. Left and
     right are told by the names' sides where there are any, else by where the toes point, else as if the character looked
@@ -52,17 +53,19 @@ def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, int]:
         return {}
     upper = [p for p in pairs if p is not legs and (legs is None or p.rank <= legs.rank)]
     arms = max(upper, key=lambda p: np.linalg.norm(p.span), default=None)
-    found = {}
-    for pair, parts in (
-        (arms, ("shoulder", "upper_arm", "lower_arm", "hand")),
-        (legs, ("", "upper_leg", "lower_leg", "foot")),
+    found: dict[str, dict[str, int]] = {}
+    for limb, pair, parts in (
+        ("arm", arms, ("shoulder", "upper_arm", "lower_arm", "hand")),
+        ("leg", legs, ("", "upper_leg", "lower_leg", "foot")),
     ):
         if pair is None or (first := _first_side(pair, legs, at, up, sides)) is None:
             continue
         second = "right" if first == "left" else "left"
-        for side, chain in zip((first, second), pair.chains, strict=True):
-            joints = _named(chain, parents, at, pair.span / 2, parts)
-            found |= {f"{side}_{part}": joint for part, joint in joints.items()}
+        found[limb] = {
+            f"{side}_{part}": joint
+            for side, chain in zip((first, second), pair.chains, strict=True)
+            for part, joint in _named(chain, parents, at, pair.span / 2, parts).items()
+        }
     return found
 
 

@@ -87,7 +87,8 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
 
-    Arguments are as for `bake`; a joint that its user named as the head is told by the bake. Grooms that have no samples beside some that do are left out, with a note.
+    Arguments are as for `bake`; a joint that its user named as the head is told by the bake. Grooms that have no samples
+    beside some that do are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.

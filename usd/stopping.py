@@ -31,10 +31,8 @@ def stoppable() -> Iterator[None]:
         except BaseException as error:
             if not (stopped() or isinstance(error, KeyboardInterrupt)):
                 raise
-            status, _number = (
-                128 + _number if _number else INTERRUPTED,
-                0,
-            )  # the block around this one has nothing more to say
+            status = 128 + _number if _number else INTERRUPTED
+            _number = 0  # the block around this one has nothing more to say
             print("stopped", file=sys.stderr)
             raise SystemExit(status) from None
 

@@ -66,7 +66,7 @@ def limbs(joints=JOINTS, turn=None, sides=None) -> dict[str, str]:
     places = np.array([place for _, place in joints.values()]) @ (np.eye(3) if turn is None else turn).T
     way = [names.index(name) for name in ("top", "throat", "breast", "waist", "pelvis", "root")]
     found = limbs_by_shape(way, parents, places, sides or [""] * len(names))
-    return {part: names[joint] for part, joint in found.items()}
+    return {part: names[joint] for limb in found.values() for part, joint in limb.items()}
 
 
 def about_y(degrees: float) -> np.ndarray:
