@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
@@ -37,7 +38,7 @@ class Obstacle:
             distance = _stand_in(grid, scalp)
         else:
             distance = _to_surface(grid, *body)
-        field = distance.reshape(self._shape)
+        field = _without_pockets(distance.reshape(self._shape), self._step)
         slope = np.stack(np.gradient(field, self._step), axis=-1)
         self._field = np.concatenate([field[..., None], slope], axis=-1).astype(np.float32).reshape(-1, 4)
 
@@ -99,6 +100,20 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     plane = ((grid - sample[nearest]) * normal[nearest]).sum(axis=1)
     flat = np.clip(2.0 - distance / 0.006, 0.0, 1.0)  # the plane's up to 6 mm away, the sample's beyond 12 mm
     return np.where(plane < 0, -1.0, 1.0) * (flat * np.abs(plane) + (1 - flat) * distance)
+
+
+def _without_pockets(field: np.ndarray, step: float) -> np.ndarray:
+    """Signed distances on a grid whose spacing is `step` [m], where what is shut off from outside is inside as well.
+
+    Heads have eyes and a mouth modelled into them; without this a strand that once got in would find room there.
+    """
+    regions, count = ndimage.label(field > 0.5 * step)  # lips and lids stand a little open
+    if count < 2:
+        return field
+    outside = regions == 1 + np.argmax(np.bincount(regions.ravel())[1:])
+    outside = ndimage.binary_dilation(outside, iterations=2, mask=field > 0)
+    depth = step * (ndimage.distance_transform_edt(~outside) - 1)  # at most the true one: up to a cell more is skin
+    return np.where(outside, field, np.minimum(field, -depth))
 
 
 def _stand_in(points: np.ndarray, scalp: Scalp) -> np.ndarray:

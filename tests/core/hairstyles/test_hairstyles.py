@@ -127,6 +127,20 @@ def test_obstacle_agrees_with_exact_distance():
     assert ((out * (points - CENTRE)).sum(axis=1) / (exact + 0.09) > 0.95)[near].all()
 
 
+def test_a_mouth_is_no_room_for_hair():
+    """A hollow within the head counts as inside, and the way out of it is the way out of the head."""
+    points, triangles = BODY
+    hollow = CENTRE + 0.4 * (points - CENTRE) + [0, 0, 0.03]
+    body = np.concatenate([points, hollow]), np.concatenate([triangles, triangles[:, ::-1] + len(points)])
+    within = CENTRE + [0, 0, 0.055]
+    assert Collider(*body).distance(within[None])[0] > 0.009
+    distance, out = Obstacle(SCALP, body).distance(within[None])
+    assert distance < -0.02
+    assert out[0, 2] > 0.9
+    far = CENTRE + np.array([[0, 0, 0.11], [0.02, 0.1, 0.03], [0, -0.2, 0.1]])
+    np.testing.assert_allclose(Obstacle(SCALP, body).distance(far)[0], OBSTACLE.distance(far)[0], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
