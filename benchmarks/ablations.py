@@ -17,7 +17,7 @@ from pathlib import Path
 import torch
 
 from neuralocks_core.boundary import BoundarySpec
-from neuralocks_core.strands import scalp_local
+from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -90,7 +90,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
 
 def main() -> None:
     """Command line."""
-    from usd.training import training_scene
+    from usd.models.training_scene import training_scene
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("work", type=Path)

@@ -90,7 +90,7 @@ def import_time() -> float:
 
 def brings_torch() -> bool:
     """Whether importing the runtime and the bake imports torch."""
-    code = "import sys, usd.bake, neuralocks_core.runtime, onnxruntime; print('torch' in sys.modules)"
+    code = "import sys, usd.baking.bake, neuralocks_core.runtime, onnxruntime; print('torch' in sys.modules)"
     return "True" in subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout
 
 
@@ -98,7 +98,7 @@ def large_shot(folder: Path, strands: int) -> Path:
     """The shipped shot with its groom's strands repeated beside themselves."""
     from pxr import Usd, UsdGeom, Vt
 
-    from usd.demo import shipped_shot
+    from usd.review.demo import shipped_shot
 
     path = folder / "large.usdc"
     stage = Usd.Stage.CreateNew(str(path))
@@ -142,8 +142,8 @@ def _told(function, *arguments) -> dict:
 
 def _bake(shot, out, model, frames, plain) -> dict:
     from neuralocks_core.runtime import StrandModel
-    from usd.bake import bake
-    from usd.stage import read_shot
+    from usd.baking.bake import bake
+    from usd.shot.stage import read_shot
 
     ready, loaded = read_shot(shot), StrandModel.load(model)
     before, start, busy = _forget_peak(), time.perf_counter(), time.process_time()
@@ -153,8 +153,8 @@ def _bake(shot, out, model, frames, plain) -> dict:
 
 def _infer(shot, out, model, frames, plain) -> dict:
     from neuralocks_core.runtime import StrandModel
-    from usd.posing import GroomPoser
-    from usd.stage import read_shot
+    from usd.baking.posing import GroomPoser
+    from usd.shot.stage import read_shot
 
     ready, loaded = read_shot(shot), StrandModel.load(model)
     start, busy = time.perf_counter(), time.process_time()
@@ -167,7 +167,7 @@ def _infer(shot, out, model, frames, plain) -> dict:
 def _write(shot, out, model, frames, plain) -> dict:
     from pxr import Usd, UsdGeom, Vt
 
-    from usd.stage import read_shot
+    from usd.shot.stage import read_shot
 
     points = read_shot(shot).grooms[0].groom.points.copy()
     start, busy = time.perf_counter(), time.process_time()

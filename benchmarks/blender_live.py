@@ -113,8 +113,8 @@ def shipped_shot(scenes, model: str) -> dict[str, float]:
 def _even(data) -> None:
     """Space the vertices of each strand evenly, as a network's strand has them."""
     from dcc_addon.scene import curves
-    from neuralocks_core.arclength import resample
     from neuralocks_core.groom import Groom
+    from neuralocks_core.strands.arclength import resample
 
     counts = curves.counts(data)
     points = curves.points(data)

@@ -66,8 +66,8 @@ class Inputs:
     """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
 
     def __init__(self, model, real, strands: int):
-        from neuralocks_core.strand_session import strand_inputs
-        from neuralocks_core.strands import scalp_local
+        from neuralocks_core.deformation.strand_session import strand_inputs
+        from neuralocks_core.strands.strand_set import scalp_local
 
         take = np.arange(strands) % len(real.rest)
         codes = model.run("encoder.onnx", "code", shape=scalp_local(real).reshape(len(real.rest), -1))
@@ -113,9 +113,9 @@ class Inputs:
 
 def shipped(model):
     """Strands of the shipped groom, and the boundary vector of the middle of the shipped shot."""
-    from neuralocks_core.strands import strands_on
-    from usd.demo import shipped_shot
-    from usd.stage import read_shot
+    from neuralocks_core.strands.strand_set import strands_on
+    from usd.review.demo import shipped_shot
+    from usd.shot.stage import read_shot
 
     item = read_shot(shipped_shot()).grooms[0]
     character, clip = item.attachment.character, item.attachment.rig.clip

@@ -18,15 +18,15 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core import model
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.locks import lock_mates
+from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.motion import Clip
-from neuralocks_core.random_motion import scripted_clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import StrandSession
-from neuralocks_core.strands import StrandSet
+from neuralocks_core.strands.locks import lock_mates
+from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
 
@@ -42,7 +42,7 @@ SECONDS = 3.0
 
 def main() -> None:
     """Command line."""
-    from usd.training import training_scene
+    from usd.models.training_scene import training_scene
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?", default=None)

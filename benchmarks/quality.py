@@ -27,14 +27,14 @@ import numpy as np
 from real_grooms import on_head
 
 from neuralocks_core import metrics
-from neuralocks_core.collider import Collider
-from neuralocks_core.locks import lock_mates
+from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
-from neuralocks_core.random_motion import KINDS, scripted_clip
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import StrandSession
-from neuralocks_core.strands import strands_on
+from neuralocks_core.strands.locks import lock_mates
+from neuralocks_core.strands.strand_set import strands_on
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
@@ -48,7 +48,7 @@ class Bench:
 
     def __init__(self, character_path: str, styles: list[str] | None, grooms: list[str], shape: int | None):
         from neuralocks_core.hairstyles import STYLES
-        from usd.training import training_scene
+        from usd.models.training_scene import training_scene
 
         scene = training_scene(character_path, ["library"], seed=SEED)
         self.character = scene.character
@@ -137,7 +137,7 @@ def main() -> None:
     if arguments.static:
         models["static"] = StrandModel.load(arguments.static)
     if arguments.motion:
-        from usd.training import read_clip
+        from usd.models.training_scene import read_clip
 
         clips = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character) for path in arguments.motion}
     else:

@@ -58,10 +58,10 @@ def main() -> None:
 
 def rows(paths, model=None, frames=None, training: dict | None = None):
     """Yield the numbers of each file, by column; with `training`, those of a model of its own."""
-    from usd.bake import bake
-    from usd.evaluate import evaluate
-    from usd.stage import read_shot
-    from usd.train import train
+    from usd.baking.bake import bake
+    from usd.models.train import train
+    from usd.review.evaluate import evaluate
+    from usd.shot.stage import read_shot
 
     shot = read_shot(SHOT)
     character = shot.grooms[0].attachment.character
@@ -90,7 +90,7 @@ def write_scene(path: Path, groom: Groom, character) -> Path:
     """The shipped shot with another hair, skinned to its head."""
     from pxr import Gf, Usd, UsdSkel
 
-    from usd.groom import author_groom
+    from usd.assets.groom import author_groom
 
     stage = Usd.Stage.CreateNew(str(path))
     shipped = Usd.Stage.Open(str(SHOT))
@@ -155,7 +155,7 @@ def roots(groom: Groom) -> np.ndarray:
 
 def lengths(groom: Groom) -> np.ndarray:
     """Arc lengths of the strands (S,) [m]."""
-    from neuralocks_core.arclength import arc_lengths
+    from neuralocks_core.strands.arclength import arc_lengths
 
     return arc_lengths(groom)[1]
 

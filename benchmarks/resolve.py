@@ -23,11 +23,11 @@ MEASURED = 4
 def main() -> None:
     """Print the table."""
     from neuralocks_core import metrics
-    from neuralocks_core.resolve import CLAMPED, Resolver
+    from neuralocks_core.deformation.resolve import CLAMPED, Resolver
     from neuralocks_core.runtime import StrandModel
-    from usd.demo import shipped_shot
-    from usd.posing import GroomPoser
-    from usd.stage import read_shot
+    from usd.baking.posing import GroomPoser
+    from usd.review.demo import shipped_shot
+    from usd.shot.stage import read_shot
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model", nargs="?")

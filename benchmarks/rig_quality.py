@@ -17,13 +17,13 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from neuralocks_core import model as model_file  # noqa: E402
+from neuralocks_core.animation.random_motion import KINDS, scripted_clip  # noqa: E402
 from neuralocks_core.motion import Clip  # noqa: E402
-from neuralocks_core.random_motion import KINDS, scripted_clip  # noqa: E402
 from neuralocks_core.rig import RigModel, rig_spec  # noqa: E402
-from neuralocks_core.training.rig_energy import RigMaterial  # noqa: E402
-from neuralocks_core.training.rig_motion import RATE, motion_report, simulate_motions  # noqa: E402
-from neuralocks_core.training.rig_report import hair_points, no_turns, static_report  # noqa: E402
-from usd.rig_stage import read_rigged_hair  # noqa: E402
+from neuralocks_core.training.rig.energy import RigMaterial  # noqa: E402
+from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions  # noqa: E402
+from neuralocks_core.training.rig.report import hair_points, no_turns, static_report  # noqa: E402
+from usd.rig.stage import read_rigged_hair  # noqa: E402
 
 EXAMPLE = ROOT / "examples" / "mesh_hair"
 

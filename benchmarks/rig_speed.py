@@ -21,8 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from neuralocks_core.character import Character, Skeleton
-from neuralocks_core.export_c import export_c
 from neuralocks_core.rig import RigModel, find_chains, rig_spec
+from neuralocks_core.rig.export_c import export_c
 from neuralocks_core.rig.graph import rig_graph
 from neuralocks_core.rig.network import feature_columns, input_limits
 

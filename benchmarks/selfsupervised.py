@@ -18,7 +18,7 @@ import torch
 
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.physics.bend_twist import Cosserat
-from neuralocks_core.strands import scalp_local
+from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -80,7 +80,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
 
 def main() -> None:
     """Command line."""
-    from usd.training import training_scene
+    from usd.models.training_scene import training_scene
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("work", type=Path)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core import rotation
+from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, leap, pulse, swing
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
-from neuralocks_core.puppet import FRONT, SIDE, UP, Puppet, ease, leap, pulse, swing
 
 SECONDS = 10.0
 STEP = 0.54

@@ -21,7 +21,7 @@ COLLAR = -0.25
 
 def build(shot_path=SHOT, strands: int | None = None):
     """Fill the current scene; returns (armature, body, hair objects)."""
-    from usd.stage import read_shot
+    from usd.shot.stage import read_shot
 
     shot = read_shot(shot_path)
     rig = shot.rigs[0]

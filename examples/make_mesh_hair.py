@@ -19,15 +19,15 @@ from typing import NamedTuple
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from neuralocks_core.collider import Collider
-from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.animation.puppet import Puppet
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.motion import Clip
-from neuralocks_core.puppet import Puppet
 from neuralocks_core.rotation import to_quaternion
-from usd.arrays import row_matrix
-from usd.border import Border, open_stage
-from usd.joints import JointSource
-from usd.rig_source import read_rig
+from usd.border.arrays import row_matrix
+from usd.border.units import Border, open_stage
+from usd.skel.joints import JointSource
+from usd.skel.source import read_rig
 
 HERE = Path(__file__).resolve().parent
 

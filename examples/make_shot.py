@@ -17,13 +17,13 @@ sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve
 
 from acting import SECONDS, act
 
-from neuralocks_core.arclength import resample
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import grow
 from neuralocks_core.hairstyles.scalp import Scalp
-from usd.animation import write_animation
-from usd.body import MESH, ROOT, SKELETON, write_body
-from usd.stage import read_rigs
+from neuralocks_core.strands.arclength import resample
+from usd.assets.animation import write_animation
+from usd.assets.body import MESH, ROOT, SKELETON, write_body
+from usd.shot.stage import read_rigs
 
 RATE = 24.0
 VERTICES = 24

@@ -14,9 +14,9 @@ from operator import index
 import numpy as np
 
 from neuralocks_core import rotation
+from neuralocks_core.anatomy.humanoid import SEMANTIC, Humanoid
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.humanoid import SEMANTIC, Humanoid
 from neuralocks_core.measures import MEASURES, body_measures
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.track import Track

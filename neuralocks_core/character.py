@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.humanoid import Humanoid, find_humanoid
 from neuralocks_core.rotation import rotation_part, sizes
 
 HEAD_WIDTHS = (0.08, 0.6)

@@ -20,7 +20,7 @@ class Groom:
     """Strands at rest in metres, world space of the bind pose, Y up.
 
     Vertex counts and strand order are the author's and never change: a bake writes back exactly this
-    topology. Strands with fewer than two distinct points stay in the groom; `strands.StrandSet.valid` keeps
+    topology. Strands with fewer than two distinct points stay in the groom; `strands.strand_set.StrandSet.valid` keeps
     them out of the network.
 
     Arrays are converted to the stated types and made read-only.

@@ -76,16 +76,39 @@ def test_every_module_is_on_the_map(package, section):
     """Or is a package that is."""
     text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"## {section}")[1].split("\n## ")[0]
     named = {word for code in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", code)}
-    there = {path.stem for path in (ROOT / package).glob("[!_]*.py")}
-    there |= {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    folders = {path.parent for path in (ROOT / package).glob("*/__init__.py")}
+    there = {path.stem for path in (ROOT / package).glob("[!_]*.py")} | {folder.name for folder in folders}
+    if package == "usd":
+        there |= {path.stem for folder in folders for path in folder.glob("[!_]*.py")}
     assert there <= named, there - named
+
+
+@pytest.mark.parametrize("package", ["neuralocks_core", "usd"])
+def test_no_folder_imports_one_further_down_the_map(package):
+    text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"\n`{package}/`")[1].split("\n\n")[1]
+    order = [name for row in text.splitlines()[2:] for name in re.findall(r"`(\w+)/`", row.split("|")[1])]
+    assert set(order) == {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    for place, folder in enumerate(order):
+        for path in (ROOT / package / folder).rglob("*.py"):
+            assert not imported(path) & {f"{package}.{later}" for later in order[place + 1 :]}, path
+
+
+def imported(path: Path) -> set[str]:
+    """The folders, as `package.folder`, that a module imports from, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            above = path.relative_to(ROOT).parts[: -node.level] if node.level else ()
+            base = [*above, *(node.module or "").split(".")]
+            found |= {".".join([*base, each.name][:2]) for each in node.names}
+    return found
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_commands_have_the_options_that_are_written(document):
     """Of lines that begin with `neuralocks`; what its commands take stands in the sources of the command line."""
     text = (ROOT / document).read_text("utf-8")
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "usd").glob("*.py"))
+    sources = "".join(path.read_text("utf-8") for path in (ROOT / "usd").rglob("*.py"))
     taken = {f"--{name.replace('_', '-')}" for name in re.findall(r"^    (\w+): ", sources, re.M)}
     taken |= set(re.findall(r"--[a-z][a-z-]+", sources))
     for line in re.findall(r"neuralocks (?:rig )?[a-z]+[^#`\n]*", text):

@@ -3,7 +3,7 @@
 
 import os
 
-from .stopping import stoppable
+from .border.stopping import stoppable
 
 
 def main() -> None:
@@ -12,7 +12,7 @@ def main() -> None:
     # they wait for the next one by spinning: a clip takes a third longer with them. It reads this when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with stoppable():
-        from .cli import main as run
+        from .cli.app import main as run
 
         run()
 

@@ -82,9 +82,9 @@ def bake_steps(context, armature, hairs, path: str):
     stem = Path(full)
     outs = [stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{n + 1}{stem.suffix}") for n in range(len(looks))]
     character, subframes = armature.name_full, scene.neuralocks.subframes
-    yield from loading("usd.bake", "usd.own_layers", "usd.scene_writer")
-    from usd.bake import bake
-    from usd.own_layers import is_own
+    yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
+    from usd.assets.own_layers import is_own
+    from usd.baking.bake import bake
 
     check_ours([*outs, *map(shot_beside, outs)], is_own)
     sampled = yield from sampling(context, named(character), share=0.5)
@@ -216,8 +216,8 @@ def _card(path: str):
     """Steps of measuring a bake; returns the lines of its card."""
     from ..services.card import lines_of
 
-    yield from loading("usd.evaluate")
-    from usd.evaluate import evaluate
+    yield from loading("usd.review.evaluate")
+    from usd.review.evaluate import evaluate
 
     measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
     return lines_of((yield from measuring.steps()))

@@ -108,9 +108,9 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
         shot = shot_beside(out)
-        yield from loading("usd.own_layers", "usd.rig_bake", "usd.scene_writer")
-        from usd.own_layers import is_own
-        from usd.rig_bake import bake_rig
+        yield from loading("usd.assets.own_layers", "usd.rig.bake", "usd.assets.scene_writer")
+        from usd.assets.own_layers import is_own
+        from usd.rig.bake import bake_rig
 
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name))
@@ -133,7 +133,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     filepath: StringProperty(name="File", description="Header to write", default="//neuralocks_hair.h", **FILE)
 
     def work(self, context):
-        from neuralocks_core.export_c import example_beside, export_c, made_here
+        from neuralocks_core.rig.export_c import example_beside, export_c, made_here
 
         if not self.filepath.strip():
             raise NeuralocksError("Export: no file is named; choose where the header is written")

@@ -86,7 +86,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         _checked[python] = yield from asking.steps()
         if _checked[python]:
             raise NeuralocksError(_checked[python])
-        yield from loading("usd.scene_writer")
+        yield from loading("usd.assets.scene_writer")
         sampled = yield from sampling(context, named(name))
         armature, target = named(name), named(wanted)
         stop()

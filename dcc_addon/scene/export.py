@@ -31,7 +31,7 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
     Raises:
         NeuralocksError: the file cannot be written, or the USD libraries are missing.
     """
-    from usd.scene_writer import SceneArrays, hair_path, write_scene
+    from usd.assets.scene_writer import SceneArrays, hair_path, write_scene
 
     motion, rig = sampled.motion, sampled.rig
     bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
@@ -63,8 +63,8 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
 
 def _hair(hair, label: str, sampled):
     """A hair object at rest, as `HairArrays`."""
-    from usd.authoring import Spline
-    from usd.scene_writer import HairArrays
+    from usd.assets.prims import Spline
+    from usd.assets.scene_writer import HairArrays
 
     data, radius = hair.data, curves.radius(hair.data)
     if radius is None or not len(radius):
@@ -84,7 +84,7 @@ def _hair(hair, label: str, sampled):
 
 def _skins(armature, scene, sampled) -> list:
     """The bodies that were sampled, as `SkinArrays`; shape names are unique among all of them."""
-    from usd.scene_writer import SkinArrays
+    from usd.assets.scene_writer import SkinArrays
 
     bodies = [body for body in bodies_of(armature, scene) if body.name_full in sampled.motion.places]
     arrays = [body_reader.read(body, armature) for body in bodies]

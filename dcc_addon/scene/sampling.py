@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from neuralocks_core.cuts import find_cuts
+from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.motion import Clip
 
 from ..services import rig as rig_service

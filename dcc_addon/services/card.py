@@ -3,7 +3,7 @@
 
 import math
 
-from neuralocks_core.report import LABELS, Card
+from neuralocks_core.evaluation.report import LABELS, Card
 
 
 def lines_of(card: Card) -> list[str]:

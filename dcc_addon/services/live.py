@@ -4,14 +4,14 @@
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.carrier import Carrier, Placing
 from neuralocks_core.character import Character
+from neuralocks_core.deformation.carrier import Carrier, Placing
+from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
-from neuralocks_core.resolve import Resolver
 from neuralocks_core.runtime import StrandModel, chunks
-from neuralocks_core.strand_session import StrandSession
-from neuralocks_core.strands import strands_on
+from neuralocks_core.strands.strand_set import strands_on
 
 from .history import SampledBoundary
 

@@ -13,7 +13,7 @@ def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
     if "--check" in sys.argv:
         try:
-            for needed in ("torch", "warp", "onnx", "usd.train"):
+            for needed in ("torch", "warp", "onnx", "usd.models.train"):
                 importlib.import_module(needed)
         except ImportError as error:
             print(f"it lacks '{error.name}'", file=sys.stderr)
@@ -43,7 +43,7 @@ def _printer(stream):
 
 
 def _train_strands(settings: dict, say) -> None:
-    from usd.train import train
+    from usd.models.train import train
 
     say(0, 1, "Reading the character")
     character, minutes = settings["character"], settings["minutes"]
@@ -62,7 +62,7 @@ def _train_strands(settings: dict, say) -> None:
 
 
 def _train_rig(settings: dict, say) -> None:
-    from usd.rig_train import train_rig
+    from usd.rig.train import train_rig
 
     say(0, 1, "Reading the character")
     train_rig(

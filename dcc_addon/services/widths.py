@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from neuralocks_core.arclength import arc_lengths
 from neuralocks_core.groom import Groom
+from neuralocks_core.strands.arclength import arc_lengths
 
 
 def radii(groom: Groom, root: float, tip: float, shape: float, pointed: bool) -> np.ndarray:

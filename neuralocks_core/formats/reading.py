@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core.arclength import count_pointlike
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats import cemyuksel, counted, tressfx, tressfx_text
 from neuralocks_core.formats.look import Look, checked_look
 from neuralocks_core.formats.raw import RawGroom, bad_file
 from neuralocks_core.formats.units import UNITS, metres_per_unit, upward_axis
 from neuralocks_core.groom import LARGEST_COORDINATE, Groom
+from neuralocks_core.strands.arclength import count_pointlike
 
 EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
 """What `read` knows by name; the content decides where it says what it is."""

@@ -13,7 +13,7 @@ from neuralocks_core.hairstyles.growth import Site, evenly, march
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp, from_head
 from neuralocks_core.hairstyles.shaping import shaped
-from neuralocks_core.strands import root_uv
+from neuralocks_core.strands.strand_set import root_uv
 
 STYLES = (*loose.STYLES, *tied.STYLES)
 """Names of the styles that `grow` knows."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulation of hair joint chains: the rods of `training/rig_energy.py` with inertia, many clips at once.
+"""Simulation of hair joint chains: the rods of `training/rig/energy.py` with inertia, many clips at once.
 
 Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per unit of mass a step minimises
 
@@ -26,7 +26,7 @@ class ChainSolver:
 
     Args:
         chains: the hair joints.
-        tree: masses, stiffnesses and rest support (`training.rig_energy.RodTree`).
+        tree: masses, stiffnesses and rest support (`training.rig.energy.RodTree`).
         damping: of motion in the head's frame [1/s].
         weight: times gravity.
         contacts: what meets the body; ends and middles of the bones if left out.

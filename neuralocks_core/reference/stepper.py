@@ -47,7 +47,8 @@ class Stepper:
         device: str,
     ):
         self.wp = wp = start_warp(device)
-        from neuralocks_core.reference import rod_kernels, step_kernels
+        from neuralocks_core.reference.kernels import rod as rod_kernels
+        from neuralocks_core.reference.kernels import step as step_kernels
 
         self.rod_kernels, self.kernels = rod_kernels, step_kernels
         self.device = wp.get_device(device)
@@ -65,7 +66,7 @@ class Stepper:
 
     def _upload_strands(self, rods: RestRods, material: dict[str, np.ndarray], neighbours: np.ndarray) -> None:
         """What stays the same for the whole simulation."""
-        from neuralocks_core.reference import energy_kernels
+        from neuralocks_core.reference.kernels import energy as energy_kernels
 
         wp = self.wp
         self.rest = self._vectors(rods.points)
@@ -85,7 +86,8 @@ class Stepper:
 
     def _empty_state(self, margin: float, collision: float) -> None:
         """Arrays that every step writes, with no body near."""
-        from neuralocks_core.reference import banded_kernels, energy_kernels
+        from neuralocks_core.reference.kernels import banded as banded_kernels
+        from neuralocks_core.reference.kernels import energy as energy_kernels
 
         wp = self.wp
         shape = (self.vertices, self.strands)

@@ -10,7 +10,7 @@ import math
 
 import warp as wp
 
-from neuralocks_core.reference.banded_kernels import array_real, array_vec
+from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
 SMOOTHING = 0.015
 """h [m]; the kernel ends at 2 h. As in `physics.self_collision`."""

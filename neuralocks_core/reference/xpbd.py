@@ -80,7 +80,7 @@ class _Hair:
 
     def __init__(self, rods: RestRods, way: HeadMotion, material: dict, margin: float, gravity: float, device: str):
         self.wp = wp = start_warp(device)
-        from neuralocks_core.reference import xpbd_kernels
+        from neuralocks_core.reference.kernels import xpbd as xpbd_kernels
 
         self.kernels, self.rods, self.way, self.margin, self.device = xpbd_kernels, rods, way, margin, device
         self.strands, vertices = rods.mass.shape

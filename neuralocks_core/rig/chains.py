@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.joint_names import leaf
 
 SAME_AXES = 1e-5
 """Axes that differ by less are the same: one rig read in two programs."""

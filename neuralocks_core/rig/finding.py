@@ -5,9 +5,9 @@ import fnmatch
 
 import numpy as np
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.joint_names import leaf
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_hair
 from neuralocks_core.rig.measuring import measured_chains

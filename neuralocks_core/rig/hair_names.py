@@ -3,7 +3,7 @@
 
 import re
 
-from neuralocks_core.joint_names import leaf
+from neuralocks_core.anatomy.joint_names import leaf
 
 _HAIR = (
     "hair|pony|braid|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|pigtail|twintail|ahoge|kami|mane|plait|dread"

@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.joint_names import leaf
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import rotation_part

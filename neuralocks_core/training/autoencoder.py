@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
-from neuralocks_core.strands import K
+from neuralocks_core.strands.strand_set import K
 
 LATENT, HIDDEN = 32, 256
 """Length of a code, and width of the hidden layers."""

@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from neuralocks_core.onnx_graph import OnnxGraph
-from neuralocks_core.strands import K
+from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
 

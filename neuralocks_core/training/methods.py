@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.strand_session import strand_inputs
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moment_options import SelfSupervisedOptions

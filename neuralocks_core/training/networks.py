@@ -7,7 +7,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core.strands import K
+from neuralocks_core.strands.strand_set import K
 
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")

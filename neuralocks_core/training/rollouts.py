@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.locks import lock_mates
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.motion import Clip
-from neuralocks_core.strands import StrandSet
+from neuralocks_core.strands.locks import lock_mates
+from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
 STEP = 2.0**-15
@@ -205,7 +205,7 @@ class RolloutMaker:
         return rng.uniform(-1, 1, count) * rng.choice([0.0, 0.6])
 
     def _motion(self, rng, shape) -> tuple[Clip, np.ndarray, int]:
-        from neuralocks_core.random_motion import random_clip
+        from neuralocks_core.animation.random_motion import random_clip
 
         scene = self.scene
         span = (scene.frames - 1) * scene.spec.dt

@@ -17,7 +17,7 @@ import torch
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
-from neuralocks_core.strands import scalp_local
+from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.beginning import Beginning, kept_coder

@@ -13,7 +13,7 @@ def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
         listed = set(made.namelist())
     shipped = {"strands.neuralocks", "rig.neuralocks", "shot/shot.usda"}
     assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
-    assert {"usd/cli.py", "neuralocks_core/rig/hair.h.in"} <= listed
+    assert {"usd/cli/app.py", "neuralocks_core/rig/hair.h.in"} <= listed
     assert {name.split("/licenses/")[1] for name in listed if "/licenses/" in name} == {"LICENSE", "CREDITS.md"}
     assert {name.split("/")[0].split("-")[0] for name in listed} == {"neuralocks_core", "usd", "neuralocks"}
     assert not any("__pycache__" in name for name in listed)

@@ -13,7 +13,7 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.report import Card
+from neuralocks_core.evaluation.report import Card
 from neuralocks_core.rotation import from_vector, transformed
 from tests.core.rigs import moved, person
 

@@ -6,7 +6,7 @@ import numpy as np
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
-from neuralocks_core.strands import StrandSet, strand_set
+from neuralocks_core.strands.strand_set import StrandSet, strand_set
 
 NAMES = ("hips", "hips/spine", "hips/spine/neck", "hips/spine/neck/head", "hips/spine/arm_L", "hips/spine/arm_R")
 PARENTS = (-1, 0, 1, 2, 1, 1)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core import metrics
+from neuralocks_core.evaluation.pose_energies import curvature, energies, stretch_energy
 from neuralocks_core.materials import Material
-from neuralocks_core.pose_energies import curvature, energies, stretch_energy
 
 TIMES = np.arange(0, 4, 1 / 50)
 LENGTH = np.array([0.3, 0.5])

@@ -12,12 +12,12 @@ import pytest
 
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
-from neuralocks_core.clumping import COLUMN, Locks
+from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import StrandSession, strand_inputs
-from neuralocks_core.strands import scalp_local, strand_set
+from neuralocks_core.strands.strand_set import scalp_local, strand_set
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 from neuralocks_core.training.autoencoder import StrandAutoencoder  # noqa: E402

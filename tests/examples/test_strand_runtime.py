@@ -10,8 +10,8 @@ from pxr import Usd, UsdGeom, Vt
 from examples.strand_runtime import largest_difference
 from neuralocks_core import model as model_file
 from tests.usd.shots import Recipe, strand_points, write_shot
-from usd.bake import bake
-from usd.export import export_model
+from usd.baking.bake import bake
+from usd.models.export import export_model
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.network import feature_columns, input_limits
-from usd.rig_stage import BAKED
+from usd.rig.stage import BAKED
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
 

@@ -7,11 +7,11 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
-from usd.bake import bake
-from usd.inspect import inspect
-from usd.rig_bake import bake_rig
-from usd.spool import Spool
-from usd.stage import read_shot
+from usd.baking.bake import bake
+from usd.baking.spool import Spool
+from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.shot.stage import read_shot
 
 from .shots import JOINTS, Recipe, write_shot
 
@@ -289,7 +289,7 @@ def test_no_space_and_read_only_folders(tmp_path, model, monkeypatch):
     monkeypatch.setattr(Spool, "write", full)
     with pytest.raises(NeuralocksError, match="no space left"):
         bake(shot, tmp_path / "out.usdc", model)
-    monkeypatch.setattr("usd.samples.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))
+    monkeypatch.setattr("usd.baking.samples.shutil.disk_usage", lambda folder: type("Usage", (), {"free": 1000}))
     with pytest.raises(NeuralocksError, match="needs"):
         bake(shot, tmp_path / "out.usdc", model)
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "file"}

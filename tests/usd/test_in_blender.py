@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from usd.bake import bake
+from usd.baking.bake import bake
 
 from ..blenders import installed
 from .shots import Recipe, samples, world_points, write_shot

@@ -7,14 +7,14 @@ import pytest
 from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
-from usd.bake import bake
-from usd.body import write_body
-from usd.demo import demo
-from usd.export import export_model
-from usd.groom import import_groom
-from usd.grow import grow
-from usd.inspect import inspect
-from usd.stage import read_shot
+from usd.assets.body import write_body
+from usd.assets.groom import import_groom
+from usd.assets.grow import grow
+from usd.baking.bake import bake
+from usd.models.export import export_model
+from usd.review.demo import demo
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
 
 from .shots import Recipe, write_shot
 

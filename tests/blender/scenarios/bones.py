@@ -59,7 +59,7 @@ def bones(folder: Path) -> None:
 
     scene.neuralocks.output = str(folder / "bakes" / "hair.usdc")
     assert bpy.ops.neuralocks.export_skel() == {"FINISHED"}
-    from usd.stage import read_rigs
+    from usd.shot.stage import read_rigs
 
     written = read_rigs(folder / "bakes" / "hair_rig.usdc")[0]
     leaves = [name.split("/")[-1] for name in written.character.skeleton.names]

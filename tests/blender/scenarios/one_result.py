@@ -8,7 +8,17 @@ import numpy as np
 from mathutils import Matrix
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
+from tests.blender.checks import (
+    MODEL,
+    SAME,
+    apart,
+    baked_points,
+    make_live,
+    messages,
+    needs_usd,
+    points_at,
+    refused,
+)
 
 
 def one_result(folder: Path) -> None:
@@ -35,7 +45,7 @@ def one_result(folder: Path) -> None:
     for f in frames:
         assert apart(baked_points(folder / "bake.usdc", "/Character/Hair_Hair", f), shown[f]) < SAME
 
-    from usd.bake import bake
+    from usd.baking.bake import bake
 
     words = ["bend=2x", "weight=1.3x", "damping=1x", "clumping=2x"]
     bake(folder / "bake_shot.usdc", folder / "again.usdc", MODEL, material=words, strength=0.8)
@@ -63,7 +73,7 @@ def out_of_the_body(folder: Path) -> None:
         assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", f), points) < SAME
     # A body that differs in its seventh digit pushes some strand elsewhere.
     from dcc_addon.session import session
-    from usd.stage import read_shot
+    from usd.shot.stage import read_shot
 
     read = read_shot(folder / "out_shot.usdc").grooms[0].attachment.character
     assert np.array_equal(read.body.points, session.rigs["Rig"].character.body.points)
@@ -210,7 +220,7 @@ def _equal_when_exported(folder: Path, strands, **options) -> None:
     """A bake of the scene as Blender itself exports it shows what is live."""
     from pxr import Usd, UsdGeom
 
-    from usd.bake import bake
+    from usd.baking.bake import bake
 
     shown = {f: points_at(strands, f) for f in (2, 13, 24)}
     strands.neuralocks_hair.live = False

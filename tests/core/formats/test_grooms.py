@@ -14,7 +14,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats import cemyuksel
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
-from neuralocks_core.strands import strand_set
+from neuralocks_core.strands.strand_set import strand_set
 from tests.core.formats.groom_files import COUNTS, FILES, POINTS, put, tressfx_text
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "grooms"

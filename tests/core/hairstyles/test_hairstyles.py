@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from neuralocks_core.collider import Collider
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles import MOST_STRANDS, STYLES, Obstacle, Scalp, from_head, grow
-from neuralocks_core.strands import strand_set
+from neuralocks_core.strands.strand_set import strand_set
 
 CENTRE = np.array([0.0, 1.66, 0.03])
 

@@ -18,12 +18,12 @@ from neuralocks_core.rig.network import feature_columns
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_quaternion, from_vector
-from neuralocks_core.training import rig_dynamic
-from neuralocks_core.training.rig import train_static
-from neuralocks_core.training.rig_body import BodyPatch
-from neuralocks_core.training.rig_contact import HairOnBodies, Moments
-from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree
-from neuralocks_core.training.rig_report import hair_points, no_turns
+from neuralocks_core.training.rig import dynamic as rig_dynamic
+from neuralocks_core.training.rig.body import BodyPatch
+from neuralocks_core.training.rig.contact import HairOnBodies, Moments
+from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial, RodTree
+from neuralocks_core.training.rig.report import hair_points, no_turns
+from neuralocks_core.training.rig.train import train_static
 from tests.core.rig.builders import character, tail
 
 RADIUS = 0.12
@@ -105,7 +105,7 @@ def test_bodies_in_motion_are_those_that_were_met():
 
 def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
     """Half of a batch: there the same answer costs more than in new poses; renewed poses are forgotten."""
-    monkeypatch.setattr("neuralocks_core.training.rig_contact.HARD", 16)
+    monkeypatch.setattr("neuralocks_core.training.rig.contact.HARD", 16)
     rig = on_a_ball()
     points = np.random.default_rng(0).normal(0, 1, (40, 3))
     points = CENTRE + 1.3 * RADIUS * points / np.linalg.norm(points, axis=1, keepdims=True)

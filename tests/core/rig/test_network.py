@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.export_c import export_c
 from neuralocks_core.rig import RigModel, rig_spec
+from neuralocks_core.rig.export_c import export_c
 from neuralocks_core.rig.graph import rig_graph
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_quaternion

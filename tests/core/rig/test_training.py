@@ -17,13 +17,13 @@ from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, skin
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_quaternion
-from neuralocks_core.training import rig_dynamic
-from neuralocks_core.training.rig import train_static
-from neuralocks_core.training.rig_body import posed_distances, rest_distances
-from neuralocks_core.training.rig_dynamic import train_dynamic
-from neuralocks_core.training.rig_energy import RigEnergy, RigMaterial, RodTree, bounded_turns
-from neuralocks_core.training.rig_motion import SPRINGS, motion_report
-from neuralocks_core.training.rig_poses import PosePool
+from neuralocks_core.training.rig import dynamic as rig_dynamic
+from neuralocks_core.training.rig.body import posed_distances, rest_distances
+from neuralocks_core.training.rig.dynamic import train_dynamic
+from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial, RodTree, bounded_turns
+from neuralocks_core.training.rig.motion import SPRINGS, motion_report
+from neuralocks_core.training.rig.poses import PosePool
+from neuralocks_core.training.rig.train import train_static
 from tests.core.rig.builders import character, random_model, tail
 
 

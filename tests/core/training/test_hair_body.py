@@ -4,8 +4,8 @@
 import numpy as np
 import trimesh
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Body, Character, Skeleton
-from neuralocks_core.collider import Collider
 from neuralocks_core.training.hair_body import hair_body
 
 from .. import rigs

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from neuralocks_core import model
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.random_motion import scripted_clip
 from tests.core.rigs import person, straight_hair
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.strand_session import StrandSession
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.regression import RegressionOptions

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
+
+The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
+capital), parts by their usual names (limbs by `limb_shapes` where none is named like one), and the trunk by hierarchy: the
+upper chest is where the ways from the head and from the arms meet.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neuralocks_core.anatomy.joint_names import leaf, sides_and_keys
+from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
+from neuralocks_core.errors import NeuralocksError
+
+PARTS = {
+    "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "humerus", "armupper"),
+    "lower_arm": ("lowerarm", "forearm", "lowarm", "elbow", "armlower", "loarm"),
+    "hand": ("hand", "wrist"),
+    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "hip", "femur"),
+    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leg"),
+    "foot": ("foot", "ankle"),
+    "eye": ("eye", "eyeball"),
+}
+TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
+SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
+_NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
+
+
+class NoHead(NeuralocksError):
+    """No joint of a rig is named like a head."""
+
+
+@dataclass(frozen=True)
+class Humanoid(Mapping):
+    """Semantic name -> joint index; `reasons` says in words how each one was found."""
+
+    joints: dict[str, int]
+    reasons: dict[str, str] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> int:
+        try:
+            return self.joints[name]
+        except KeyError:
+            raise NeuralocksError(
+                f"skeleton: no joint found for '{name}'; name it by hand (--head JOINT, or --joint MEANING=JOINT)"
+            ) from None
+
+    def get(self, name: str, default=None):
+        """The joint index, or `default` where the rig has no such joint."""
+        return self.joints.get(name, default)
+
+    def __contains__(self, name) -> bool:
+        return name in self.joints
+
+    def __iter__(self):
+        return iter(self.joints)
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def nearest(self, name: str) -> int:
+        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can drive a
+        model.
+        """
+        side = name.split("_")[0] if name.split("_")[0] in ("left", "right") else ""
+        ways = {
+            "neck": ["neck", "head"],
+            "upper_chest": ["upper_chest", "chest", "spine", "hips", "neck", "head"],
+        }
+        if side:
+            part = name[len(side) + 1 :]
+            arm = ["upper_arm", "shoulder"] if part != "shoulder" else ["shoulder"]
+            way = [name] + [f"{side}_{p}" for p in arm] + ways["upper_chest"]
+        else:
+            way = ways.get(name, [name, "hips", "head"])
+        return next(self.joints[step] for step in way if step in self.joints)
+
+
+def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None = None) -> Humanoid:
+    """Map semantic names to joints.
+
+    Args:
+        names: joint paths (J), separated by `/`.
+        parents: (J,) parent indices, -1 for roots.
+        positions: bind positions (J, 3), which tell the head from what else hangs on the neck, and limbs whose names say
+            nothing.
+        by_hand: semantic name -> joint path or its last part; overrides what is found.
+
+    Raises:
+        NoHead: no joint is named like one.
+        NeuralocksError: a joint given by hand does not exist.
+    """
+    names, parents = list(names), np.asarray(parents, int)
+    joints: dict[str, int] = {}
+    reasons: dict[str, str] = {}
+
+    def put(name, joint, reason):
+        if joint is not None and name not in joints:
+            joints[name], reasons[name] = int(joint), reason
+
+    for name, wanted in (by_hand or {}).items():
+        if name not in SEMANTIC:
+            raise NeuralocksError(f"--joint {name}=...: there is no such meaning; use one of {', '.join(SEMANTIC)}")
+        put(name, find_joint(names, wanted), "given by hand")
+
+    parts = {word for words in PARTS.values() for word in words}
+    sides, keys = zip(*sides_and_keys([leaf(name) for name in names], parts), strict=True)
+    for side in ("left", "right"):
+        for part, joint in _limbs(side, sides, keys, parents).items():
+            put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
+    put("head", *_find_head(names, sides, keys, parents, positions))
+    if "head" not in joints:
+        raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
+    if positions is not None:
+        _find_unnamed_limbs(joints, put, names, sides, parents, positions)
+    _find_trunk(joints, put, names, keys, parents)
+    ordered = {name: joints[name] for name in SEMANTIC if name in joints}
+    return Humanoid(ordered, {name: reasons[name] for name in ordered})
+
+
+def find_joint(names, wanted: str) -> int:
+    """Index of the joint with this path or this unique last part.
+
+    Raises:
+        NeuralocksError: there is none, or several.
+    """
+    hits = [i for i, name in enumerate(names) if name == wanted] or [
+        i for i, name in enumerate(names) if leaf(name) == wanted
+    ]
+    if len(hits) != 1:
+        fact = (
+            "several joints have that name; give its full path"
+            if hits
+            else f"no such joint; it has {', '.join(map(leaf, names[:12]))} ..."
+        )
+        raise NeuralocksError(f"joint '{wanted}': {fact}")
+    return hits[0]
+
+
+def _depth(joint: int, parents) -> int:
+    depth = 0
+    while parents[joint] >= 0:
+        joint, depth = parents[joint], depth + 1
+    return depth
+
+
+def _ancestors(joint: int, parents) -> list[int]:
+    way = []
+    while joint >= 0:
+        way.append(int(joint))
+        joint = parents[joint]
+    return way
+
+
+def _limbs(side, sides, keys, parents) -> dict[str, int]:
+    """The side's limb joints: of several with one name (upperarm01, upperarm02) the one nearest the root."""
+
+    def first(options):
+        for option in options:
+            hits = [i for i in range(len(keys)) if sides[i] == side and keys[i] == option]
+            if hits:
+                # `LHipJoint` over `LeftHip` is a mere socket at the pelvis: of several hips, the lowest is the thigh.
+                sign = -1 if option == "hip" else 1
+                return min(hits, key=lambda i: (sign * _depth(i, parents), i))
+        return None
+
+    found = {part: first(options) for part, options in PARTS.items()}
+    collar = first(("clavicle", "collar", "collarbone", "clav"))
+    plain = first(("shoulder",))
+    if found["upper_arm"] is None and plain is not None:
+        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no
+        # arm is named.
+        found["upper_arm"], found["shoulder"] = plain, collar
+    if found["upper_arm"] is None and found["lower_arm"] is not None and parents[found["lower_arm"]] >= 0:
+        found["upper_arm"] = int(parents[found["lower_arm"]])
+    if found["shoulder"] is not None and found["shoulder"] == found["upper_arm"]:
+        found["shoulder"] = None
+    return {part: joint for part, joint in found.items() if joint is not None}
+
+
+def _find_unnamed_limbs(joints, put, names, sides, parents, positions) -> None:
+    """Arms where no arm, and legs where no leg was found."""
+    lacking = [
+        limb for limb in ("arm", "leg") if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))
+    ]
+    if lacking:
+        found = limbs_by_shape(_ancestors(joints["head"], parents), parents, positions, sides)
+        for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
+            put(name, joint, f"by its place, '{leaf(names[joint])}'")
+
+
+def _find_head(names, sides, keys, parents, positions):
+    def score(i):
+        key = keys[i]
+        return (key != "head", not key.endswith("head"), _depth(i, parents), i)
+
+    def beside_head(i):
+        """Tails of hair hang from necks too: the head is in the middle, and farthest along the neck."""
+        at = None if positions is None else np.asarray(positions, float)
+        along = 0.0 if at is None or parents[neck] < 0 else (at[i] - at[neck]) @ (at[neck] - at[parents[neck]])
+        return (bool(sides[i]), any(bad in keys[i] for bad in _NOT_HEAD), -along, i)
+
+    hits = [
+        i
+        for i in range(len(keys))
+        if "head" in keys[i] and not sides[i] and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)
+    ]
+    if hits:
+        best = min(hits, key=score)
+        return best, f"by name '{leaf(names[best])}'"
+    necks = [i for i in range(len(keys)) if "neck" in keys[i] and not sides[i]]
+    if necks:
+        neck = max(necks, key=lambda i: _depth(i, parents))
+        children = [i for i in range(len(keys)) if parents[i] == neck]
+        if children:
+            return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
+    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the
+    # head.
+    spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
+    if len(spine) >= 5:
+        best = max(spine, key=lambda i: _depth(i, parents))
+        return best, f"last joint of the spine '{leaf(names[best])}'"
+    return None, ""
+
+
+def _find_trunk(joints, put, names, keys, parents) -> None:
+    head_way = _ancestors(joints["head"], parents)
+
+    def meet(*others):
+        shared = set(head_way)
+        for other in others:
+            shared &= set(_ancestors(other, parents))
+        return next((joint for joint in head_way if joint in shared and joint != joints["head"]), None)
+
+    arms = [joints[n] for n in ("left_upper_arm", "right_upper_arm") if n in joints]
+    legs = [joints[n] for n in ("left_upper_leg", "right_upper_leg") if n in joints]
+    if arms:
+        put("upper_chest", meet(*arms), "where the ways from head and arms meet")
+    if legs:
+        put("hips", meet(*legs), "where the ways from head and legs meet")
+    between = head_way[1:]
+    if "upper_chest" in joints and joints["upper_chest"] in between:
+        between = between[: between.index(joints["upper_chest"])]
+    named = [joint for joint in between if "neck" in keys[joint]]
+    # `MCH-ROT-neck` over `neck` is a control rig's help, and does not turn with it.
+    named = [joint for joint in named if keys[joint] == "neck"] or named
+    neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
+    put("neck", neck, f"between head and chest, '{leaf(names[neck])}'" if neck is not None else "")
+    if "upper_chest" in joints:
+        below = head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
+        if "hips" in joints and joints["hips"] in below:
+            below = below[: below.index(joints["hips"])]
+        if below:
+            put("chest", below[0], "below the upper chest")
+            put("spine", below[-1], "above the hips")
+    else:
+        put("upper_chest", head_way[min(2, len(head_way) - 1)], "two joints below the head")
+    put("hips", head_way[-1], "root of the trunk")

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which way is up in a bind pose: what of the turn of a character's parents is axes, and what is pose."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from neuralocks_core.anatomy.humanoid import Humanoid
+from neuralocks_core.rotation import angle_between, rotation_part
+
+SAME = 1e-6
+"""Entries of rotations that differ by less are the same."""
+STRAIGHTER = 45.0
+"""A quarter turn that brings legs, or a trunk without legs, nearer to the vertical than the nearest one does, by more than
+this [degrees], is meant in its place."""
+ASKEW = 10.0
+"""Legs and trunk that are less off the vertical by more than this [degrees], each, where they are than by any quarter turn
+were built askew."""
+NEAR = 30.0
+"""Where nothing tells what is up, the nearest quarter turn is meant if it is this near [degrees]."""
+FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
+
+
+def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> np.ndarray:
+    """The turn and scale that a character's parents give it in its bind pose.
+
+    Quarter turns are what an exporter did to the axes: the nearest one is taken, or one in which the character stands
+    where it lies by that. By other angles parents turn a character as a joint would: one that leans with its parent has
+    the bind pose of one that stands.
+
+    Args:
+        placed: their turn and scale (3, 3) at rest.
+        joints: places (J, 3) in the bind pose, without them.
+        humanoid: which of these are head, hips and feet.
+        up: the direction (3,) that is up where the parents are.
+
+    Returns:
+        (3, 3); `placed` itself, bit for bit, where that turns by quarters or the character was built askew.
+    """
+    here = rotation_part(placed)
+    if np.abs(here - np.eye(3)).max() < SAME:
+        return placed
+    legs, trunk = _axes(joints, humanoid)
+    found = [axis for axis in (legs, trunk) if axis is not None]
+
+    def tilt(turn: np.ndarray, axis: np.ndarray) -> float:
+        return np.degrees(np.arccos(np.clip(up @ turn @ axis, -1, 1)))
+
+    quarters = sorted(Rotation.create_group("O").as_matrix().round(), key=lambda turn: -round(np.sum(turn * here), 9))
+    turn = quarters[0]
+    if found:
+        # Legs are upright on two feet and on four; a trunk without legs may be either's.
+        others = quarters if legs is not None else [np.eye(3)]
+        turn = next((o for o in others if tilt(o, found[0]) < tilt(turn, found[0]) - STRAIGHTER), turn)
+        if all(tilt(here, axis) < tilt(turn, axis) - ASKEW for axis in found):
+            return placed
+    elif np.degrees(angle_between(turn, here)) > NEAR:
+        return placed
+    return placed if np.abs(turn - here).max() < SAME else turn @ here.T @ placed
+
+
+def _axes(joints: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Directions (3,) from the feet to the hips and from the hips to the head; None where these are not known."""
+    feet = [joints[humanoid[name]] for name in FEET if name in humanoid]
+    head, hips = (joints[humanoid[name]] if name in humanoid else None for name in ("head", "hips"))
+    legs = hips - np.mean(feet, axis=0) if feet and hips is not None else None
+    trunk = head - hips if head is not None and hips is not None else None
+    return tuple(None if a is None or not np.linalg.norm(a) else a / np.linalg.norm(a) for a in (legs, trunk))

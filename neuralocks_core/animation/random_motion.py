@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion where there is no motion capture: random clips to learn from, scripted ones to be judged by.
+
+Both come from the same gestures, with sizes and timings of people; the scripted clips' are fixed and lie between the
+random ones'.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip, G
+
+KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
+REST = 0.3
+"""[s] A random clip begins still, so that hair at rest is its true beginning."""
+
+
+def random_clip(
+    character: Character,
+    rng: np.random.Generator,
+    seconds: float,
+    rate: float = 30.0,
+    shape: np.ndarray | None = None,
+) -> Clip:
+    """A random motion of one to three gestures over swaying and posture.
+
+    Args:
+        character: who moves.
+        rng: source of all chance; the same state gives the same clip.
+        seconds: length.
+        rate: samples a second.
+        shape: blend shape weights (B,).
+    """
+    times = np.arange(round(seconds * rate) + 1) / rate
+    puppet = Puppet(character, times)
+    chosen = rng.choice(KINDS, size=int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2])))
+    _posture(puppet, rng)
+    if "hold" not in chosen and rng.random() < 0.4:
+        _fidget(puppet, rng)
+    for kind in dict.fromkeys(str(k) for k in chosen):
+        _GESTURES[kind](puppet, _Dice(rng, seconds))
+    return puppet.clip(shape)
+
+
+def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: float = 30.0) -> Clip:
+    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
+
+    Raises:
+        NeuralocksError: the kind is none of KINDS.
+    """
+    if kind not in KINDS:
+        raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(KINDS)}")
+    times = np.arange(round(seconds * rate) + 1) / rate
+    puppet = Puppet(character, times)
+    _GESTURES[kind](puppet, _Dice(None, seconds))
+    return puppet.clip()
+
+
+class _Dice:
+    """Numbers between limits: random, or always the same one near the middle for scripted clips."""
+
+    def __init__(self, rng: np.random.Generator | None, seconds: float):
+        self.rng, self.seconds = rng, seconds
+
+    def between(self, low: float, high: float) -> float:
+        return low + 0.55 * (high - low) if self.rng is None else float(self.rng.uniform(low, high))
+
+    def sign(self) -> float:
+        return 1.0 if self.rng is None else float(self.rng.choice([-1.0, 1.0]))
+
+    def start(self, latest_share: float = 0.5) -> float:
+        """When a gesture begins [s]."""
+        return 0.5 if self.rng is None else self.between(REST, max(REST + 0.01, latest_share * self.seconds))
+
+    def repeats(self) -> int:
+        return 2 if self.rng is None else int(self.rng.integers(1, 4))
+
+    def direction(self) -> np.ndarray:
+        """A level unit vector."""
+        angle = self.between(0, 2 * np.pi)
+        return np.array([np.sin(angle), 0.0, np.cos(angle)])
+
+
+def _posture(puppet: Puppet, rng) -> None:
+    """Where head, trunk and arms are held through the clip; changed once, slowly, in some."""
+    still = (
+        np.ones(len(puppet.times))
+        if rng.random() < 0.5
+        else ease(puppet.times, rng.uniform(0.3, 1.5), rng.uniform(0.4, 1.5))
+    )
+    puppet.turn_neck(still[:, None] * rng.normal(size=3) * [0.15, 0.25, 0.08])
+    puppet.bend_spine(still[:, None] * rng.normal(size=3) * [0.12, 0.12, 0.06])
+    for side in ("left", "right"):
+        if rng.random() < 0.3:
+            lift = ease(puppet.times, rng.uniform(0.3, 2.0), rng.uniform(0.3, 1.0)) * rng.uniform(0.3, 2.2)
+            out = FRONT if side == "left" else -FRONT
+            axis = out * rng.uniform(0.2, 1.0) - SIDE * rng.uniform(0.0, 1.0)
+            puppet.turn_further(f"{side}_upper_arm", lift[:, None] * axis)
+            puppet.turn(f"{side}_shoulder", 0.15 * lift[:, None] * out)
+
+
+def _fidget(puppet: Puppet, rng) -> None:
+    size = rng.uniform(0.2, 1.0)
+    highest = rng.uniform(0.5, 2.5)
+    puppet.turn_neck(size * noise(puppet.times, rng, highest) * [0.12, 0.2, 0.08])
+    puppet.bend_spine(size * noise(puppet.times, rng, 0.7) * [0.05, 0.06, 0.04])
+    puppet.position += size * noise(puppet.times, rng, 0.9) * [0.03, 0.01, 0.03]
+
+
+def _shake(puppet: Puppet, dice: _Dice) -> None:
+    wave = swing(puppet.times, dice.start(), dice.between(2, 5), dice.between(1.0, 2.6))
+    puppet.turn_neck(wave[:, None] * UP * dice.sign() * dice.between(0.2, 0.75))
+
+
+def _turn(puppet: Puppet, dice: _Dice) -> None:
+    start = dice.start(0.3)
+    for _ in range(dice.repeats()):
+        attack, hold, release = dice.between(0.2, 0.8), dice.between(0.1, 1.0), dice.between(0.2, 0.8)
+        angle = dice.sign() * dice.between(0.4, 1.3)
+        curve = pulse(puppet.times, start, attack, hold, release)
+        puppet.turn_neck(curve[:, None] * UP * angle)
+        if dice.between(0, 1) > 0.5:
+            puppet.turn("root", ease(puppet.times, start, 2 * attack)[:, None] * UP * angle * dice.between(0.3, 2.4))
+        start += attack + hold + release + dice.between(0.1, 0.6)
+
+
+def _nod(puppet: Puppet, dice: _Dice) -> None:
+    wave = swing(puppet.times, dice.start(), dice.between(2, 4), dice.between(0.8, 2.2))
+    puppet.turn_neck(wave[:, None] * SIDE * dice.between(0.15, 0.5))
+
+
+def _bow(puppet: Puppet, dice: _Dice) -> None:
+    curve = pulse(puppet.times, dice.start(0.3), dice.between(0.4, 1.2), dice.between(0.2, 1.5), dice.between(0.4, 1.2))
+    angle = dice.between(0.3, 1.4)
+    puppet.bend_spine(curve[:, None] * SIDE * angle)
+    puppet.turn_neck(curve[:, None] * SIDE * dice.between(-0.2, 0.5))
+
+
+def _tilt(puppet: Puppet, dice: _Dice) -> None:
+    start = dice.start(0.3)
+    for _ in range(dice.repeats()):
+        attack, hold = dice.between(0.25, 0.7), dice.between(0.2, 0.9)
+        curve = pulse(puppet.times, start, attack, hold, attack)
+        puppet.turn_neck(curve[:, None] * (FRONT + 0.2 * SIDE) * dice.sign() * dice.between(0.2, 0.75))
+        start += 2 * attack + hold + 0.2
+
+
+def _sway(puppet: Puppet, dice: _Dice) -> None:
+    wave = swing(puppet.times, dice.start(0.2), dice.between(2, 5), dice.between(0.4, 1.2))[:, None]
+    puppet.position += wave * dice.direction() * dice.between(0.03, 0.12)
+    puppet.bend_spine(wave * FRONT * dice.sign() * dice.between(0.0, 0.2))
+
+
+def _translate(puppet: Puppet, dice: _Dice) -> None:
+    start = dice.start(0.3)
+    for _ in range(dice.repeats()):
+        duration = dice.between(0.3, 0.9)
+        puppet.position += ease(puppet.times, start, duration)[:, None] * dice.direction() * dice.between(0.15, 1.0)
+        start += duration + dice.between(0.1, 0.8)
+
+
+def _jump(puppet: Puppet, dice: _Dice) -> None:
+    start = dice.start(0.3)
+    for _ in range(dice.repeats()):
+        height, deep, down = dice.between(0.08, 0.4), dice.between(0.08, 0.2), dice.between(0.25, 0.45)
+        rise, over = leap(puppet.times, start, height, deep, dice.between(0.5, 0.9) * deep, down, 0.45)
+        puppet.position += rise[:, None] * UP
+        puppet.bend_spine(pulse(puppet.times, start, down, 0.0, 0.3)[:, None] * SIDE * 0.3)
+        start = over + dice.between(-0.2, 0.5)
+
+
+def _walk(puppet: Puppet, dice: _Dice) -> None:
+    """Walking from the first sample or from a standing start; hips bob twice a stride."""
+    times, steps = puppet.times, dice.between(1.5, 2.6)
+    speed = 0.75 * steps * dice.between(0.7, 1.1)
+    begin = dice.start(0.2)
+    going = ease(times, begin, 0.8) - ease(times, times[0] + dice.seconds * dice.between(0.6, 1.2), 0.7)
+    phase = np.pi * steps * (times - begin)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (going[1:] + going[:-1]) * np.diff(times))]) * speed
+    bob = dice.between(0.015, 0.05) * (steps / 2) ** 2
+    puppet.position += way[:, None] * FRONT + (going * bob * np.cos(2 * phase) - going * bob)[:, None] * UP
+    puppet.position += (going * 0.02 * np.sin(phase))[:, None] * SIDE
+    puppet.bend_spine((going * 0.1 * np.sin(phase))[:, None] * UP + (going * 0.05)[:, None] * SIDE)
+    puppet.turn_neck((-going * 0.05 * np.sin(phase))[:, None] * UP)
+    stride = going * dice.between(0.3, 0.55)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        leg = stride * np.sin(phase) * sign
+        puppet.turn(f"{side}_upper_leg", -leg[:, None] * SIDE)
+        puppet.turn(f"{side}_lower_leg", (stride * np.maximum(0, np.cos(phase) * sign))[:, None] * SIDE * 1.3)
+        puppet.turn_further(f"{side}_upper_arm", 0.7 * leg[:, None] * SIDE)
+
+
+def _fall_and_stop(puppet: Puppet, dice: _Dice) -> None:
+    """Free fall, as from a platform, and a hard stop."""
+    times, start = puppet.times, dice.start(0.4)
+    height, brake = dice.between(0.2, 0.9), dice.between(0.06, 0.2)
+    fall = np.sqrt(2 * height / G)
+    speed = G * fall
+    t = np.clip(times - start, 0, fall)
+    s = np.clip(times - start - fall, 0, brake)
+    puppet.position -= (0.5 * G * t**2 + speed * (s - s**2 / (2 * brake)))[:, None] * UP
+    puppet.bend_spine(pulse(times, start + fall, 0.15, 0.05, 0.4)[:, None] * SIDE * dice.between(0.0, 0.3))
+
+
+def _hold(puppet: Puppet, dice: _Dice) -> None:
+    """A pose taken slowly and kept: the head to one side and down."""
+    curve = ease(puppet.times, 0.3, 0.8)[:, None]
+    turn = np.array([0.35, 0.5, 0.2]) if dice.rng is None else dice.rng.normal(size=3) * [0.4, 0.5, 0.25]
+    puppet.turn_neck(curve * turn)
+
+
+_GESTURES = {
+    "shake": _shake,
+    "turn": _turn,
+    "nod": _nod,
+    "bow": _bow,
+    "tilt": _tilt,
+    "sway": _sway,
+    "translate": _translate,
+    "jump": _jump,
+    "walk": _walk,
+    "fall_and_stop": _fall_and_stop,
+    "hold": _hold,
+}

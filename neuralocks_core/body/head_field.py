@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Signed distance to what stands still against the hair, the head: a grid, made once."""
+
+import hashlib
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from neuralocks_core.body.collider import Collider
+
+CELL = 0.005
+"""Distance between grid nodes [m]; on a head, linear interpolation is then right within 0.2 mm."""
+ROOM = 0.03
+"""How far around the head the grid reaches [m]."""
+EXACT = 0.01
+"""Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
+MOST_NODES = 3_000_000
+
+
+def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> "HeadField":
+    """The HeadField of these, made once for all grooms of a head and for the bakes that follow."""
+    digest = hashlib.sha256()
+    for array in (points, triangles, still):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return _made(_Mesh(digest.digest(), (points, triangles, still)))
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """Arrays that are known by their digest."""
+
+    digest: bytes
+    arrays: tuple = field(compare=False, repr=False)
+
+
+@lru_cache(maxsize=4)
+def _made(mesh: _Mesh) -> "HeadField":
+    return HeadField(*mesh.arrays)
+
+
+class HeadField:
+    """Distances around the part of a mesh that does not move, sampled on a grid.
+
+    Args:
+        points: the whole mesh in bind pose (V, 3) [m], canonical space, so that the sign is that of a closed surface.
+        triangles: (F, 3).
+        still: which vertices (V,) never move.
+
+    Attributes:
+        moving: triangles (M, 3) of which some vertex moves.
+    """
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, still: np.ndarray):
+        whole = Collider(points, triangles)
+        fixed = still[whole.triangles].all(axis=1)
+        self.moving = whole.triangles[~fixed]
+        self.cell, self._low = CELL, np.zeros(3)
+        self._values = np.full((2, 2, 2), np.inf, np.float32)
+        if not fixed.any():
+            return
+        held = points[np.unique(whole.triangles[fixed])]
+        self._low, high = held.min(axis=0) - ROOM, held.max(axis=0) + ROOM
+        self.cell = max(CELL, float(np.cbrt(np.prod(high - self._low) / MOST_NODES)))
+        size = np.ceil((high - self._low) / self.cell).astype(int) + 1
+        nodes = self._low + self.cell * np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
+        value, _, nearest = whole.closest(nodes.reshape(-1, 3), limit=EXACT, proven=False)
+        # Where something that moves is nearest, the grid knows nothing, and neither does what is mixed with it.
+        self._values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
+
+    def near(self, reach: float) -> np.ndarray:
+        """Nodes (N, 3) [m] that lie less than `reach` outside, or inside."""
+        return self._low + self.cell * np.argwhere(self._values < reach)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distance (N,) [m] and its direction (N, 3), float32; infinite where the head is not what is nearest."""
+        corner, part, known = self._corners(points)
+        value, direction = np.full(len(points), np.inf, np.float32), np.zeros((len(points), 3), np.float32)
+        if not len(known):
+            return value, direction
+        flat, strides = self._values.ravel(), self._strides
+        x, y, z = part
+        at = [[[flat.take(corner + (i * strides[0] + j * strides[1] + k)) for k in (0, 1)] for j in (0, 1)]
+              for i in (0, 1)]  # fmt: skip
+        with np.errstate(invalid="ignore"):  # infinity less infinity: not known, and left out below
+            (a, b), (c, d) = ([one + z * (other - one) for one, other in side] for side in at)
+            low, high = a + y * (b - a), c + y * (d - c)
+            mixed = low + x * (high - low)
+            slope_z = [[other - one for one, other in side] for side in at]
+            (e, f), (g, h) = slope_z
+            down, up = e + y * (f - e), g + y * (h - g)
+            slope = np.stack([high - low, (b - a) + x * ((d - c) - (b - a)), down + x * (up - down)], axis=1)
+            slope /= np.maximum(np.sqrt(np.einsum("ni,ni->n", slope, slope)), np.float32(1e-20))[:, None]
+            sound = np.isfinite(mixed)
+        value[known[sound]], direction[known[sound]] = mixed[sound], slope[sound]
+        return value, direction
+
+    def rough(self, points: np.ndarray) -> np.ndarray:
+        """The nearest node's distance (N,) [m]: right within 0.87 cells, infinite where nothing is known."""
+        result = np.full(len(points), np.inf, np.float32)
+        corner, part, known = self._corners(points)
+        nearest = corner + (part > 0.5).T.astype(np.int32) @ self._strides
+        result[known] = self._values.ravel().take(nearest)
+        return result
+
+    @property
+    def _strides(self) -> np.ndarray:
+        size = self._values.shape
+        return np.array([size[1] * size[2], size[2], 1], np.int32)
+
+    def _corners(self, points: np.ndarray):
+        """Number of the low node of each point's cell (n,), place in it (3, n), and which points (n,) are in the grid."""
+        place = (np.asarray(points, np.float32) - self._low.astype(np.float32)) * np.float32(1 / self.cell)
+        held = [(x >= 0) & (x < size - 1) for x, size in zip(place.T, self._values.shape)]
+        known = np.flatnonzero(held[0] & held[1] & held[2])
+        place = place.take(known, axis=0).T
+        low = place.astype(np.int32)
+        return self._strides @ low, place - low, known

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Signed distance to the skin that moves against the head: samples with planes, blended to a smooth surface.
+
+Samples are chosen once. A pose moves them and enters them in a grid, which is all that a frame costs; no tree is built.
+"""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.body.collider import split_triangle
+
+SPACING = 0.010
+"""Distance between samples on the skin [m]; a half or a quarter of it where triangles are as small."""
+NEIGHBOURS = 8
+"""Samples that are blended; the first is the sample itself."""
+CELL = 0.012
+"""Width of the grid's cells [m]. A sample is entered in its own cell and those around it."""
+DEPTH = 3
+"""Cells below the skin in which a sample is entered too: hair may come that deep."""
+ENOUGH_SAMPLES = 20_000
+MOST_SAMPLES = 60_000
+MOST_CELLS = 4_000_000
+
+
+class Box:
+    """A grid of cubes over the space that hair can reach; `cells` numbers them, 0 is outside.
+
+    Args:
+        low, high: corners (3,) [m].
+    """
+
+    def __init__(self, low: np.ndarray, high: np.ndarray):
+        span = np.maximum(np.asarray(high, float) - low, CELL)
+        self.cell = max(CELL, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+        self.size = np.ceil(span / self.cell).astype(int) + 4
+        self.low = np.asarray(low, float) - 2 * self.cell
+        self.strides = np.array([self.size[1] * self.size[2], self.size[2], 1])
+        self.count = int(np.prod(self.size))
+
+    def cells(self, points: np.ndarray) -> np.ndarray:
+        """Number of the cell (..., ) int32 of each point (..., 3) float32; of some cell for points outside the box."""
+        index = None
+        for axis in range(3):
+            place = points[..., axis] - np.float32(self.low[axis])
+            place *= np.float32(1 / self.cell)
+            cell = place.astype(np.int32)
+            cell *= np.int32(self.strides[axis])
+            index = cell if index is None else np.add(index, cell, out=index)
+        np.maximum(index, 0, out=index)
+        return np.minimum(index, np.int32(self.count - 1), out=index)
+
+    def inside(self, points: np.ndarray, border: int) -> np.ndarray:
+        """Which points (N, 3) lie at least `border` cells within."""
+        place = ((points - self.low) / self.cell).T
+        held = [(x >= border) & (x < size - border) for x, size in zip(place, self.size)]
+        return held[0] & held[1] & held[2]
+
+
+class Skin:
+    """Samples of a mesh: where on which triangle, and which ones lie beside each.
+
+    Args:
+        points: of the mesh in bind pose (V, 3) [m].
+        triangles: those that move (F, 3), not empty, outward by the right-hand rule.
+    """
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray):
+        triangle, part, spacing = _sampled(points, triangles)
+        self._corners, self._part = triangles[triangle], part.astype(np.float32)
+        place, normal = self.planes(points)
+        count = min(NEIGHBOURS, len(place))
+        self.square = np.square(spacing).astype(np.float32)
+        tree = cKDTree(place)
+        far, near = tree.query(place, k=np.arange(1, count + 1))
+        near[:, 0] = np.arange(len(place))
+        # Skin on the other side of a thin part is no neighbour; the sample itself stands in for it.
+        other = np.einsum("ni,nki->nk", normal, normal[near]) < 0.2
+        own = np.arange(len(place))[:, None]
+        self.near = np.where(other | (far > 3 * spacing[:, None]), own, near).astype(np.int32)
+        self.counted = np.where((self.near == own) & (np.arange(count) > 0), 0, 1).astype(np.float32)
+
+    def planes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places and unit normals (N, 3) float32 of the samples for mesh points (V, 3)."""
+        points = np.asarray(points, np.float32)
+        a, b, c = (points.take(self._corners[:, i], axis=0) for i in range(3))
+        b -= a
+        c -= a
+        normal = np.stack(
+            [b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1], b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2],
+             b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]], axis=1)  # fmt: skip
+        normal /= np.maximum(np.sqrt(np.einsum("ni,ni->n", normal, normal)), np.float32(1e-20))[:, None]
+        b *= self._part[:, :1]
+        c *= self._part[:, 1:]
+        a += b
+        a += c
+        return a, normal
+
+
+class PosedSkin:
+    """Skin in one pose.
+
+    Args:
+        skin: its samples.
+        points: of the whole mesh in this pose (V, 3) [m].
+        box: the grid; its cells near the skin are marked with `bit`.
+        marks: (box.count,) uint8, changed.
+        bit: what to add.
+        low, high: corners (3,) [m] of the space that will be asked for.
+    """
+
+    def __init__(self, skin: Skin, points: np.ndarray, box: Box, marks: np.ndarray, bit: int, low, high):
+        self._skin = skin
+        place, normal = skin.planes(points)
+        self._plane = np.concatenate([place, normal], axis=1)
+        self._place, self._normal = (np.ascontiguousarray(each.T) for each in (place, normal))
+        self._start = np.empty(box.count, np.int32)
+        room = (DEPTH + 1) * box.cell
+        low = np.maximum(low - room, box.low + room).astype(np.float32)
+        high = np.minimum(high + room, box.low + box.size * box.cell - room).astype(np.float32)
+        held = [(x > a) & (x < b) for x, a, b in zip(self._place, low, high)]
+        asked = np.flatnonzero(held[0] & held[1] & held[2])
+        place, normal = place.take(asked, axis=0), normal.take(asked, axis=0)
+        entered = np.zeros(box.count, np.uint8)
+
+        def enter(cells: np.ndarray) -> None:
+            self._start[cells] = asked
+            entered[cells] = bit
+
+        # From the farthest cells to a sample's own: the last one entered is the nearest.
+        for depth in range(DEPTH, 0, -1):
+            enter(box.cells(place - normal * np.float32(depth * box.cell)))
+        own = box.cells(place)
+        # Around them, of samples in one cell the last one stands for all.
+        self._start[own] = asked
+        last = self._start.take(own) == asked
+        own, asked = own[last], asked[last]
+        around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        for step in around[np.argsort(-np.abs(around).sum(axis=1), kind="stable")] @ box.strides:
+            enter(own + np.int32(step))
+        marks |= entered
+
+    def rough(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Height [m] over the plane of some sample near by, (N,), of points (N, 3) float32 in marked cells."""
+        plane = self._plane.take(self._start.take(cells), axis=0)
+        offset = points - plane[:, :3]
+        offset *= plane[:, 3:]
+        return offset[:, 0] + offset[:, 1] + offset[:, 2]
+
+    def distance(self, points: np.ndarray, cells: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distance (N,) [m] and its direction (N, 3) of points (N, 3) in marked cells.
+
+        Infinite beyond the rim, and where the distance `head` (N,) to what stands still is less than that to a sample.
+        """
+        skin = self._skin
+        sample = self._start.take(cells)
+        x, y, z = np.ascontiguousarray(points.T, np.float32)[:, :, None]
+        rows = np.arange(len(points))
+        for _ in range(3):  # downhill from neighbour to neighbour
+            near = skin.near.take(sample, axis=0)
+            dx, dy, dz = x - self._place[0].take(near), y - self._place[1].take(near), z - self._place[2].take(near)
+            squared = dx * dx + dy * dy + dz * dz
+            best = squared.argmin(axis=1)
+            sample = near[rows, best]
+            if not best.any():
+                break
+        nearest = squared[rows, best]
+        # Weights fall from the nearest sample on: smooth in the point and in the pose, at any height.
+        square = skin.square.take(near[:, 0])
+        weight = np.maximum(1 - (squared - nearest[:, None]) / (3.2 * square)[:, None], 0)
+        weight *= weight
+        weight *= skin.counted.take(near[:, 0], axis=0)
+        nx, ny, nz = (each.take(near) for each in self._normal)
+        height = dx * nx
+        height += dy * ny
+        height += dz * nz
+        value = np.einsum("nk,nk->n", height, weight) / np.einsum("nk->n", weight)
+        direction = np.stack([np.einsum("nk,nk->n", n, weight) for n in (nx, ny, nz)], axis=1)
+        direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
+        beyond = nearest - value * value > 4 * square
+        beyond |= nearest - 0.5 * square > head * head
+        return np.where(beyond, np.inf, value), direction
+
+
+def _sampled(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangle (N,), place on it (N, 2) and spacing (N,) [m] of samples: closer together where triangles are small."""
+    corners = np.asarray(points, float)[triangles]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    for finest in (2, 1, 0):
+        halved = np.clip(np.round(np.log2(SPACING / np.maximum(edges.mean(axis=1), 1e-9))), 0, finest)
+        owner, part, spacing = _thinned(corners, edges.max(axis=1), SPACING / 2**halved)
+        if len(owner) <= ENOUGH_SAMPLES:
+            break
+    return owner, part, spacing
+
+
+def _thinned(corners: np.ndarray, longest: np.ndarray, spacing: np.ndarray):
+    """Samples of triangles (F, 3, 3) with a spacing each (F,), as `_sampled`."""
+    wide = 1.5 * spacing
+    while (np.maximum(np.ceil(longest / wide), 1) ** 2).sum() > max(MOST_SAMPLES, len(longest)):
+        wide = 1.3 * wide
+    split = np.maximum(np.ceil(longest / wide), 1).astype(int)
+    owner, part = [], []
+    for m in np.unique(split):
+        which, uv = np.flatnonzero(split == m), split_triangle(m)
+        owner.append(np.repeat(which, len(uv)))
+        part.append(np.tile(uv, (len(which), 1)))
+    owner, part = np.concatenate(owner), np.concatenate(part)
+    spacing = spacing[owner]
+    a, b, c = (corners[owner, i] for i in range(3))
+    place = (a + part[:, :1] * (b - a) + part[:, 1:] * (c - a)) / (0.8 * spacing[:, None])
+    # Of samples in one small cube the one nearest to its middle is enough.
+    cube = np.floor(place)
+    off = np.square(place - cube - 0.5).sum(axis=1)
+    order = np.lexsort((off, spacing, cube[:, 2], cube[:, 1], cube[:, 0]))
+    key = np.column_stack([cube, spacing])[order]
+    first = np.concatenate([[True], (np.diff(key, axis=0) != 0).any(axis=1)])
+    kept = np.sort(order[first])
+    return owner[kept], part[kept], spacing[kept]

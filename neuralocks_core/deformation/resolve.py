@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Push hair out of the body after the network, with every segment's length kept."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.going_in import depths_along
+from neuralocks_core.body.near_body import NearBody, PosedBody
+from neuralocks_core.character import Body, Character
+from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import inverse
+from neuralocks_core.strands.strand_set import StrandSet
+
+MARGIN = 0.001
+"""Clearance that a pushed vertex gets [m]."""
+ROUNDS = 5
+"""Rounds of finding the planes under a strand and laying it over them."""
+SLACK = np.float32(1e-5)
+"""Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
+CLAMPED = 2
+"""Vertices at the root that never move."""
+STILL = 1e-3
+"""Skin that moves by less than this against the head [m] stands still."""
+STEP, ROOM = 0.1, 0.1
+"""The part of the body that hair can reach, a ball, is that much larger [m]: to the next multiple of STEP, and ROOM."""
+DEEP = 0.02
+"""A strand that rests deeper than this [m] is looked at in every frame: what follows may lie where nothing is known."""
+BATCH = 2048
+"""Strands looked at together."""
+PUSHED = 1024
+"""Strands pushed together."""
+NEAR = 0.02
+"""A strand that is pushed keeps clear of the surface where it comes within this distance [m]."""
+
+
+class Resolver:
+    """Keeps one groom out of its character's body, frame by frame, in canonical space.
+
+    Args:
+        character: whose body the hair must stay out of; without a body nothing is done.
+        strands: the groom at rest.
+        clip: the motion to come. What hardly moves against the head in it is looked up in a grid made once, and blend
+            shapes that do not change in it are part of the pose at rest.
+
+    Attributes:
+        body: the part of the body that the hair can reach, or None.
+    """
+
+    def __init__(self, character: Character, strands: StrandSet, clip: Clip):
+        self.character, self.strands, self._clip = character, strands, clip
+        self.body = None if character.body is None else _within_reach(character, strands)
+
+    @cached_property
+    def at_rest(self) -> Collider | None:
+        """The exact collider in bind pose, if there is a body."""
+        if self.body is None:
+            return None
+        return Collider(self.character.canonical(self.body.shaped(self._constant)), self.body.triangles)
+
+    def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
+        """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: to measure with."""
+        if self.body is None:
+            return None
+        return Collider(self.body.posed(self._skinning(joints), shape), self.body.triangles)
+
+    def prepare(self) -> None:
+        """Make now, once for all frames, what the first one would have to wait for."""
+        if self.body is not None:
+            _ = self.clear
+
+    def apply(
+        self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None, each: Callable = map
+    ) -> None:
+        """Change the network's displacement (S, 24, 3) float32 [m] for a pose where it leaves hair inside the body.
+
+        Args:
+            displacement: canonical, changed in place.
+            joints: world joint transforms (J, 4, 4).
+            shape: blend shape weights (B,).
+            each: as `map`, on several threads say; the result does not depend on them.
+        """
+        if self.body is None or not len(displacement):
+            return
+        rest, clear = self.strands.rest, self.clear
+        parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
+        edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
+        body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
+        hit = list(each(lambda s: body.violated(rest[s] + displacement[s], clear[s] - SLACK) + s.start, parts))
+        hit = np.union1d(np.concatenate(hit), self._deep)
+        hit = hit[self.strands.valid[hit]]
+
+        def push(rows: np.ndarray) -> None:
+            displacement[rows] = resolved(rest[rows] + displacement[rows], body, clear[rows]) - rest[rows]
+
+        for _ in each(push, [hit[i : i + PUSHED] for i in range(0, len(hit), PUSHED)]):
+            pass
+
+    def _posed(self, joints, shape, low, high) -> PosedBody:
+        changed = None if shape is None else np.asarray(shape, float) - self._constant
+        return self._near.posed(self._skinning(joints), changed, low, high)
+
+    @cached_property
+    def clear(self) -> np.ndarray:
+        """Distance (S, 24) float32 [m] that each vertex must keep."""
+        joints = self.character.skeleton.bind
+        points = self.strands.rest
+        rest = self._posed(joints, self._constant, *_corners(points))
+        return clearance(
+            np.concatenate([rest_distance(points[i : i + BATCH], rest) for i in range(0, len(points), BATCH)])
+        )
+
+    @cached_property
+    def _deep(self) -> np.ndarray:
+        return np.flatnonzero((self.clear[:, CLAMPED:] < -DEEP).any(axis=1))
+
+    def serves(self, clip: Clip) -> bool:
+        """Whether a resolver made for this clip would give the same results."""
+        if self.body is None:
+            return True
+        same = np.array_equal(clip.shape[:1], self._clip.shape[:1])
+        return same and np.array_equal(_stands_still(self.character, self.body, clip), self._still)
+
+    @cached_property
+    def _still(self) -> np.ndarray:
+        return _stands_still(self.character, self.body, self._clip)
+
+    @cached_property
+    def _near(self) -> NearBody:
+        body, character, strands, still = self.body, self.character, self.strands, self._still
+        if body.shapes:
+            body = replace(body, points=body.shaped(self._constant))
+        length = float(strands.length[strands.valid].max())
+        roots = strands.rest[strands.valid, 0]
+        low, high = roots.min(axis=0) - length, roots.max(axis=0) + length
+        return NearBody(body, character.bind_to_canonical, still, low, high)
+
+    @property
+    def _constant(self) -> np.ndarray:
+        return self._clip.shape[0]
+
+    def _skinning(self, joints: np.ndarray) -> np.ndarray:
+        to_canonical = inverse(self.character.canonical_to_world(joints))
+        return to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """Low and high corner (2, 3) of points (S, K, 3)."""
+    # Along the strands first: rows of numbers are compared much faster than triples.
+    rows = points.reshape(len(points), -1)
+    return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
+
+
+def rest_distance(points: np.ndarray, body: PosedBody) -> np.ndarray:
+    """Signed distance (S, K) float32 [m] of strands (S, K, 3) at rest, measured as `resolved` does."""
+    return _measured(np.ascontiguousarray(points.transpose(1, 2, 0)), body)[0].T
+
+
+def clearance(rest_distance: np.ndarray) -> np.ndarray:
+    """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
+
+    Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
+    """
+    clear = np.minimum(rest_distance, MARGIN).astype(np.float32)
+    clear[:, :CLAMPED] = -np.inf
+    return clear
+
+
+def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
+    """Strands laid over the surface where they were inside it.
+
+    Strand by strand, from the root on and with every length kept, each segment goes as near to where it was wanted as
+    the planes under it let it, until nothing is inside any more. A strand depends on itself and on the body only:
+    neither the order of strands nor their division into chunks matters. Up to the first vertex that must give way, a
+    strand stays bit for bit.
+
+    Args:
+        points: deformed strands (S, K, 3) [m], in the body's space.
+        body: in this pose.
+        clear: distance [m] that each vertex must keep (S, K), -inf for those that never move.
+
+    Returns:
+        (S, K, 3) float32.
+    """
+    # Vertices first, strands last: what is done to one vertex of all strands is one contiguous array.
+    wanted = np.ascontiguousarray(np.asarray(points, float).transpose(1, 2, 0))
+    lengths = np.sqrt(np.square(np.diff(wanted, axis=0)).sum(axis=1))
+    keep = np.ascontiguousarray(clear.T, float)
+    now, todo = wanted, np.arange(len(points))
+    normal, height = np.zeros(wanted.shape), np.full(keep.shape, -np.inf)
+    # Strands that no round frees are left as they were least deep.
+    least, best = np.full(len(points), np.inf), wanted.copy()
+    for done in range(ROUNDS + 1):
+        here = now[CLAMPED:][:, :, todo]
+        distance, way = _measured(here, body)
+        # The first time a strand is given its margin; after that half of it is enough.
+        lack = (keep[CLAMPED:, todo] - distance).max(axis=0)
+        left = lack > (0.5 * MARGIN if done else SLACK)
+        todo, lack = todo[left], lack[left]
+        better = lack < least[todo]
+        least[todo[better]], best[:, :, todo[better]] = lack[better], now[:, :, todo[better]]
+        if not len(todo) or done == ROUNDS:
+            break
+        here, distance, way = here[:, :, left], distance[:, left], way[:, :, left]
+        surface = (here * way).sum(axis=1) - distance
+        normal[CLAMPED:, :, todo] = way
+        height[CLAMPED:, todo] = np.where(distance < NEAR, surface + keep[CLAMPED:, todo] + 4e-5, -np.inf)
+        # What is still inside was deep: from where it lies now the way out is clearer than from where it came.
+        now[:, :, todo] = _laid(now[:, :, todo], lengths[:, todo], normal[:, :, todo], height[:, todo])
+    now[:, :, todo] = best[:, :, todo]
+    return now.transpose(2, 0, 1).astype(np.float32)
+
+
+def _measured(points: np.ndarray, body: PosedBody) -> tuple[np.ndarray, np.ndarray]:
+    """Signed distance (K, n) [m] of strands (K, 3, n) and its direction (K, 3, n), deep in the body too."""
+    distance, way = body.distance(points.transpose(0, 2, 1).astype(np.float32))
+    distance, way = distance.astype(float), way.transpose(0, 2, 1).astype(float)
+    depths_along(points, distance, way)
+    return distance, way
+
+
+def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """Strands (K, 3, n) as near to where they are wanted as their lengths (K - 1, n) and the planes under them let them.
+
+    From the root on, each segment aims at its wanted end. If that is under its plane, it takes the direction nearest to
+    that which ends on the plane; straight away from the body if not even that reaches.
+    """
+    result = wanted.copy()
+    free = np.ones(wanted.shape[2], bool)
+    # Before any vertex comes under its plane (by so much more than rounding does) there is nothing to lay.
+    under = np.einsum("kcn,kcn->kn", normal, wanted) < height + 1e-5
+    for i in range(max(CLAMPED, int(under.any(axis=1).argmax())), len(wanted)):
+        before, length, n = result[i - 1], lengths[i - 1], normal[i]
+        up = height[i] - _dot(n, before)
+        along = wanted[i] - before
+        rise = _dot(along, n)
+        size = np.sqrt(_dot(along, along))
+        low = rise * length < up * size
+        free &= ~low
+        if free.all():
+            continue
+        np.maximum(size, 1e-12, out=size)
+        along *= length / size
+        rise *= length / size
+        slope = np.clip(up, -length, length)
+        side = along - rise * n
+        side *= np.sqrt(length**2 - slope**2) / np.maximum(np.sqrt(_dot(side, side)), 1e-12)
+        side += slope * n
+        moved = np.where(low, side, along)
+        moved += before
+        result[i] = np.where(free, wanted[i], moved)
+    return result
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
+    """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion, and are
+    moved by no blend shape.
+    """
+    shift = turn = np.zeros(len(character.skeleton.names))
+    for joints in clip.joints:
+        against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
+        off = against @ character.canonical_to_bind - np.eye(4)
+        turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
+        shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
+    far = np.linalg.norm(character.canonical(body.points), axis=1)
+    each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
+    still = np.sum(body.joint_weights * each, axis=1) < STILL
+    for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
+        if varies:
+            still &= ~(np.abs(offsets) > 1e-5).any(axis=1)
+    return still
+
+
+def _within_reach(character: Character, strands: StrandSet) -> Body | None:
+    """The part of the body that the hair could touch in some pose, with room for the neck to bend: a ball about the head, in
+    steps, so that the grooms of a head share it, and what is made of it.
+    """
+    body, centre = character.body, character.head_centre
+    if not strands.valid.any():
+        return None
+    reach = np.linalg.norm(strands.rest[strands.valid, 0] - centre, axis=1) + strands.length[strands.valid]
+    radius = STEP * np.ceil(float(reach.max()) / STEP) + ROOM
+    near = np.linalg.norm(character.canonical(body.points) - centre, axis=1) < radius
+    faces = body.triangles[near[body.triangles].any(axis=1)]
+    if not len(faces):
+        return None
+    used, triangles = np.unique(faces, return_inverse=True)
+    return body.part(used, triangles.reshape(-1, 3))

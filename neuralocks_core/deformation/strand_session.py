@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A strand model bound to one groom: what depends on its strands alone is computed once, and kept for all frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, partial
+from threading import Lock
+
+import numpy as np
+
+from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.runtime import StrandModel
+from neuralocks_core.strands.locks import lock_codes
+from neuralocks_core.strands.strand_set import K, StrandSet, scalp_local
+
+
+class StrandSession:
+    """A model bound to one groom.
+
+    Attributes:
+        strands: the groom.
+        strand_part: the first layer's part of each strand, (S, 256) float32.
+        anchor_offsets: the answers that an anchored model's are measured from, (S, 72) float32; see `anchor`.
+    """
+
+    def __init__(self, model: StrandModel, strands: StrandSet):
+        self.model, self.strands = model, strands
+        count = len(strands.rest)
+        shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
+        inputs = strand_inputs(strands, self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32))
+        self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
+        self.anchor_offsets = np.zeros((count, 3 * K), np.float32)
+        self._anchored_at: np.ndarray | None = None
+        # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
+        self._turn = Lock()
+
+    def anchor(self, vector: np.ndarray) -> None:
+        """Measure an anchored model's answers from this boundary vector: the bind pose, held, with the
+        materials in use.
+
+        Costs one inference, and nothing when the vector is the one already in use.
+        """
+        vector, _ = self._without_clumping(vector)
+        if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
+            return
+        self.anchor_offsets[:] = 0
+        self.anchor_offsets[:] = self._tail("offsets", self.model.frame(vector))
+        self._anchored_at = vector
+
+    def displacement(self, vector: np.ndarray) -> np.ndarray:
+        """Displacement (S, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
+
+        Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
+        """
+        frame, gather = self._frame(vector)
+        result = self._tail("displacement", frame, gather)
+        still = ~self.strands.valid
+        if still.any():
+            result[still] = 0
+        return result.reshape(len(result), K, 3)
+
+    def _frame(self, vector: np.ndarray):
+        """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
+        plain, clumping = self._without_clumping(vector)
+        frame = self.model.frame(plain)
+        if not clumping:  # exactly 0 for the default
+            return frame, None
+        locks, session = self._locks
+        if self._anchored_at is not None:
+            session.anchor(self._anchored_at)
+        led = session._tail("displacement", frame).reshape(-1, K, 3)
+        factor = locks.spread(vector[self.model.spec.slices["material"]])
+        return frame, partial(locks.gather, led=led, factor=factor)
+
+    def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
+        """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
+        plain, column = np.array(vector, np.float32), self.model.spec.slices["material"].start + COLUMN
+        clumping, plain[column] = float(plain[column]), 0.0
+        return plain, clumping
+
+    @cached_property
+    def _locks(self) -> tuple[Locks, StrandSession]:
+        locks = Locks.of(self.strands)
+        return locks, StrandSession(self.model, locks.strands)
+
+    def _tail(self, output: str, frame: dict[str, np.ndarray], gather: Callable | None = None) -> np.ndarray:
+        """(S, 72) of all strands."""
+
+        def values(chunk: slice) -> np.ndarray:
+            found = self._chunk(output, chunk, frame)
+            if gather is not None:
+                with self._turn:
+                    gather(found, chunk)
+            return found
+
+        return self._by_chunk(values, 3 * K)
+
+    def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
+        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
+        computed it and still has it in its cache, one at a time.
+        """
+        (frame, gather), valid = self._frame(vector), self.strands.valid
+
+        def work(chunk: slice) -> None:
+            values = self._chunk("displacement", chunk, frame)
+            with self._turn:
+                if gather is not None:
+                    gather(values, chunk)
+                if not valid[chunk].all():
+                    values[~valid[chunk]] = 0
+                function(chunk, values.reshape(-1, K, 3))
+
+        self.model.by_chunk(work, len(self.strands.rest))
+
+    def _chunk(self, output: str, chunk: slice, frame: dict[str, np.ndarray]) -> np.ndarray:
+        """(n, 72) of one whole chunk."""
+        return self.model.run(
+            "tail.onnx",
+            output,
+            strand_part=self.strand_part[chunk],
+            anchor=self.anchor_offsets[chunk],
+            edges=rest_edges(self.strands.rest[chunk]),
+            **frame,
+        )
+
+    def _by_chunk(self, function, width: int) -> np.ndarray:
+        result = np.empty((len(self.strands.rest), width), np.float32)
+
+        def work(chunk: slice) -> None:
+            result[chunk] = function(chunk)
+
+        self.model.by_chunk(work, len(result))
+        return result
+
+
+def rest_edges(rest: np.ndarray) -> np.ndarray:
+    """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
+    flat, edges = rest.reshape(-1), np.empty(rest.size, np.float32)
+    np.subtract(flat[3:], flat[:-3], out=edges[3:])  # one long row; what reaches from strand to strand is the first
+    edges = edges.reshape(len(rest), -1)
+    edges[:, :3] = 0
+    return edges
+
+
+def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
+    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1."""
+    locks = lock_codes(codes, strands.lock, strands.valid)
+    return np.concatenate([strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1).astype(
+        np.float32
+    )

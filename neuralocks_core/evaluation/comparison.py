@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair beside a trusted simulation of the same strands: the second half of the report card."""
+
+import numpy as np
+
+from neuralocks_core import metrics
+from neuralocks_core.character import Character
+from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import Clip
+from neuralocks_core.progress import Progress
+from neuralocks_core.rotation import rotation_part
+from neuralocks_core.strands.locks import lock_mates
+from neuralocks_core.strands.strand_set import StrandSet
+
+STEP = 1 / 30
+"""Time step of the reference [s]: the one that models are trained on."""
+MOST_STEPS = 10_000
+"""Over five minutes; all of a rollout is held in memory."""
+
+
+def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray) -> dict[str, float]:
+    """All measures of an answer against the reference.
+
+    Args:
+        answer, reference: displacements from rest (T, S, 24, 3) [m], canonical.
+        length: of the strands (S,) [m].
+        times: (T,) [s].
+    """
+    error = metrics.motion_error(answer, reference, length)
+    return {
+        "position_percent": metrics.position_error(answer, reference, length),
+        "tip_percent": metrics.position_error(answer[:, :, -1:], reference[:, :, -1:], length),
+        "motion_error_median": error["median"],
+        "motion_error_p95": error["p95"],
+        "motion_error_rms": error["rms"],
+        "velocity_error": metrics.velocity_error(answer, reference, times),
+        "motion_ratio": metrics.motion_ratio(answer, reference, times),
+        "dynamic_frames": metrics.dynamic_frames(answer, reference, times),
+        "tip_correlation": _correlation(metrics.tip_curves(answer), metrics.tip_curves(reference)),
+    }
+
+
+def simulated(
+    character: Character,
+    strands: StrandSet,
+    clip: Clip,
+    times: np.ndarray,
+    material: Material | None = None,
+    *,
+    volume: float = 0.0,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
+
+    It runs at its own step from the first time on, and anew from each cut, and is interpolated in between.
+
+    Args:
+        character: with its body.
+        strands: all valid.
+        clip: the motion.
+        times: (T,) [s].
+        material: of the hair.
+        volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the solver is not installed, or would take more than MOST_STEPS.
+    """
+    steps = np.ceil((times[-1] - times[0]) / STEP - 1e-9)
+    if not steps <= MOST_STEPS:
+        raise NeuralocksError(
+            f"frames: the solver goes from {times[0]:g} s to {times[-1]:g} s, {steps:g} steps where {MOST_STEPS} are "
+            "the most; choose frames near the animation, or fewer"
+        )
+    parts = clip.parts
+    part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
+    options = {"volume": volume, "progress": progress}
+    result = np.empty((len(times), *strands.rest.shape), np.float32)
+    for i in np.unique(part):
+        start = times[0] if i == part[0] else parts[i].start
+        result[part == i] = _from(start, character, strands, parts[i], times[part == i], material, **options)
+    return result
+
+
+def _from(start: float, character, strands, clip, times, material, **options) -> np.ndarray:
+    """What `simulated` gives, of a clip without cuts and with hair at rest at `start` [s]."""
+    from neuralocks_core.reference import simulate
+
+    clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 1)
+    joints, shapes = _unscaled(character, clip.at(clock)), clip.shape_at(clock)
+    resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
+    body = triangles = bind = None
+    if resolver.at_rest is not None:
+        part = resolver.body
+        body = np.stack([part.posed(j @ character.inverse_bind, s) for j, s in zip(joints, shapes, strict=True)])
+        triangles, bind = part.triangles, resolver.at_rest.points
+    rollout = simulate(
+        strands.rest,
+        character.canonical_to_world(joints),
+        body,
+        triangles,
+        material or Material(),
+        dt=STEP,
+        neighbours=lock_mates(strands.rest, strands.lock),
+        bind_body=bind,
+        **options,
+    )
+    place = np.clip((times - start) / STEP, 0, len(clock) - 1)
+    low = np.minimum(place.astype(int), max(len(clock) - 2, 0))
+    part = (place - low)[:, None, None, None].astype(np.float32)
+    high = np.minimum(low + 1, len(clock) - 1)
+    return (1 - part) * rollout.points[low] + part * rollout.points[high] - strands.rest
+
+
+def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
+    """World joint transforms (T, J, 4, 4) as seen by a head that keeps its size: the solver, like the network, answers for
+    hair as long as at rest, whatever size the animation gives the head.
+    """
+    head = character.canonical_to_world(joints)
+    rigid = head.copy()
+    rigid[:, :3, :3] = rotation_part(head, "head")
+    return (rigid @ np.linalg.inv(head))[:, None] @ joints
+
+
+def whole_locks(strands: StrandSet, count: int) -> np.ndarray:
+    """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
+    the same each time.
+    """
+    usable = np.flatnonzero(strands.valid)
+    if len(usable) <= count:
+        return usable
+    order = np.random.default_rng(0).permutation(int(strands.lock.max()) + 1)
+    rank = np.empty(len(order), int)
+    rank[order] = np.arange(len(order))
+    by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]
+    return np.sort(by_lock[:count])
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    """Correlation of two curves (T, 3) about their means."""
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    both = np.sqrt(np.square(a).sum() * np.square(b).sum())
+    return float((a * b).sum() / both) if both > 1e-12 else float("nan")

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene of moving hair made ready to be drawn: which strands, in what colours, seen from where."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview import shading
+from neuralocks_core.preview.canvas import Camera, open_canvas
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely hair is drawn.
+
+    Attributes:
+        strands: of a larger groom only so many, of a smaller one copies beside its own.
+        vertices: of each.
+        scale: how many times larger to draw before reducing.
+        width: of a strand, in pixels of the larger drawing.
+        samples: of a pixel of the larger drawing; 0 for one, without the cost of counting.
+    """
+
+    strands: int
+    vertices: int
+    scale: float
+    width: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is to be seen, from arrays.
+
+    Attributes:
+        times: of the frames (T,) [s].
+        head: rigid transforms bind world -> posed world of the head (T, 4, 4).
+        facing: rotation (3, 3) whose transpose's third column is where the face looks in bind pose.
+        centre: middle of the head in bind pose (3,) [m].
+        counts: vertices of each strand (S,); none where all hair is mesh hair.
+        rest: points of strands, or of mesh hair, in bind pose (P, 3) [m].
+        hair: frame number -> strand points (P, 3) [m], world.
+        triangles: of the body (F, 3), or None.
+        body: frame number -> body points (V, 3) [m], world, or None.
+        body_rest: body points in bind pose (V, 3) [m], or None.
+        mesh_hair: vertices of the body that are hair (V,) bool, or None.
+        look: colours.
+    """
+
+    times: np.ndarray
+    head: np.ndarray
+    facing: np.ndarray
+    centre: np.ndarray
+    counts: np.ndarray
+    rest: np.ndarray
+    hair: Callable[[int], np.ndarray]
+    triangles: np.ndarray | None = None
+    body: Callable[[int], np.ndarray] | None = None
+    body_rest: np.ndarray | None = None
+    mesh_hair: np.ndarray | None = None
+    look: shading.Look = field(default_factory=shading.Look)
+
+
+class Film:
+    """A scene with its camera, strands and colours made ready.
+
+    Args:
+        scene: what is to be seen.
+        width, height: of a picture in pixels.
+        detail: how finely hair is drawn.
+        calm: time [s] over which the camera's path is smoothed.
+        canvas: draws; called as `canvas.open_canvas`.
+
+    Raises:
+        NeuralocksError: there is nothing to draw.
+    """
+
+    def __init__(self, scene: Scene, width: int, height: int, detail: Detail, calm: float, canvas=open_canvas):
+        self.scene, self.detail, self._calm = scene, detail, calm
+        self._pick(detail.strands)
+        self._albedo = None if scene.body_rest is None else self._dress()
+        self._cameras = self._follow()
+        triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
+        self._canvas = canvas(width, height, triangles, len(self._tone), detail)
+
+    def shoot(self, frames, say: Callable[[int], None] = lambda done: None) -> Iterator[np.ndarray]:
+        """Pictures (height, width, 3) uint8 of frames; one is lit while the one before is drawn."""
+        with ThreadPoolExecutor(1) as pool:
+            ahead = pool.submit(self.light, int(frames[0]))
+            for i, frame in enumerate(frames):
+                lit = ahead.result()
+                if i + 1 < len(frames):
+                    ahead = pool.submit(self.light, int(frames[i + 1]))
+                yield self._canvas.draw(self._cameras[frame], *lit)
+                say(i + 1)
+
+    def light(self, frame: int) -> tuple:
+        """Body, its colours, hair and its colours: everything about a frame but the drawing itself."""
+        scene, camera, shadow = self.scene, self._cameras[frame], None
+        hair = tint = np.zeros((0, 3))
+        if len(self._low):
+            hair, tint, shadow = self._strands(frame)
+        body, body_tint = None, np.zeros((0, 3))
+        if scene.body is not None:
+            body = np.asarray(scene.body(frame), float)
+            normals = vertex_normals(body, scene.triangles)
+            body_tint = shading.body_colours(body, normals, self._albedo, shadow, camera.to_eye, self._axes)
+        return body, body_tint, hair, tint
+
+    def _strands(self, frame: int) -> tuple:
+        """Points and colours of all strands that are drawn, and the shadow that they throw."""
+        scene, camera, head = self.scene, self._cameras[frame], self.scene.head[frame]
+        own = self._own(scene.hair(frame))
+        centre = head[:3, :3] @ scene.centre + head[:3, 3]
+        counts = np.full(len(own), self.detail.vertices)
+        tint, shadow = shading.hair_colours(own.reshape(-1, 3), counts, camera.to_eye, centre, self._axes, scene.look)
+        hair = np.repeat(own, self._copies, axis=0) + self._beside @ head[:3, :3].T
+        tint = np.repeat(tint.reshape(own.shape), self._copies, axis=0) * self._tone
+        return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
+
+    def close(self) -> None:
+        """Let go of what the canvas holds."""
+        self._canvas.close()
+
+    def _pick(self, strands: int) -> None:
+        """Which strands are drawn, how they are resampled, and where copies lie beside them."""
+        scene, rng = self.scene, np.random.default_rng(3)
+        starts = np.cumsum(scene.counts) - scene.counts
+        usable = np.flatnonzero(scene.counts > 1)
+        if not len(usable) and scene.mesh_hair is None:
+            raise NeuralocksError("preview: the groom has no strand of two points; there is nothing to draw")
+        rows = usable[:: max(1, -(-len(usable) // strands))]
+        self._copies = copies = int(np.clip(round(strands / max(len(rows), 1)), 1, 12))
+        place = np.linspace(0, 1, self.detail.vertices)[None] * (scene.counts[rows] - 1)[:, None]
+        low = np.minimum(place.astype(int), scene.counts[rows, None] - 2)
+        self._low, self._part = starts[rows, None] + low, (place - low)[..., None]
+        roots = scene.rest[starts[usable]] if len(usable) else np.zeros((1, 3))
+        spacing = 1.3 * np.sqrt(4 * np.pi * max(np.var(roots, axis=0).sum(), 1e-6) / len(roots))
+        beside = rng.normal(0, 0.5 * spacing, (len(rows) * copies, 1, 3))
+        beside[::copies] = 0
+        self._tone = np.exp(rng.normal(0, 0.25, (len(rows) * copies, 1, 1)))
+        # Copies keep apart along the strand but close up towards the tip, as locks do.
+        self._beside = beside * np.linspace(1, 0.45, self.detail.vertices)[None, :, None]
+
+    def _own(self, points: np.ndarray) -> np.ndarray:
+        """The groom's own strands (S, detail.vertices, 3), resampled."""
+        points = np.asarray(points, float)
+        return points[self._low] * (1 - self._part) + points[self._low + 1] * self._part
+
+    def _dress(self) -> np.ndarray:
+        """Skin above the collar, dark cloth below, and mesh hair: linear RGB (V, 3)."""
+        scene = self.scene
+        below = (scene.centre[1] - scene.body_rest[:, 1] - 0.25) / 0.03
+        cloth = np.clip(below, 0, 1)[:, None]
+        result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
+        if scene.mesh_hair is not None:
+            result[scene.mesh_hair] = scene.look.tip
+        return result
+
+    def _follow(self) -> list[Camera]:
+        """One camera a frame: it goes along with the head's path, smoothed, and does not turn."""
+        scene = self.scene
+        centre = np.einsum("tij,j->ti", scene.head[:, :3, :3], scene.centre) + scene.head[:, :3, 3]
+        reach = np.linalg.norm(scene.rest - scene.centre, axis=1).max()
+        step = np.median(np.diff(scene.times)) if len(scene.times) > 1 else 1.0
+        smooth = _blurred(centre, self._calm / step)
+        # How far the head strays from the smooth path, so that a jump does not leave the picture.
+        stray = np.abs(centre - smooth).max()
+        high = 0.15 + 0.60 * min(reach, 0.6) + 0.5 * min(stray, 0.3)
+        front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
+        front /= np.linalg.norm(front)
+        # Where the face looks on average, so that a shot of somebody's back does not show the back only.
+        turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]
+        front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
+        right = np.cross([0, 1.0, 0], front)
+        self._axes = np.stack([right, [0, 1.0, 0], front], axis=1)
+        direction = front + 0.62 * right + np.array([0, 0.10, 0])
+        direction /= np.linalg.norm(direction)
+        far = high / np.tan(np.radians(24.0) / 2)
+        up = np.array([0, 1.0, 0])
+        aim = smooth - up * 0.36 * min(reach, 0.6)
+        return [Camera(a + far * direction, a, up) for a in aim]
+
+
+def _blurred(values: np.ndarray, width: float) -> np.ndarray:
+    from scipy.ndimage import gaussian_filter1d
+
+    return gaussian_filter1d(values, max(width, 1e-3), axis=0, mode="nearest")

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures and clips of moving hair, on machines without a display."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.preview.film import Detail, Film, Scene
+from neuralocks_core.progress import Progress, silent
+
+SUFFIXES = (".png", ".mp4", ".gif")
+PALETTE, DITHER = 5, 6.0
+"""A .gif takes its colours from so many frames of the clip; they are dithered by so much of 255."""
+
+PICTURE = Detail(16000, 24, 2.0, 1.2, 4)
+CLIP = Detail(4000, 16, 1.5, 2.0, 0)
+"""A quarter of the strands, wider: in motion it looks the same, and a frame takes a fifth of the time."""
+
+
+def render(
+    scene: Scene,
+    path: str | os.PathLike,
+    *,
+    size: tuple[int, int] | None = None,
+    panels: int = 6,
+    rate: float = 24.0,
+    detail: Detail | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a strip of pictures (.png) or a clip (.mp4, .gif).
+
+    Args:
+        scene: what is to be seen.
+        path: the file to write; its ending chooses the kind.
+        size: width and height of one picture in pixels.
+        panels: pictures in a strip, evenly over the time.
+        rate: frames a second of a clip; in real time.
+        detail: how finely; PICTURE or CLIP if left out.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the ending is unknown, a library is missing, or the file cannot be written.
+    """
+    path = as_path(path, "path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(SUFFIXES)}")
+    kind = path.suffix.lower()
+    for module in ("PIL", "imageio", "imageio_ffmpeg")[: 3 if kind == ".mp4" else 1]:
+        _need(module)
+    still = kind == ".png"
+    if still:
+        frames = np.unique(np.linspace(0, len(scene.times) - 1, panels + 2)[1:-1].round().astype(int))
+    else:
+        clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
+        frames = _nearest(scene.times, clock)
+    if kind == ".gif":
+        frames = np.concatenate([frames[np.linspace(0, len(frames) - 1, PALETTE).astype(int)], frames])
+    width, height = size or ((440, 620) if still else (480, 600))
+    # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
+    detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
+    say = progress or silent
+    with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
+        say(0, len(frames), f"drawing {path.name}")
+        with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
+            _WRITERS[kind](part, images, scene.times[frames], rate)
+            say(len(frames), len(frames), f"writing {path.name}")  # the last moment at which a caller may stop it
+    return path
+
+
+def _nearest(times: np.ndarray, clock: np.ndarray) -> np.ndarray:
+    """Numbers (n,) of the ascending times (T,) that lie nearest to those of a clock (n,); the earlier of two as near."""
+    after = np.searchsorted(times, clock).clip(max=len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(clock - times[before] <= np.abs(times[after] - clock), before, after)
+
+
+def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+    from PIL import Image, ImageDraw
+
+    images = list(images)
+    gap = np.full((images[0].shape[0], 4, 3), 255, np.uint8)
+    row = [piece for image in images for piece in (gap, image)][1:]
+    strip = Image.fromarray(np.concatenate(row, axis=1))
+    pen, wide = ImageDraw.Draw(strip), images[0].shape[1] + 4
+    for i, time in enumerate(times):
+        pen.text((wide * i + 10, strip.height - 20), f"{time:.2f} s", fill=(230, 230, 230))
+    strip.save(part)
+
+
+def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+    """The first PALETTE pictures give the colours that all others share: so what stands still stays still."""
+    from PIL import Image
+
+    shown = np.stack([next(images) for _ in range(PALETTE)])
+    _, height, width, _ = shown.shape
+    pixels = Image.fromarray(shown[:, ::2, ::2].reshape(1, -1, 3))
+    palette = pixels.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3)
+    # Ordered dithering keeps the backdrop smooth, and still; what is diffused would crawl.
+    pattern = np.tile(DITHER * (_bayer(8)[..., None] - 63 / 128), (height // 8 + 1, width // 8 + 1, 1))
+
+    def reduced(image: np.ndarray):
+        dithered = image + pattern[:height, :width]
+        return Image.fromarray(dithered.clip(0, 255).astype(np.uint8)).quantize(palette=palette, dither=0)
+
+    ends = np.round(np.arange(1, len(times) - PALETTE + 1) * 100 / rate)  # a file counts hundredths of a second
+    durations = (10 * np.diff(ends, prepend=0)).astype(int).tolist()
+    frames = map(reduced, images)
+    next(frames).save(part, save_all=True, append_images=frames, duration=durations, loop=0, optimize=True)
+
+
+def _bayer(size: int) -> np.ndarray:
+    """Thresholds (size, size), from 0 to less than 1, of ordered dithering (Bayer 1973); the size is a power of two."""
+    if size == 1:
+        return np.zeros((1, 1))
+    finer = _bayer(size // 2)
+    return np.block([[finer, finer + 2 / size**2], [finer + 3 / size**2, finer + 1 / size**2]])
+
+
+def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+    import imageio.v2 as imageio
+
+    # The encoder's own default takes three times the cores for the same size and look.
+    fast = {"codec": "libx264", "quality": 8, "ffmpeg_params": ["-preset", "veryfast"]}
+    try:
+        with imageio.get_writer(part, fps=rate, macro_block_size=2, ffmpeg_log_level="quiet", **fast) as writer:
+            for image in images:
+                writer.append_data(image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2])
+    except OSError as error:
+        if error.errno is not None:  # else the encoder has ended, and takes no more pictures
+            raise
+    if _frames_of(part) < len(times):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _frames_of(clip: Path) -> int:
+    """Pictures that can be read back from a clip: its encoder's exit status is not told."""
+    import imageio_ffmpeg
+
+    try:
+        return imageio_ffmpeg.count_frames_and_secs(clip)[0]
+    except RuntimeError:
+        return 0
+
+
+_WRITERS = {".png": _strip, ".mp4": _mp4, ".gif": _gif}
+
+
+def _need(module: str) -> None:
+    from importlib.util import find_spec
+
+    if find_spec(module) is None:
+        package = {"PIL": "pillow"}.get(module, module.replace("_", "-"))
+        raise NeuralocksError(f"preview: {package} is not installed; pip install 'neuralocks[preview]'")

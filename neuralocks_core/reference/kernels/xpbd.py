@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Extended position based dynamics of one strand per thread, in the small-step form: float32, as games run it.
+
+Macklin, Mueller, Chentanez 2016 (XPBD) with the single iteration a substep of Macklin et al. 2019: Gauss-Seidel from
+root to tip over distances (rigid), bends (compliance 1 / stiffness) and body planes. Arrays are (K, S).
+"""
+
+import warp as wp
+
+array_vec = wp.array2d(dtype=wp.vec3)
+array_real = wp.array2d(dtype=wp.float32)
+
+
+@wp.func
+def hold_length(x: array_vec, inverse_mass: array_real, length: float, k: int, s: int):
+    """Bring the edge that ends in vertex k back to its length."""
+    above = inverse_mass[k - 1, s]
+    below = inverse_mass[k, s]
+    d = x[k, s] - x[k - 1, s]
+    size = wp.max(wp.length(d), 1.0e-9)
+    move = (size - length) / (size * (above + below)) * d
+    x[k - 1, s] = x[k - 1, s] + above * move
+    x[k, s] = x[k, s] - below * move
+
+
+@wp.func
+def hold_bend(x: array_vec, inverse_mass: array_real, rest: wp.vec3, compliance: float, i: int, s: int):
+    """Two constraints, u . (bend - rest) = 0 for the directions u across edge i; see `rod.add_bend`."""
+    d = x[i, s] - x[i - 1, s]
+    f = x[i + 1, s] - x[i, s]
+    back = wp.max(wp.length(d), 1.0e-9)
+    ahead = wp.max(wp.length(f), 1.0e-9)
+    e = d / back
+    f = f / ahead
+    open = wp.max(1.0 + wp.dot(e, f), 0.05)
+    scale = 1.0 / wp.sqrt(2.0 * open)
+    cross = wp.cross(e, f)
+    u = wp.cross(e, wp.vec3(1.0, 0.0, 0.0))
+    if wp.abs(e[0]) > 0.7:
+        u = wp.cross(e, wp.vec3(0.0, 1.0, 0.0))
+    u = wp.normalize(u)
+    w0 = inverse_mass[i - 1, s]
+    w1 = inverse_mass[i, s]
+    w2 = inverse_mass[i + 1, s]
+    for _turn in range(2):
+        gap = scale * wp.dot(u, cross) - wp.dot(u, rest)
+        lean = -scale * scale * scale * wp.dot(u, cross)
+        a = scale * wp.cross(f, u) + lean * f
+        b = scale * wp.cross(u, e) + lean * e
+        a = (a - wp.dot(a, e) * e) / back
+        b = (b - wp.dot(b, f) * f) / ahead
+        m = a - b
+        weight = w0 * wp.dot(a, a) + w1 * wp.dot(m, m) + w2 * wp.dot(b, b) + compliance
+        push = -gap / weight
+        x[i - 1, s] = x[i - 1, s] - w0 * push * a
+        x[i, s] = x[i, s] + w1 * push * m
+        x[i + 1, s] = x[i + 1, s] + w2 * push * b
+        u = wp.cross(e, u)
+
+
+@wp.kernel(enable_backward=False)
+def frame(
+    length: array_real,
+    inverse_mass: array_real,
+    stiffness: array_real,
+    curl: array_vec,
+    rest: array_vec,
+    push: array_vec,
+    weight: wp.array(dtype=wp.float32),
+    damping: wp.array(dtype=wp.float32),
+    turns: wp.array(dtype=wp.quat),
+    origins: wp.array(dtype=wp.vec3),
+    gravity: wp.vec3,
+    h: float,
+    plane: wp.array2d(dtype=wp.vec4),
+    margin: array_real,
+    x: array_vec,
+    old: array_vec,
+    velocity: array_vec,
+):
+    """All substeps of a frame. turns, origins: the head at each substep, the frame's start first.
+
+    plane: in the head's frame. push: rest support per mass, head axes. stiffness: 4 B / l per interior vertex.
+    """
+    s = wp.tid()
+    vertices = x.shape[0]
+    for step in range(1, turns.shape[0]):
+        turn = turns[step]
+        origin = origins[step]
+        carry = turn * wp.quat_inverse(turns[step - 1])
+        keep = wp.exp(-damping[s] * h)
+        for k in range(vertices):
+            p = x[k, s]
+            old[k, s] = p
+            if k < 2:
+                x[k, s] = origin + wp.quat_rotate(turn, rest[k, s])
+            else:
+                along = (wp.quat_rotate(carry, p - origins[step - 1]) + origin - p) / h
+                v = along + keep * (velocity[k, s] - along)
+                v = v + h * weight[s] * (gravity + wp.quat_rotate(turn, push[k, s]))
+                x[k, s] = p + h * v
+        q = turn
+        for k in range(2, vertices):
+            hold_length(x, inverse_mass, length[k, s], k, s)
+            hold_bend(
+                x,
+                inverse_mass,
+                wp.quat_rotate(q, curl[k - 1, s]),
+                1.0 / (stiffness[k - 1, s] * h * h),
+                k - 1,
+                s,
+            )
+            e = wp.normalize(x[k - 1, s] - x[k - 2, s])
+            f = wp.normalize(x[k, s] - x[k - 1, s])
+            open = wp.max(1.0 + wp.dot(e, f), 1.0e-4)
+            bend = wp.cross(e, f) / wp.sqrt(2.0 * open)
+            q = wp.normalize(wp.quat(bend[0], bend[1], bend[2], wp.sqrt(0.5 * open)) * q)
+        for k in range(2, vertices):
+            wall = plane[k, s]
+            n = wp.vec3(wall[0], wall[1], wall[2])
+            p = wp.quat_rotate_inv(turn, x[k, s] - origin)
+            depth = margin[k, s] - (wp.dot(n, p) - wall[3])
+            if depth > 0.0:
+                x[k, s] = x[k, s] + depth * wp.quat_rotate(turn, n)
+            velocity[k, s] = (x[k, s] - old[k, s]) / h
+
+
+@wp.kernel(enable_backward=False)
+def look(
+    mesh: wp.uint64,
+    reach: float,
+    turn: wp.quat,
+    origin: wp.vec3,
+    carry: wp.quat,
+    carry_origin: wp.vec3,
+    x: array_vec,
+    plane: wp.array2d(dtype=wp.vec4),
+):
+    """Nearest body element of each vertex, taken along into the frame's end; a plane in the head's frame."""
+    k, s = wp.tid()
+    q = wp.quat_rotate(carry, x[k, s]) + carry_origin
+    hit = wp.mesh_query_point_sign_normal(mesh, q, reach, 1.0e-3)
+    found = wp.vec4(0.0, 0.0, 0.0, -1.0e3)
+    if hit.result:
+        near = wp.mesh_eval_position(mesh, hit.face, hit.u, hit.v)
+        away = (q - near) * hit.sign
+        gap = wp.length(away)
+        n = wp.mesh_eval_face_normal(mesh, hit.face)
+        if gap > 1.0e-4:
+            n = away / gap
+        m = wp.quat_rotate_inv(turn, n)
+        found = wp.vec4(m[0], m[1], m[2], wp.dot(n, near - origin))
+    plane[k, s] = found

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rig model as one self-contained C99 header for engines, and a worked example beside it."""
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
+from neuralocks_core.rig.network import RigModel, rig_spec
+
+_TEXTS = Path(__file__).parent
+_AT_ONCE = 4
+"""Rows of a layer that are added at a time."""
+_WIDTH = 8
+"""Columns of a layer are a multiple of it: what vector units take at once."""
+
+
+MADE = "Made by `neuralocks rig export-c`"
+"""What both files say in their first lines."""
+
+
+def made_here(path) -> bool:
+    """Whether a file is a header, or a worked example, that `export_c` wrote."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            return MADE in file.read(1000)
+    except UnicodeDecodeError:
+        return False
+
+
+def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
+    """Write `path` (ends in .h) and `<path>_example.c` beside it.
+
+    Args:
+        model: the trained model.
+        path: header to write.
+        prefix: of every name in it, so that several models can live in one program.
+
+    Raises:
+        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, the example's place is taken
+            by another file, or the model reads what the header does not compute.
+    """
+    path = Path(path)
+    if path.suffix not in (".h", ".hpp"):
+        raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
+    if re.search(r'["\\\x00-\x1f]', path.name):
+        raise NeuralocksError(f"{path.name!r}: no #include can name it; choose a name without quotes and backslashes")
+    beside = example_beside(path)
+    if beside.is_file() and not made_here(beside):
+        raise NeuralocksError(f"{beside}: would be written over by the worked example; move it, or name another header")
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
+        raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
+    known = rig_spec(model.dynamic)
+    if any(getattr(model.spec, name) != getattr(known, name) for name in ("pose_joints", "linear", "chest")):
+        raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
+    for target, text in (
+        (path, header_text(model, prefix)),
+        (beside, _example(model, path.name, prefix)),
+    ):
+        with atomic_write(target) as part:
+            part.write_text(text, encoding="utf-8", newline="\n")
+    return path
+
+
+def example_beside(path: Path) -> Path:
+    """The file of the worked example of a header."""
+    return path.with_name(f"{path.stem}_example.c")
+
+
+def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
+    """The text of the header: the template rig/hair.h.in with the model's numbers in place of @NAME@."""
+    text = (_TEXTS / "hair.h.in").read_text(encoding="utf-8")
+    history = (_TEXTS / "history.h.in").read_text(encoding="utf-8") if model.dynamic else ""
+    text = text.replace("@HISTORY@", history)
+    text = _parts_for(model, text)
+    chains = model.chains
+    size = np.float32(np.sin(model.max_angle / 2))
+    layers = _padded(model.layers, len(chains))
+    spec = model.spec
+    values = {
+        "PREFIX": prefix,
+        "UPPER": prefix.upper(),
+        "DIGEST": _digest(model),
+        "JOINTS": len(chains),
+        "FEATURES": model.inputs,
+        "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
+        "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
+        "CHAINS": _plain(", ".join(chains.chain_name(c) for c in range(len(chains.roots)))),
+        "READS": _reads(model),
+        "DEGREES": f"{np.degrees(model.max_angle):.0f}",
+        "ROWS": len(layers[0][0]),
+        "WIDTH": layers[-1][0].shape[1] // 3,
+        "LIMITS": ", ".join(_float(v) for v in model.limits),
+        "SIZE": _float(size),
+        "SIZE2": _float(size * size),
+        "FLOOR": _float(np.float32(1) - size * size),
+        "BINS": len(spec.bins),
+        "STEPS": spec.steps,
+        "BINSTEPS": ", ".join(str(b) for b in spec.bins),
+        "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
+        "DT": repr(float(spec.dt)),
+        **_network(layers),
+    }
+    return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _digest(model: RigModel) -> str:
+    """By which a compiler tells two models apart."""
+    digest = hashlib.sha256(repr(model.chains.names).encode("utf-8", "replace"))
+    for array in (model.limits, *(each for layer in model.layers for each in layer)):
+        digest.update(array.tobytes())
+    return digest.hexdigest()[:12].upper()
+
+
+def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:
+    """C text of the padded layers: weights, buffers of their outputs, loops, and the last buffer's name."""
+    tables, buffers, code, below = [], [], [], "x"
+    for index, (weight, bias) in enumerate(layers):
+        rows, columns = weight.shape
+        kind, number = ("double", _double) if index == 0 else ("float", _float)
+        table = ",\n".join(" {" + ", ".join(number(v) for v in row) + "}" for row in weight)
+        tables.append(f"  static const {kind} w{index}[{rows}][{columns}] = {{\n{table}}};")
+        tables.append(f"  static const {kind} b{index}[{columns}] = {{{', '.join(number(v) for v in bias)}}};")
+        buffers.append(f"  float h{index}[{columns}];")
+        code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
+        below = f"h{index}"
+    return {"TABLES": "\n".join(tables), "BUFFERS": "\n".join(buffers), "LAYERS": "\n".join(code), "RAW": below}
+
+
+def _padded(layers, joints: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Weights (in, out) and biases of the C layers, zeros added so that no loop has a remainder.
+
+    The last layer gives x of all joints, then y, then z, so that joints are turned many at a time.
+    """
+    result, rows = [], _round_up(layers[0][0].shape[1], _AT_ONCE)
+    for index, (weight, bias) in enumerate(layers):
+        count = len(bias)
+        if index + 1 < len(layers):
+            place, columns = np.arange(count), _round_up(count, _WIDTH)
+        else:
+            width = _round_up(joints, _WIDTH)
+            place, columns = (np.arange(joints)[:, None] + width * np.arange(3)).ravel(), 3 * width
+        padded, biases = np.zeros((rows, columns), np.float32), np.zeros(columns, np.float32)
+        padded[: weight.shape[1], place] = weight.T
+        biases[place] = bias
+        result.append((padded, biases))
+        rows = columns
+    return result
+
+
+def _round_up(count: int, unit: int) -> int:
+    return -(-count // unit) * unit
+
+
+def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
+    """Outer products whose inner loop has a constant length, so that it vectorises. Blocks of columns keep the sums in
+    registers, four rows at a time spare three of four trips to memory, and rows are added in the order in which
+    matrix libraries add them, bias last, so that the rounding is theirs. The first layer is summed in double precision, as
+    everywhere: it has many large terms.
+    """
+    block = next(size for size in (48, 40, 32, 24, 16, 8) if columns % size == 0)
+    total, kind, zero, narrow = "s[k]", "float", "0.0f", ""
+    if index == 0:
+        kind, zero, narrow = "double", "0.0", "(float)"
+    for row in range(_AT_ONCE):
+        total = f"({total} + w{index}[i + {row}][j + k] * {below}[i + {row}])"
+    lines = [
+        f"  for (j = 0; j < {columns}; j += {block}) {{",
+        f"    {kind} s[{block}];",
+        f"    for (k = 0; k < {block}; ++k) s[k] = {zero};",
+        f"    for (i = 0; i < {rows}; i += {_AT_ONCE})",
+        f"      for (k = 0; k < {block}; ++k) s[k] = {total[1:-1]};",
+        f"    for (k = 0; k < {block}; ++k) s[k] += b{index}[j + k];",
+        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = "
+        + (f"s[k] > {zero} ? {narrow}s[k] : 0.0f;" if hidden else f"{narrow}s[k];"),
+        "  }",
+    ]
+    return "\n".join(lines)
+
+
+def _parts_for(model: RigModel, text: str) -> str:
+    """A template without its marks, and for a quasi-static model without what lies between @IF_DYNAMIC@ and @END@."""
+    return re.sub(r"@IF_DYNAMIC@\n(.*?)@END@\n", r"\1" if model.dynamic else "", text, flags=re.S)
+
+
+def _example(model: RigModel, header: str, prefix: str) -> str:
+    text = _parts_for(model, (_TEXTS / "example.c.in").read_text(encoding="utf-8"))
+    names = {"HEADER": header, "STEM": Path(header).stem, "PREFIX": prefix, "UPPER": prefix.upper()}
+    return re.sub("@([A-Z]+)@", lambda m: names[m[1]], text)
+
+
+def _reads(model: RigModel) -> str:
+    """A line of the header's comment with the joints that the inputs are of, if the model file has their names."""
+    reads = model.training.get("reads")
+    if not isinstance(reads, dict) or not all(isinstance(name, str) for name in reads.values()):
+        return ""
+    named = ", ".join(f"{part.replace('_', ' ')} {name}" for part, name in reads.items())
+    return f" *   the joints that it reads, as they are named in its rig: {_plain(named)}\n"
+
+
+def _plain(text: str) -> str:
+    """What may stand in a comment, whoever made the model."""
+    return re.sub(r"[^\w ,.:-]", "_", text[:300])
+
+
+def _float(value) -> str:
+    text = str(np.float32(value))
+    return (text if "." in text or "e" in text else f"{text}.0") + "f"
+
+
+def _double(value) -> str:
+    return repr(float(np.float32(value)))
+
+
+def _c_text(name: str) -> str:
+    """A name as UTF-8 inside a C string literal, in plain ASCII: three octal digits end by themselves."""
+    plain = [chr(byte).isalnum() or chr(byte) in " _-.:" for byte in range(128)] + [False] * 128
+    return "".join(chr(byte) if plain[byte] else f"\\{byte:03o}" for byte in name.encode("utf-8", "replace"))

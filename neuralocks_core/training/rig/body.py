@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The body around the head of a rig with mesh hair: posed, and how far from it points are."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.rig.rigging import HairRig
+
+AROUND = 1000
+"""Body vertices that a simulation meets."""
+
+
+class BodyPatch:
+    """The part of the body around the head that hair can reach.
+
+    Attributes:
+        body: that part, whose blend shapes leave the head as it is.
+        kept: vertices whose planes are used.
+        rim: which of these touch the cut, (kept,).
+    """
+
+    def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
+        body, character = rig.character.body, rig.character
+        inside = rig.in_reach(body)
+        used = np.unique(body.triangles[inside])
+        place = np.zeros(len(body.points), int)
+        place[used] = np.arange(len(used))
+        near = body.part(used, place[body.triangles[inside]])
+        # The hair was fitted to its own head: other bodies vary below it.
+        on_head = np.sum(near.joint_weights * (near.joint_indices == character.head), axis=1)
+        shapes = {}
+        for name, offsets in near.shapes.items():
+            mean = offsets[on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
+            shapes[name] = (offsets - mean) * (1 - on_head)[:, None]
+        self.body = replace(near, shapes=shapes)
+        self.kept = np.sort(rng.permutation(len(used))[:most_points])
+        cut = np.zeros(len(body.points), bool)
+        cut[body.triangles[~inside]] = True
+        self.rim = cut[used][self.kept]
+
+
+def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
+    character = rig.character
+    body = BodyPatch(rig, np.random.default_rng(0), 1).body
+    skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
+    return np.stack([proven_distances(body.posed(m), body.triangles, p) for m, p in zip(skinning, points)])
+
+
+def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Distance (V,) [m] that canonical points (V, 3) may come near the body: what they have in bind pose, exactly or by
+    the nearest body vertex's plane, whichever is less.
+
+    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair would be thrown
+    from where the artist has put it.
+    """
+    exact, body = rest_distances(rig, points), rig.character.body
+    if body is None or not len(points):
+        return exact
+    used = np.unique(body.triangles)
+    vertices = rig.character.canonical(body.points)
+    normals = vertex_normals(vertices, body.triangles)[used]
+    nearest = cKDTree(vertices[used]).query(points)[1]
+    return np.minimum(exact, np.einsum("vi,vi->v", points - vertices[used][nearest], normals[nearest]))
+
+
+def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
+    """Signed distances (V,) [m] of canonical points (V, 3) to the body in bind pose; infinite without one."""
+    body = rig.character.body
+    if body is None:
+        return np.full(len(points), np.inf)
+    return Collider(rig.character.canonical(rig.character.body.points), body.triangles).distance(points)[0]
+
+
+def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
+    canonical space of the head; None if there are none.
+    """
+    body, character = rig.character.body, rig.character
+    if body is None:
+        return None
+    canonical = rig.character.canonical(rig.character.body.points)
+    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
+    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
+    near = np.flatnonzero(used)
+    if not len(near):
+        return None
+    chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
+    normals = vertex_normals(body.points, body.triangles)[chosen]
+    to_head = np.linalg.inv(character.canonical_to_world(joints))
+    skinning = to_head[:, None] @ joints @ character.inverse_bind
+    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
+    for row, matrices in enumerate(skinning):
+        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
+        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
+        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
+    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)

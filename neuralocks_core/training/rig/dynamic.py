@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training the dynamic variant of a rig's network: regression on simulations of its chains under random motion.
+
+The network stays a pure function of the boundary history; what it learns to answer is what the simulation did
+after the same history.
+"""
+
+import time
+from dataclasses import asdict, replace
+
+import numpy as np
+import torch
+
+from neuralocks_core.animation.random_motion import random_clip
+from neuralocks_core.progress import Progress, silent
+from neuralocks_core.rig.network import RigModel, rig_spec
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.training.descent import Schedule, descend, muon
+from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
+from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial
+from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
+from neuralocks_core.training.rig.network import TinyNet
+from neuralocks_core.training.rig.report import static_report, within
+
+_VELOCITY = 20.0
+"""Of squared errors of the motion from one sample to the next, against squared errors of places."""
+_BESIDE = 0.02
+"""How far beside a bone's end [m] a turn shows: of ends alone networks learn that locks may twist as they like."""
+_COLLISION, _HELD_COLLISION, _HELD_ELASTIC = 1.5e-4, 2e-4, 2e-3
+"""Of the skinned mesh's contact in motion and in held poses, and of gravity and bending in held poses [m^2/s^2], against
+squared errors [m^2]. Clips hold few of the poses that necks can take; energy needs no clip."""
+_RATE = 3e-3
+_POOL = 256
+"""Bodies held ready, as many in motion."""
+_HELD, _MOVING = 16, 8
+"""Bodies in held poses and in motion of which the contact is felt in a step."""
+_CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
+"""About how long each takes [s], so that progress goes evenly."""
+_MOMENTS = 16
+"""Of each simulated motion, from which those in motion are drawn."""
+_ROOM, _HELD_ROOM = 0.006, 0.012
+"""Kept from the body over the material's margin while learning, in motion and in held poses [m]: the network cannot hit the
+mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
+
+
+def train_dynamic(
+    rig: HairRig,
+    material: RigMaterial = RigMaterial(),
+    *,
+    seconds: float = 120.0,
+    steps: int | None = None,
+    hidden: int = 32,
+    seed: int = 0,
+    clips: int = 256,
+    clip_seconds: float = 4.0,
+    batch: int = 256,
+    report_poses: int = 1000,
+    progress: Progress | None = None,
+) -> RigModel:
+    """Train the dynamic network of one rig.
+
+    Args:
+        rig: chains and body.
+        material: constants; `damping` counts here.
+        seconds: how long to regress, after the simulations; `steps`, if given, takes its place.
+        hidden: width of both layers.
+        seed: decides clips and first weights.
+        clips: how many random motions are simulated.
+        clip_seconds: length of each [s].
+        batch: pairs of consecutive samples a step.
+        report_poses: held-out poses of the report, which also compares with spring bones in motion; 0 leaves it out.
+        progress: called with (done, total, message); may raise to stop.
+    """
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    say = progress or silent
+    spec = rig_spec(dynamic=True)
+    simulating, learning = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
+    ends = np.cumsum([simulating, learning, _REPORT_TAKES])
+    simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
+    features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated))
+    held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
+    moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
+    inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
+    net = TinyNet(features.shape[-1], hidden, len(rig.chains), held.pool, spec)
+    net.normalise(features.reshape(-1, features.shape[-1]))
+
+    def losses(done: float) -> dict[str, torch.Tensor]:
+        clip = torch.as_tensor(rng.integers(0, inputs.shape[0], batch))
+        frame = torch.as_tensor(rng.integers(1, inputs.shape[1], batch))
+        both = torch.cat([inputs[clip, frame], inputs[clip, frame - 1]])
+        with torch.no_grad():
+            there = _marks(held.energy, torch.cat([wanted[clip, frame], wanted[clip, frame - 1]]))
+        now, before = (_marks(held.energy, net(both)) - there).chunk(2)
+        result = {
+            "place": now.square().sum(-1).mean(),
+            "motion": _VELOCITY * (now - before).square().sum(-1).mean(),
+        }
+        if held.pool.collides:
+            # Near the body a small error is a deep one, which squared errors do not tell.
+            elastic, collision = held.parts(net, _HELD)
+            felt = contact_weight(done)
+            result["held"] = felt * _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic.mean()
+            result["moving"] = felt * _COLLISION * moving.parts(net, _MOVING)[1].mean()
+        return result
+
+    began = time.monotonic()
+    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
+    for state in descend(muon(net, _RATE, 0.1), losses, schedule):
+        far = simulated + int((learned - simulated) * state.done)
+        say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
+    training = {
+        "method": "dynamic, regression on simulated chains",
+        "steps": state.step,
+        "seconds": round(time.monotonic() - began, 1),
+        "seed": seed,
+        "clips": clips,
+        "clip_seconds": clip_seconds,
+        "batch": batch,
+        "hidden": hidden,
+        "material": asdict(material),
+    }
+    model = net.model(rig.chains, training)
+    if report_poses:
+        middle = (learned + 1000) // 2
+        held_poses, in_motion = within(say, learned, middle), within(say, middle, 1000)
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, held_poses))
+        model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
+        say(1000, 1000, "report done")
+    return model
+
+
+def _marks(energy: RigEnergy, turns: torch.Tensor) -> torch.Tensor:
+    """Bones' ends, and points BESIDE them in three directions less these, (B, M, 12) [m], of turns (B, N, 4)."""
+    rotations, _, ends = energy.pose(turns)
+    beside = _BESIDE * rotations[:, energy.bone_joint]
+    return torch.cat([ends, beside.flatten(-2)], dim=-1)
+
+
+def _simulated(rig, material, spec, clips, seconds, rng, say) -> tuple[np.ndarray, np.ndarray, Moments]:
+    """Features (C, T, F) and turns (C, T, N, 4) of random motions, a few at a time so that progress can be told; and
+    some moments of each.
+    """
+    parts, read, posed = [], [], []
+    for first in range(0, clips, 16):
+        say(first, clips, f"simulating motion, {first} of {clips} clips")
+        few = [random_clip(rig.character, rng, seconds, rate=RATE) for _ in range(min(16, clips - first))]
+        parts.append(simulate_motions(rig, material, spec, few))
+        for motion, features in zip(few, parts[-1][0]):
+            samples = rng.choice(len(features), min(_MOMENTS, len(features)), replace=False)
+            read.append(features[samples])
+            posed.append(motion.at(motion.start + samples / RATE) @ rig.character.inverse_bind)
+    features, turns = zip(*parts)
+    return np.concatenate(features), np.concatenate(turns), Moments(np.concatenate(read), np.concatenate(posed))

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tiny network of a rig while it is trained."""
+
+import numpy as np
+import torch
+
+from neuralocks_core.rig.network import MAX_ANGLE, POSE, RigModel, input_limits
+from neuralocks_core.training.rig.energy import bounded_turns
+from neuralocks_core.training.rig.poses import PosePool
+
+
+class TinyNet(torch.nn.Module):
+    """Two hidden layers; gives turns (B, N, 4) wxyz in canonical axes, none for the held bind pose.
+
+    Args:
+        inputs: F, how many features it reads.
+        hidden: width of both layers.
+        joints: N.
+        pool: poses whose features scale the inputs.
+        spec: which features these are.
+    """
+
+    def __init__(self, inputs: int, hidden: int, joints: int, pool: PosePool, spec):
+        super().__init__()
+        self.joints, self.spec = joints, spec
+        sample = np.arange(min(pool.count, 512))
+        features = pool.features(spec, sample, pool.gravity(sample))
+        self.register_buffer("mean", torch.as_tensor(features.mean(0)))
+        self.register_buffer("scale", torch.as_tensor(1 / np.maximum(features.std(0), 0.05)))
+        still = np.zeros(inputs, np.float32)
+        still[[0, 4, 6, 10, 13]] = 1, 1, 1, 1, -1
+        self.register_buffer("bind", torch.as_tensor(still)[None])
+        self.layers = torch.nn.ModuleList(
+            [torch.nn.Linear(inputs, hidden), torch.nn.Linear(hidden, hidden), torch.nn.Linear(hidden, 3 * joints)]
+        )
+        torch.nn.init.normal_(self.layers[2].weight, std=0.02)
+
+    def normalise(self, features: np.ndarray) -> None:
+        """Scale the inputs of a dynamic network by a sample (n, F) of motion."""
+        self.mean.copy_(torch.as_tensor(features.mean(0)))
+        deviation = np.maximum(features.std(0), 0.02)
+        deviation[POSE:] *= 3.0  # the long history must not drown the pose
+        self.scale.copy_(torch.as_tensor(1 / deviation))
+        self.mean[POSE:] = 0
+
+    def raw(self, features: torch.Tensor) -> torch.Tensor:
+        """Unbounded outputs (B, 3 N) of features (B, F)."""
+        value = (features - self.mean) * self.scale
+        value = torch.relu(self.layers[0](value))
+        return self.layers[2](torch.relu(self.layers[1](value)))
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        raw = self.raw(features) - self.raw(self.bind)
+        return bounded_turns(raw.reshape(len(features), self.joints, 3), MAX_ANGLE)
+
+    def model(self, chains, training: dict) -> RigModel:
+        """What runs without torch, for the chains that this was trained on."""
+        limits = input_limits(self.spec)
+        return RigModel(chains, self.spec, self.plain_layers(chains.axes), limits, training=training)
+
+    def plain_layers(self, axes: np.ndarray) -> tuple:
+        """Weights and biases with the normalisation, the bind pose and the joints' axes (N, 3, 3) folded in;
+        summed in float64.
+        """
+        w = [layer.weight.detach().double().numpy() for layer in self.layers]
+        b = [layer.bias.detach().double().numpy() for layer in self.layers]
+        b[0] = b[0] - w[0] @ (self.mean * self.scale).double().numpy()
+        w[0] = w[0] * self.scale.double().numpy()
+        w, b = [x.astype(np.float32) for x in w], [x.astype(np.float32) for x in b]
+        hidden = np.maximum(w[0] @ self.bind[0].numpy() + b[0], 0)
+        hidden = np.maximum(w[1] @ hidden + b[1], 0).astype(float)
+        turned = np.einsum("nji,njk->nik", axes, w[2].astype(float).reshape(-1, 3, w[2].shape[1]))
+        w[2] = turned.reshape(w[2].shape).astype(np.float32)
+        b[2] = -(w[2].astype(float) @ hidden)
+        return tuple(zip(w, b))

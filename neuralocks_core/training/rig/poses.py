@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random neck poses and body shapes for rigged mesh hair, with the body around the head of each (paper section 4.4)."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.deformation.scratch import Scratch
+from neuralocks_core.progress import Progress, silent
+from neuralocks_core.rig.network import held_features
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rotation import from_vector
+from neuralocks_core.runtime import cores
+from neuralocks_core.training.rig.body import BodyPatch
+
+RANGE = np.radians([60.0, 80.0, 45.0])
+"""Most nod, turn and tilt of the head against the chest that people have [rad]."""
+KEPT = 2000
+"""Vertices of each body, by whose planes depths are told."""
+_SIEVE = 5e-3
+"""Points farther than this [m] outside the plane of the nearest body vertex are not asked for exactly."""
+_TOGETHER = 96
+"""Points for which the nearest body vertex is looked for together: what is compared for them stays in the processor's cache,
+and takes a third of the time of asking a tree.
+"""
+_scratch = Scratch()
+
+
+class PosePool:
+    """Posed bodies to draw from; renewed bit by bit, so that no network learns their shapes by heart.
+
+    Args:
+        rig: hair and body.
+        count: how many poses are held at a time.
+        rng: decides all of them.
+        whole: keep each whole body around the head too, for exact distances.
+        moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
+            necks if left out.
+
+    Attributes:
+        moment: which of these each pose is, (P,).
+        relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
+        shapes: blend shape weights of each, (P, B).
+        bodies: with `whole`, vertices of the body around the head of each (V, 3) float32 [m], canonical; else None.
+    """
+
+    def __init__(
+        self,
+        rig: HairRig,
+        count: int,
+        rng: np.random.Generator,
+        whole: bool = False,
+        moving: np.ndarray | None = None,
+    ):
+        self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
+        self.moment = np.zeros(count, int)
+        self.relative = np.empty((count, 2, 3, 3))
+        self._patch = BodyPatch(rig, rng, KEPT) if rig.character.body is not None and len(rig.points) else None
+        self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
+        self.bodies = [None] * count if self._patch and whole else None
+        kept = len(self._patch.kept) if self._patch else 0
+        self._normals = np.empty((count, kept, 3), np.float32)
+        # x, y, z and x.x of each body vertex: a matrix product with (-2 p, 1) tells which is nearest to p.
+        self._points = np.empty((count, 4, kept), np.float32)
+        self.renew(count)
+
+    @property
+    def collides(self) -> bool:
+        """Whether there is a body to collide with."""
+        return self._patch is not None
+
+    def renew(self, count: int) -> np.ndarray:
+        """Put new poses in the place of the oldest; which these were, (count,)."""
+        character = self.rig.character
+        rows = (self._oldest + np.arange(count)) % self.count
+        self._oldest = (self._oldest + count) % self.count
+        if self._moving is None:
+            skinning = _random_skinning(character, count, self._rng)
+        else:
+            self.moment[rows] = self._rng.integers(0, len(self._moving), count)
+            skinning = self._moving[self.moment[rows]]
+        facing, head = character.facing, character.head
+        indices = [character.humanoid.nearest(name) for name in ("neck", "upper_chest")]
+        turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
+        self.relative[rows] = facing @ turns @ facing.T
+        if self._patch is None:
+            return rows
+        self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
+        skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
+        for row, matrices in zip(rows, skinning):
+            body = self._patch.body.posed(matrices, self.shapes[row]).astype(np.float32)
+            points = body[self._patch.kept]
+            self._points[row, :3], self._points[row, 3] = points.T, np.square(points).sum(axis=1)
+            self._normals[row] = vertex_normals(body, self._patch.body.triangles)[self._patch.kept]
+            if self.bodies is not None:
+                self.bodies[row] = body
+        return rows
+
+    def gravity(self, poses: np.ndarray) -> np.ndarray:
+        """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
+        upside down.
+        """
+        count = len(poses)
+        lean = np.abs(self._rng.normal(0, np.radians(25), count))
+        lean = np.where(self._rng.random(count) < 0.08, self._rng.uniform(0, np.pi, count), lean)
+        around = self._rng.uniform(0, 2 * np.pi, count)
+        axis = np.stack([np.cos(around), 0 * around, np.sin(around)], axis=1)
+        trunk = np.einsum("nji,j->ni", from_vector(axis * lean[:, None]), [0.0, -1.0, 0.0])
+        return np.einsum("nij,nj->ni", self.relative[poses, 1], trunk)
+
+    def features(self, spec, poses: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        """What the network reads of these poses (n, F) float32."""
+        return held_features(spec, self.relative[poses], gravity)
+
+    def planes(self, poses: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Plane of the body vertex nearest to each point (n, V, 3): normals (n, V, 3) and offsets (n, V), distance
+        = n.x - d.
+        """
+        normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
+        for row, pose in enumerate(poses):
+            nearest = _nearest(points[row], self._points[pose])
+            normals[row] = self._normals[pose, nearest]
+            offsets[row] = np.einsum("vi,iv->v", normals[row], self._points[pose, :3][:, nearest])
+            # Where the rest of the body was cut off, a plane says nothing about inside and outside.
+            offsets[row][self._patch.rim[nearest]] = -1e3
+        return normals, offsets
+
+    def distances(self, poses: np.ndarray, points: np.ndarray, progress: Progress = silent) -> np.ndarray:
+        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be in it, 1 elsewhere; needs `whole`."""
+        normals, offsets = self.planes(poses, points)
+        near = np.einsum("nvi,nvi->nv", normals, points) - offsets < _SIEVE
+        result = np.ones(near.shape)
+
+        def measure(row: int) -> None:
+            result[row, near[row]] = proven_distances(
+                self.bodies[poses[row]], self._patch.body.triangles, points[row][near[row]]
+            )
+
+        with ThreadPoolExecutor(cores()) as pool:
+            rows = np.flatnonzero(near.any(axis=1))
+            for done, _ in enumerate(pool.map(measure, rows), 1):
+                progress(done, len(rows), "measuring what lies in the body")
+        return result
+
+
+def _nearest(points: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Which of the body's vertices, columns x, y, z, x.x of (4, n), is nearest to each of the points (V, 3)."""
+    asked, nearest = np.ones((len(points), 4), np.float32), np.empty(len(points), int)
+    asked[:, :3] = -2 * points
+    (products,) = _scratch.arrays((_TOGETHER, body.shape[1]))
+    for first in range(0, len(points), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        np.matmul(asked[some], body, out=products[: len(asked[some])]).argmin(axis=1, out=nearest[some])
+    return nearest
+
+
+def _random_skinning(character, count, rng) -> np.ndarray:
+    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less."""
+    turns = {}
+    # Evenly in an ellipsoid that is a tenth larger than what a neck can do; its corners no neck can reach.
+    direction = rng.normal(size=(count, 3))
+    direction *= (1.1 * rng.random(count) ** (1 / 3) / np.linalg.norm(direction, axis=1))[:, None]
+    total = RANGE * direction
+    share = rng.uniform(0.2, 0.6, (count, 1)) if "neck" in character.humanoid else np.zeros((count, 1))
+    wobble = rng.normal(0, 0.08, (count, 3))
+    turns[character.humanoid.nearest("neck")] = share * total + wobble
+    head = (1 - share) * total - wobble
+    if character.humanoid.nearest("neck") == character.head:
+        head = total
+    turns[character.head] = head
+    for side, sign in (("left", 1), ("right", -1)):
+        arm, elbow = character.humanoid.get(f"{side}_upper_arm"), character.humanoid.get(f"{side}_lower_arm")
+        if arm is not None and elbow is not None:
+            bone = character.facing @ (character.skeleton.bind[elbow, :3, 3] - character.skeleton.bind[arm, :3, 3])
+            down = np.arctan2(-bone[1], sign * bone[0])
+            turns[arm] = np.outer(rng.uniform(np.radians(15), np.radians(80), count) - down, [0, 0, -sign])
+    skinning = np.empty((count, len(character.skeleton.names), 4, 4))
+    for joint, parent in enumerate(character.skeleton.parents):
+        carrier = skinning[:, parent] if parent >= 0 else np.broadcast_to(np.eye(4), (count, 4, 4))
+        if joint not in turns:
+            skinning[:, joint] = carrier
+            continue
+        own = np.broadcast_to(np.eye(4), (count, 4, 4)).copy()
+        own[:, :3, :3] = character.facing.T @ from_vector(turns[joint]) @ character.facing
+        origin = character.skeleton.bind[joint, :3, 3]
+        own[:, :3, 3] = origin - own[:, :3, :3] @ origin
+        skinning[:, joint] = carrier @ own
+    return skinning

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training the tiny quasi-static network of a rig without any data: random neck poses, energy as loss (paper
+section 4.4).
+"""
+
+import time
+from dataclasses import asdict, replace
+
+import numpy as np
+import torch
+
+from neuralocks_core.progress import Progress, silent
+from neuralocks_core.rig.network import POSE, RigModel, rig_spec
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.training.descent import Schedule, descend, muon
+from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
+from neuralocks_core.training.rig.energy import RigMaterial
+from neuralocks_core.training.rig.network import TinyNet
+from neuralocks_core.training.rig.report import static_report, within
+
+_POOL = 512
+"""Poses to draw from."""
+_ROOM = 0.01
+"""Kept from the body over the material's margin while learning [m]: the network sees neither the body's shape nor its arms,
+nor can it hit the mark to the millimetre, and so goes less deep into the body."""
+_COLLISION = 0.3
+"""Times the body's stiffness."""
+_RATE = 3e-3
+_LEARNING = 700
+"""Thousandths of the work that are learning, as by default; the rest is the report."""
+
+
+def train_static(
+    rig: HairRig,
+    material: RigMaterial = RigMaterial(),
+    *,
+    seconds: float = 75.0,
+    steps: int | None = None,
+    hidden: int = 16,
+    seed: int = 0,
+    batch: int = 32,
+    report_poses: int = 1000,
+    progress: Progress | None = None,
+) -> RigModel:
+    """Train the quasi-static network of one rig.
+
+    Args:
+        rig: chains, hair vertices and body.
+        material: constants of the energy.
+        seconds: how long to train; `steps`, if given, takes its place and makes the result repeatable.
+        hidden: width of both layers (the paper's 16).
+        seed: decides poses and first weights.
+        batch: poses a step.
+        report_poses: held-out poses of the report; 0 leaves it out.
+        progress: called with (done, total, message); may raise to stop.
+    """
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    spec = rig_spec()
+    say = progress or silent
+    say(0, 1, "posing bodies")
+    roomy = replace(material, margin=material.margin + _ROOM)
+    held = HairOnBodies(rig, roomy, _POOL, rng, spec)
+    net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec)
+
+    def losses(done: float) -> dict[str, torch.Tensor]:
+        elastic, collision = held.parts(net, batch)
+        return {"elastic": elastic.mean(), "collision": contact_weight(done) * _COLLISION * collision.mean()}
+
+    began = time.monotonic()
+    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
+    for state in descend(muon(net, _RATE, 0.0), losses, schedule):
+        say(int(_LEARNING * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
+    training = {
+        "method": "quasi-static, self-supervised",
+        "steps": state.step,
+        "seconds": round(time.monotonic() - began, 1),
+        "seed": seed,
+        "batch": batch,
+        "hidden": hidden,
+        "material": asdict(material),
+    }
+    model = net.model(rig.chains, training)
+    if report_poses:
+        model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000)))
+    return model

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Semantic joints are found on the rigs that people have."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.errors import NeuralocksError
+
+
+def rig(text: str) -> tuple[list[str], list[int]]:
+    """Joint paths and parents from an indented outline."""
+    paths, stack = [], []
+    for line in text.strip("\n").split("\n"):
+        depth = len(line) - len(line.lstrip())
+        stack = [*stack[:depth], line.strip()]
+        paths.append("/".join(stack))
+    index = {path: i for i, path in enumerate(paths)}
+    return paths, [index.get(path.rpartition("/")[0], -1) for path in paths]
+
+
+RIGS = {
+    "Rigify, generated": (
+        "MCH_torso_parent\n torso\n  MCH_spine_003\n   spine_fk_003\n    MCH_ROT_neck\n     neck\n      MCH_ROT_head\n"
+        "       head\n    ORG_spine_003\n     ORG_shoulder_L\n      ORG_upper_arm_L\n     ORG_shoulder_R\n"
+        "      ORG_upper_arm_R",
+        {"head": "head", "neck": "neck", "upper_chest": "spine_fk_003", "left_upper_arm": "ORG_upper_arm_L"},
+    ),
+    "MotionBuilder": (
+        "Hips\n LeftUpLeg\n RightUpLeg\n LowerBack\n  Spine1\n   Neck\n    Neck1\n     Head\n      HeadTop_End\n"
+        "   LeftShoulder\n    LeftArm\n     LeftForeArm\n   RightShoulder\n    RightArm",
+        {
+            "head": "Head",
+            "neck": "Neck",
+            "upper_chest": "Spine1",
+            "left_shoulder": "LeftShoulder",
+            "left_upper_arm": "LeftArm",
+            "left_lower_arm": "LeftForeArm",
+            "hips": "Hips",
+        },
+    ),
+    "3ds Max": (
+        "Hips\n Chest\n  Chest2\n   LeftCollar\n    LeftShoulder\n     LeftElbow\n   RightCollar\n    RightShoulder\n"
+        "   Neck\n    Head\n LeftHip\n RightHip",
+        {"head": "Head", "upper_chest": "Chest2", "left_shoulder": "LeftCollar", "left_upper_arm": "LeftShoulder"},
+    ),
+    "Poser": (
+        "hip\n abdomen\n  chest\n   neck\n    head\n     leftEye\n   rCollar\n    rShldr\n   lCollar\n    lShldr",
+        {"head": "head", "neck": "neck", "upper_chest": "chest", "right_upper_arm": "rShldr", "left_eye": "leftEye"},
+    ),
+    "VRoid": (
+        "J_Bip_C_Hips\n J_Bip_C_Spine\n  J_Bip_C_UpperChest\n   J_Bip_C_Neck\n    J_Bip_C_Head\n     J_Sec_Hair1\n"
+        "   J_Bip_L_Shoulder\n    J_Bip_L_UpperArm\n   J_Bip_R_Shoulder\n    J_Bip_R_UpperArm",
+        {"head": "J_Bip_C_Head", "upper_chest": "J_Bip_C_UpperChest", "right_upper_arm": "J_Bip_R_UpperArm"},
+    ),
+    "Unreal": (
+        "pelvis\n spine_01\n  spine_03\n   clavicle_l\n    upperarm_l\n   clavicle_r\n    upperarm_r\n   neck_01\n    head",
+        {"head": "head", "neck": "neck_01", "upper_chest": "spine_03", "left_shoulder": "clavicle_l"},
+    ),
+    "Mixamo": (
+        "mixamorig:Hips\n mixamorig:Spine2\n  mixamorig:Neck\n   mixamorig:Head\n    mixamorig:HeadTop_End\n"
+        "  mixamorig:LeftShoulder\n   mixamorig:LeftArm\n  mixamorig:RightShoulder\n   mixamorig:RightArm",
+        {"head": "mixamorig:Head", "left_upper_arm": "mixamorig:LeftArm", "upper_chest": "mixamorig:Spine2"},
+    ),
+    "HumanIK in a namespace, in USD": (
+        "Root\n hero_rig_Character1_Hips\n  hero_rig_Character1_Spine\n   hero_rig_Character1_Spine1\n"
+        "    hero_rig_Character1_Neck\n     hero_rig_Character1_Head\n    hero_rig_Character1_LeftShoulder\n"
+        "     hero_rig_Character1_LeftArm\n      hero_rig_Character1_LeftForeArm\n       hero_rig_Character1_LeftHand\n"
+        "    hero_rig_Character1_RightShoulder\n     hero_rig_Character1_RightArm",
+        {
+            "head": "hero_rig_Character1_Head",
+            "left_shoulder": "hero_rig_Character1_LeftShoulder",
+            "left_upper_arm": "hero_rig_Character1_LeftArm",
+            "left_lower_arm": "hero_rig_Character1_LeftForeArm",
+            "right_upper_arm": "hero_rig_Character1_RightArm",
+            "upper_chest": "hero_rig_Character1_Spine1",
+        },
+    ),
+    "a namespace, and joints of a face without it": (
+        "Character1_Hips\n Character1_Spine\n  Character1_Neck\n   Character1_Head\n    jaw\n    eye_L\n    eye_R\n"
+        "    tongue_1\n  Character1_LeftShoulder\n   Character1_LeftArm\n  Character1_RightShoulder\n"
+        "   Character1_RightArm",
+        {"head": "Character1_Head", "left_upper_arm": "Character1_LeftArm", "left_eye": "eye_L"},
+    ),
+    "a namespace, and more joints of hair without it": (
+        "Character1_Hips\n Character1_Spine\n  Character1_Neck\n   Character1_Head\n"
+        + "".join(f"    hair_{i:02d}\n" for i in range(9))
+        + "  Character1_LeftShoulder\n   Character1_LeftArm\n  Character1_RightShoulder\n   Character1_RightArm",
+        {"head": "Character1_Head", "left_upper_arm": "Character1_LeftArm"},
+    ),
+    "AutoRig Pro": (
+        "root_x\n spine_01_x\n  spine_03_x\n   neck_x\n    head_x\n   shoulder_l\n    arm_stretch_l\n     forearm_stretch_l\n"
+        "   shoulder_r\n    arm_stretch_r",
+        {
+            "head": "head_x",
+            "neck": "neck_x",
+            "left_shoulder": "shoulder_l",
+            "left_upper_arm": "arm_stretch_l",
+            "left_lower_arm": "forearm_stretch_l",
+            "right_upper_arm": "arm_stretch_r",
+        },
+    ),
+    "an avatar through glTF": (
+        "Armature_rootJoint\n pelvis_Armature\n  chest_Armature\n   neck_Armature\n    head_Armature\n"
+        "   shoulder_l_Armature\n    upper_arm_l_Armature\n   shoulder_r_Armature\n    upper_arm_r_Armature",
+        {
+            "head": "head_Armature",
+            "left_shoulder": "shoulder_l_Armature",
+            "left_upper_arm": "upper_arm_l_Armature",
+            "right_upper_arm": "upper_arm_r_Armature",
+            "upper_chest": "chest_Armature",
+        },
+    ),
+    "Daz": (
+        "hip\n abdomenLower\n  chestUpper\n   lCollar\n    lShldrBend\n     lShldrTwist\n      lForearmBend\n"
+        "   rCollar\n    rShldrBend\n   neckLower\n    neckUpper\n     head",
+        {
+            "head": "head",
+            "upper_chest": "chestUpper",
+            "left_shoulder": "lCollar",
+            "left_upper_arm": "lShldrBend",
+            "left_lower_arm": "lForearmBend",
+            "neck": "neckLower",
+        },
+    ),
+    "Rigify": (
+        "DEF-spine\n DEF-spine.001\n  DEF-spine.002\n   DEF-spine.003\n    DEF-spine.004\n     DEF-spine.005\n"
+        "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",
+        {"head": "DEF-spine.006", "neck": "DEF-spine.004", "upper_chest": "DEF-spine.003"},
+    ),
+    "MikuMikuDance": (
+        "センター\n 上半身\n  上半身2\n   首\n    頭\n     左目\n     左髪1\n   左肩\n    左腕\n     左ひじ\n      左手首\n"
+        "   右肩\n    右腕\n     右ひじ\n 下半身\n  左足\n   左ひざ\n    左足首\n  右足",
+        {
+            "head": "頭",
+            "neck": "首",
+            "upper_chest": "上半身2",
+            "left_shoulder": "左肩",
+            "right_upper_arm": "右腕",
+            "left_hand": "左手首",
+            "left_upper_leg": "左足",
+            "left_foot": "左足首",
+            "left_eye": "左目",
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_finds_the_joints_of_common_rigs(name):
+    text, expected = RIGS[name]
+    paths, parents = rig(text)
+    humanoid = find_humanoid(paths, parents)
+    assert {key: paths[humanoid[key]].rpartition("/")[2] for key in expected} == expected
+
+
+def test_tails_that_hang_from_the_neck_are_no_head():
+    """Whatever the order, where the head itself is named in another language."""
+    for outline in (
+        "hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf",
+        "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL",
+    ):
+        paths, parents = rig(outline)
+        heights = {"hips": 1.0, "neck": 1.45, "Kopf": 1.55}
+        places = np.array([(0, heights.get(p.rpartition("/")[2], 1.4), 0) for p in paths])
+        assert paths[find_humanoid(paths, parents, places)["head"]].endswith("Kopf")
+
+
+def test_joints_by_hand_win_and_are_checked():
+    paths, parents = rig("root\n a\n  b")
+    assert find_humanoid(paths, parents, by_hand={"head": "b"})["head"] == 2
+    with pytest.raises(NeuralocksError, match="no such joint"):
+        find_humanoid(paths, parents, by_hand={"head": "missing"})
+    with pytest.raises(NeuralocksError, match="no such meaning"):
+        find_humanoid(paths, parents, by_hand={"skull": "b"})
+
+
+def test_a_rig_without_a_head_is_refused_with_the_remedy():
+    paths, parents = rig("root\n wheel_L\n wheel_R")
+    with pytest.raises(NeuralocksError, match="--head"):
+        find_humanoid(paths, parents)
+
+
+def test_missing_joints_fall_back_towards_the_trunk():
+    paths, parents = rig("hips\n spine\n  head\n  shoulder_L\n   upper_arm_L")
+    humanoid = find_humanoid(paths, parents)
+    wanted = {"left_lower_arm": "upper_arm_L", "right_lower_arm": "spine", "right_shoulder": "spine", "neck": "head"}
+    assert {name: paths[humanoid.nearest(name)].rpartition("/")[2] for name in wanted} == wanted

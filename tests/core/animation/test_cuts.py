@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cuts are where a character is put elsewhere; nothing that a body can do is one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import rig_spec
+from neuralocks_core.rotation import from_vector
+from tests.core.rig.builders import character
+
+
+def walking(rate=24, seconds=2.0):
+    """A head that moves at 2 m/s and nods: times, joints and its index."""
+    who = character()
+    t = np.arange(0, seconds + 1e-9, 1 / rate)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, 0, 3] += 2 * t
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.5 * np.sin(7 * t), [1, 0, 0]))
+    return who, t, joints
+
+
+@pytest.mark.parametrize("rate", [24, 60])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_jump_and_a_turn_on_the_spot_are_cuts(rate, turned):
+    who, t, joints = walking(rate)
+    late = t > 1
+    if turned:
+        joints[late, who.head, :3, :3] = from_vector([0, 2.0, 0]) @ joints[late, who.head, :3, :3]
+    else:
+        joints[late, who.head, 2, 3] += 0.8
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[late][0]])
+
+
+@pytest.mark.parametrize("first", [1, 2, 3, -3, -2, -1])
+def test_cuts_near_the_ends_are_found(first):
+    """A bind pose of a frame or two before the action, which starts elsewhere, is usual."""
+    who, t, joints = walking()
+    joints[first:, who.head, 0, 3] += 3
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[first]])
+
+
+def test_a_held_key_just_before_a_cut():
+    """As animators key it: two samples a thousandth of a frame apart."""
+    who, t, joints = walking()
+    t = np.insert(t, 24, t[24] - 1e-3 / 24)
+    joints = np.insert(joints, 24, joints[23], axis=0)
+    joints[25:, who.head, 1, 3] += 1
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[25]])
+
+
+def test_motion_and_damaged_samples_are_no_cuts():
+    who, t, joints = walking()
+    assert not len(find_cuts(Clip(t, joints), who.head))
+    joints[20, who.head, 0, 3] += 3
+    assert not len(find_cuts(Clip(t, joints), who.head))
+    for kind in KINDS:
+        assert not len(find_cuts(scripted_clip(who, kind, 4.0, 24.0), who.head)), kind
+
+
+def test_stepped_animation_has_no_cuts():
+    """On twos, at a run: every second step stands still, every other one is large."""
+    who, t, joints = walking(24)
+    joints[:, who.head, 0, 3] += 10 * (np.arange(len(t)) // 2 * 2) / 24
+    assert not len(find_cuts(Clip(t, joints), who.head))
+
+
+def cut_clip():
+    """A character that is put 5 m aside after a second: who, times, joints before, joints after, clip."""
+    who, t, joints = walking(rate=30)
+    put = joints.copy()
+    put[30:, :, 0, 3] += 5
+    clip = Clip(t, put)
+    return who, t, joints, put, replace(clip, cuts=find_cuts(clip, who.head))
+
+
+@pytest.mark.parametrize("spec", [rig_spec(True), BoundarySpec()])
+def test_nothing_of_the_way_is_felt(spec):
+    """After a cut what a network reads is that of the part by itself, before it that of the clip without it."""
+    who, t, joints, put, clip = cut_clip()
+    assert clip.cuts == pytest.approx([1.0])
+    sampler, alone = BoundarySampler(spec, who, clip), BoundarySampler(spec, who, clip.parts[1])
+    after, before = t[30:], t[:30] + 0.001
+    np.testing.assert_array_equal(sampler.vectors(after), alone.vectors(after))
+    first = BoundarySampler(spec, who, Clip(t[:30], joints[:30]))
+    np.testing.assert_array_equal(sampler.vectors(before), first.vectors(before))
+    felt = BoundarySampler(spec, who, replace(clip, cuts=())).vectors(after)
+    assert np.abs(felt - alone.vectors(after)).max() > 1
+    mixed = sampler.vectors(t[::-1], joints=put[::-1])  # in any order
+    np.testing.assert_array_equal(mixed[::-1], sampler.vectors(t, joints=put))
+
+
+def test_held_poses_and_loops_know_no_cuts():
+    who, t, _, _, clip = cut_clip()
+    for spec, other in ((rig_spec(), clip), (rig_spec(True), replace(clip, loop=True))):
+        with_cuts, without = (BoundarySampler(spec, who, c).vectors(t) for c in (other, replace(other, cuts=())))
+        np.testing.assert_array_equal(with_cuts, without)

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion that is made up is repeatable, human in size, and starts still."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.animation.random_motion import KINDS, random_clip, scripted_clip
+from tests.core.rigs import HEAD, person
+
+
+def acceleration(clip):
+    head = clip.joints[:, HEAD, :3, 3]
+    return np.linalg.norm(np.diff(head, 2, axis=0), axis=1) / (clip.times[1] - clip.times[0]) ** 2
+
+
+def test_the_same_seed_gives_the_same_clip():
+    one, two = (random_clip(person(), np.random.default_rng(5), 3.0) for _ in range(2))
+    assert np.array_equal(one.joints, two.joints)
+    assert not np.array_equal(one.joints, random_clip(person(), np.random.default_rng(6), 3.0).joints)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_clips_are_rigid_start_still_and_stay_human(seed):
+    clip = random_clip(person(), np.random.default_rng(seed), 3.65)
+    turns = clip.joints[..., :3, :3]
+    assert np.allclose(turns @ turns.swapaxes(-1, -2), np.eye(3), atol=1e-9)
+    assert acceleration(clip)[:5].max() < 2.0
+    assert acceleration(clip).max() < 250.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scripted_clips_do_what_they_say_and_end_still(kind):
+    clip = scripted_clip(person(), kind)
+    head = clip.joints[:, HEAD]
+    travel = np.ptp(head[:, :3, 3], axis=0)
+    turned = np.degrees(np.arccos(np.clip((np.trace(head[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))).max()
+    if kind in ("shake", "turn", "nod", "tilt", "hold"):
+        assert turned > 12
+    if kind in ("translate", "jump", "walk", "fall_and_stop"):
+        assert travel.max() > 0.25
+    if kind in ("fall_and_stop", "hold"):
+        assert acceleration(clip)[-15:].max() < 1e-6
+
+
+def test_free_fall_is_free_fall():
+    clip = scripted_clip(person(), "fall_and_stop", rate=120.0)
+    down = np.diff(clip.joints[:, HEAD, 1, 3], 2) * 120**2
+    assert np.median(down[down < -5]) == pytest.approx(-9.81, abs=0.05)

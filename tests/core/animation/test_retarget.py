@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion capture on the shipped body looks right: upright, on its feet, the same left and right."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from neuralocks_core.animation.retarget import retarget
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.formats.bvh import read_bvh
+from neuralocks_core.rotation import from_vector
+
+HERE = Path(__file__).resolve()
+REAL = HERE.parents[4] / "shared" / "data" / "motion"
+FILES = sorted(REAL.glob("*.bvh"))
+needs_capture = pytest.mark.skipif(not FILES, reason="the shared motion capture is not there")
+
+
+@pytest.fixture(scope="module")
+def woman():
+    pytest.importorskip("pxr")
+    from usd.shot.stage import read_rigs
+
+    return read_rigs(HERE.parents[3] / "examples" / "shot" / "body.usdc")[0].character
+
+
+@cache
+def take(path):
+    return read_bvh(path)
+
+
+def place(clip, character, name):
+    return clip.joints[:, character.humanoid[name], :3, 3]
+
+
+@needs_capture
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+def test_she_stands_on_her_feet_with_her_head_up(woman, path):
+    clip = retarget(take(path), woman)
+    head, hips = place(clip, woman, "head"), place(clip, woman, "hips")
+    assert np.median(head[:, 1] - hips[:, 1]) > 0.45
+    up = woman.relative_rotations(clip.joints, [woman.head])[:, 0, 1, 1]
+    assert np.median(up) > 0.85
+    soles = np.min([place(clip, woman, f"{side}_foot")[:, 1] for side in ("left", "right")], axis=0)
+    stand = woman.skeleton.bind[woman.humanoid["left_foot"], 1, 3]
+    assert abs(np.percentile(soles, 5) - stand) < 0.05
+    # Bones keep their lengths.
+    for child, parent in (("left_lower_arm", "left_upper_arm"), ("right_foot", "right_lower_leg"), ("head", "neck")):
+        bone = place(clip, woman, child) - place(clip, woman, parent)
+        bind = woman.skeleton.bind[:, :3, 3]
+        length = np.linalg.norm(bind[woman.humanoid[child]] - bind[woman.humanoid[parent]])
+        assert np.allclose(np.linalg.norm(bone, axis=1), length, atol=1e-9)
+
+
+@needs_capture
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+def test_each_naming_gives_whole_limbs(path):
+    """No socket without length stands for a thigh or an arm, and both sides are found."""
+    source = Character(take(path).skeleton)
+    bind = source.skeleton.bind[:, :3, 3]
+    for side in ("left", "right"):
+        for upper, lower in (("upper_leg", "lower_leg"), ("lower_leg", "foot"), ("upper_arm", "lower_arm")):
+            ends = [source.humanoid[f"{side}_{part}"] for part in (upper, lower)]
+            assert source.skeleton.parents[ends[1]] == ends[0]
+            assert np.linalg.norm(bind[ends[1]] - bind[ends[0]]) > 0.15
+
+
+@needs_capture
+def test_a_walk_walks(woman):
+    clip = retarget(take(REAL / "02_01.bvh"), woman)
+    hips = place(clip, woman, "hips")
+    speed = np.linalg.norm(hips[-1] - hips[0]) / clip.end
+    assert 0.6 < speed < 2.2
+    # A standing foot does not slide: of both feet's heels and toes, the slowest hardly moves.
+    feet = [place(clip, woman, f"{side}_foot") for side in ("left", "right")]
+    toes = [i for i, name in enumerate(woman.skeleton.names) if name.rsplit("/", 1)[-1].startswith("ball")]
+    feet += [clip.joints[:, toe, :3, 3] for toe in toes]
+    velocity = [np.linalg.norm(np.gradient(f, clip.times, axis=0)[:, [0, 2]], axis=1) for f in feet]
+    assert np.median(np.min(velocity, axis=0)) < 0.15
+    # She walks the way she faces, her left side on her left.
+    across = place(clip, woman, "left_upper_leg") - place(clip, woman, "right_upper_leg")
+    front = np.cross(across, [0, 1, 0])
+    assert np.mean(np.sum(front * (hips[-1] - hips[0]), axis=1) > 0) > 0.95
+
+
+@needs_capture
+def test_limbs_point_where_the_source_points(woman):
+    """Bone directions are the source's own, whatever the rest poses."""
+    for path in FILES[:1] + FILES[3:6]:
+        motion = take(path)
+        source = Character(motion.skeleton)
+        clip = retarget(motion, woman)
+        for child, joint in (("left_hand", "left_lower_arm"), ("right_foot", "right_lower_leg")):
+            bones = []
+            for who, joints in ((woman, clip.joints), (source, motion.clip.joints)):
+                bone = (joints[:, who.humanoid[child]] - joints[:, who.humanoid[joint]])[:, :3, 3] @ who.facing.T
+                bones.append(bone / np.linalg.norm(bone, axis=1, keepdims=True))
+            assert np.allclose(*bones, atol=1e-6), path.name
+
+
+def test_retargeting_to_a_turned_rig_turns_the_motion(woman, tmp_path):
+    """A character bound facing another way does the same thing, seen from its own front."""
+    if not FILES:
+        pytest.skip("the shared motion capture is not there")
+    whole = np.eye(4)
+    whole[:3, :3] = from_vector(np.array([0, 1.1, 0]))
+    skeleton = woman.skeleton
+    turned = Character(Skeleton(skeleton.names, skeleton.parents, whole @ skeleton.bind))
+    motion = take(REAL / "02_01.bvh")
+    straight, other = retarget(motion, Character(skeleton)), retarget(motion, turned)
+    assert np.allclose(whole @ straight.joints, other.joints, atol=1e-9)

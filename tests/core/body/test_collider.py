@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.body.collider import Collider, closest_on_triangle
+from neuralocks_core.errors import NeuralocksError
+
+
+def bumpy(seed=0):
+    """A closed, star-shaped mesh with triangles of many sizes."""
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    direction = mesh.vertices / 0.1
+    radius = 1 + 0.3 * np.sin(5 * direction[:, 0]) * np.cos(4 * direction[:, 1] + seed)
+    mesh.vertices = mesh.vertices * radius[:, None] * [1, 1.6, 0.7]
+    return mesh
+
+
+def test_distance_agrees_with_trimesh():
+    """Two implementations, on points near, far, inside and outside."""
+    mesh, rng = bumpy(), np.random.default_rng(1)
+    points = rng.uniform(-0.25, 0.25, (1500, 3))
+    collider = Collider(mesh.vertices, mesh.faces)
+    distance, direction = collider.distance(points, limit=1.0)
+    np.testing.assert_allclose(distance, -trimesh.proximity.signed_distance(mesh, points), atol=1e-7)
+    on_surface = points - distance[:, None] * direction
+    np.testing.assert_allclose(collider.distance(on_surface)[0], 0, atol=1e-9)
+
+
+def test_limit_keeps_near_points_exact_and_far_points_signed():
+    mesh, rng = bumpy(2), np.random.default_rng(2)
+    collider, points = Collider(mesh.vertices, mesh.faces), rng.uniform(-0.3, 0.3, (2000, 3))
+    exact, _ = collider.distance(points, limit=1.0)
+    limited, _ = collider.distance(points, limit=0.02)
+    near = np.abs(exact) < 0.02
+    np.testing.assert_array_equal(limited[near], exact[near])
+    assert np.abs(limited - exact).max() < 0.01
+    assert (np.sign(limited) == np.sign(exact)).mean() > 0.999
+
+
+def test_points_far_beyond_a_sharp_rim_are_not_inside():
+    """The nearest sample there lies on a face that may look away."""
+    cone, rng = trimesh.creation.cone(0.01, 0.1, sections=16), np.random.default_rng(7)
+    angle, radius = rng.uniform(0, 2 * np.pi, 2000), rng.uniform(0.05, 0.08, 2000)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0, 0.004, 2000)], axis=1)
+    assert Collider(cone.vertices, cone.faces).distance(points, limit=0.02)[0].min() > 0.03
+
+
+def test_box_is_analytic_with_two_huge_triangles_a_side():
+    """Large triangles are found by points near their middle and near their corners."""
+    mesh = trimesh.creation.box((2.0, 2.0, 2.0))
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1.5, 1.5, (3000, 3))
+    outside = np.linalg.norm(np.maximum(np.abs(points) - 1, 0), axis=1)
+    expected = np.where(outside > 0, outside, (np.abs(points) - 1).max(axis=1))
+    np.testing.assert_allclose(Collider(mesh.vertices, mesh.faces).distance(points, limit=9)[0], expected, atol=1e-12)
+
+
+def test_closest_point_covers_all_seven_features():
+    a, b, c = np.eye(3)
+    rng = np.random.default_rng(4)
+    points = rng.normal(0.3, 1.5, (4000, 3))
+    place, feature = closest_on_triangle(points, a, b, c)
+    assert set(feature) == set(range(7))
+    tri = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    np.testing.assert_allclose(place, trimesh.triangles.closest_point(tri, points), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "points, triangles, said",
+    [
+        (np.full((3, 3), np.nan), [[0, 1, 2]], "not finite"),
+        (np.eye(3), [[0, 1, 7]], "not there"),
+        (np.zeros((3, 3)), [[0, 1, 2]], "no triangle"),
+        (np.eye(3), np.zeros((0, 3)), "no triangle"),
+    ],
+)
+def test_bad_meshes_are_named(points, triangles, said):
+    with pytest.raises(NeuralocksError, match=said):
+        Collider(points, triangles)
+
+
+def test_no_points_give_no_distances():
+    mesh = trimesh.creation.icosphere()
+    distance, direction = Collider(mesh.vertices, mesh.faces).distance(np.zeros((0, 24, 3)))
+    assert distance.shape == (0, 24) and direction.shape == (0, 24, 3)

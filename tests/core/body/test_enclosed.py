@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inside and outside by winding numbers, in meshes that cut through themselves too."""
+
+import numpy as np
+import trimesh
+
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.enclosed import enclosed, proven_distances
+
+
+def test_a_ball_two_balls_and_an_open_one():
+    ball = trimesh.creation.icosphere(3, 0.1)
+    points = np.random.default_rng(0).uniform(-0.2, 0.2, (3000, 3))
+    inside = np.linalg.norm(points, axis=1) < 0.1
+    clear = np.abs(np.linalg.norm(points, axis=1) - 0.1) > 2e-3
+    assert (enclosed(points, ball.vertices, ball.faces) == inside)[clear].all()
+    lens = np.concatenate([ball.vertices, ball.vertices + [0.1, 0, 0]])
+    faces = np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
+    both = inside | (np.linalg.norm(points - [0.1, 0, 0], axis=1) < 0.1)
+    clear &= np.abs(np.linalg.norm(points - [0.1, 0, 0], axis=1) - 0.1) > 2e-3
+    assert (enclosed(points, lens, faces) == both)[clear].all()
+    hole = ball.faces[ball.triangles_center[:, 2] > -0.098]
+    assert (enclosed(points, ball.vertices, hole) == inside)[clear & (points[:, 2] > -0.08)].all()
+
+
+def test_air_beside_a_crease_is_no_depth():
+    """A sheet folded so far that it cuts through itself: past the fold the nearest face looks away from the air there."""
+    box = trimesh.creation.box((0.2, 0.2, 0.2)).subdivide().subdivide()
+    points, inward = box.vertices.copy(), box.vertices[:, 0] > 0.09
+    points[inward & (np.abs(points[:, 1]) < 0.04) & (np.abs(points[:, 2]) < 0.04), 0] -= 0.3  # dented through the back
+    air = np.array([[-0.28, 0.0, 0.0], [-0.22, 0.01, 0.0]])
+    assert (Collider(points, box.faces).distance(air)[0] < -0.01).all()
+    assert (proven_distances(points, box.faces, air) > 0.01).all()
+
+
+def test_few_points_are_measured_as_many_are():
+    """Those are compared with the triangles in their reach alone, far from these and near, inside and outside."""
+    ball = trimesh.creation.icosphere(4, 0.1)
+    points = np.random.default_rng(1).uniform(-0.13, 0.13, (200, 3))
+    every = proven_distances(ball.vertices, ball.faces, points)
+    few = np.concatenate([proven_distances(ball.vertices, ball.faces, some) for some in np.split(points, 50)])
+    near = every < 0.03
+    np.testing.assert_allclose(few[near], every[near], atol=1e-9)
+    assert (few[~near] > 0.029).all()

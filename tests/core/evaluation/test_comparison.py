@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What hair is compared with: the same simulation, however the body came by its form."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.evaluation.comparison import simulated
+from neuralocks_core.groom import Groom
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands.strand_set import strand_set
+
+from .. import rigs
+
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+
+HEAD = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
+CENTRE = np.array([0.0, 1.68, 0.0])
+
+
+def person(points, shapes):
+    count = len(points)
+    body = Body(points, HEAD.faces, np.full((count, 1), rigs.HEAD), np.ones((count, 1)), shapes)
+    return Character(Skeleton(rigs.NAMES, rigs.PARENTS, rigs.bind()), body)
+
+
+def lying_strands(character):
+    """Eight that lie over the head, a little above its skin."""
+    turn, down = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None], np.linspace(0.2, 2.0, 12)
+    way = np.stack([np.cos(turn) * np.sin(down), np.ones((8, 1)) * np.cos(down), np.sin(turn) * np.sin(down)], axis=-1)
+    points = CENTRE + 0.112 * way
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(8, 12))
+    return strand_set(groom, rigs.POSITIONS[rigs.HEAD], CENTRE - rigs.POSITIONS[rigs.HEAD], character.facing)
+
+
+def pushed(frames=10):
+    """Times and world joint transforms of a character that is moved to the side, faster and faster."""
+    times = np.arange(frames) / 30
+    joints = np.tile(rigs.bind(), (frames, 1, 1, 1))
+    joints[:, :, 0, 3] += 0.3 * times[:, None] ** 2
+    return times, joints
+
+
+def test_a_body_shaped_by_a_blend_shape_is_simulated_as_one_modelled_so():
+    swollen = HEAD.vertices * 1.2 + CENTRE
+    shaped = person(HEAD.vertices + CENTRE, {"heavy": swollen - HEAD.vertices - CENTRE})
+    modelled = person(swollen, {})
+    answers, (times, joints) = [], pushed()
+    for character, clip in ((shaped, Clip(times, joints, np.ones((10, 1)))), (modelled, Clip(times, joints))):
+        # The strands lie within the part of the head that the shape adds.
+        answers.append(simulated(character, lying_strands(character), clip, times))
+    assert np.abs(answers[1]).max() > 1e-3
+    np.testing.assert_allclose(answers[0], answers[1], atol=1e-5)
+
+
+def test_hair_on_a_head_that_grows_and_shrinks_moves_as_on_one_that_keeps_its_size():
+    """As networks have it, which see no scale."""
+    character, (times, joints) = person(HEAD.vertices + CENTRE, {}), pushed()
+    scaled = joints.copy()
+    scaled[:, rigs.HEAD, :3, :3] *= np.linspace(0.8, 1.5, 10)[:, None, None]
+    strands = lying_strands(character)
+    kept, grown = (simulated(character, strands, Clip(times, each), times) for each in (joints, scaled))
+    assert np.abs(kept).max() > 1e-3
+    np.testing.assert_allclose(grown, kept, atol=1e-5)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+
+import numpy as np
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.evaluation.report import Card
+
+
+def card():
+    times = np.linspace(0, 1, 10)
+    wave = np.stack([np.sin(times), 0 * times, np.cos(times)], axis=1)
+    return Card(
+        "shot.usdc",
+        {"/Hair": {"strands": 12, "stretch_percent": 0.0, "droop_cm": 3.25, "settling_s": float("nan")}},
+        {"/Hair": {"bake": {"motion_error_median": 0.31}, "rigid": {"motion_error_median": 1.0}}},
+        {"/Hair": {"times": times, "reference": wave, "bake": 0.8 * wave, "rigid": 0 * wave}},
+        ("a [note] with brackets",),
+    )
+
+
+def test_text_holds_every_number_and_note():
+    text = card().text()
+    for part in ("/Hair", "strands 12", "3.25", "0.31", "a [note] with brackets", "droop"):
+        assert part in text
+    assert "nan" not in text
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8", None])
+def test_text_can_be_written_in_the_code_page_asked_for(encoding):
+    measured = card()
+    measured.grooms["/Hair_髪"] = measured.grooms["/Hair"]
+    text = measured.text(encoding=encoding)
+    text.encode(encoding or "utf-8")
+    assert "3.25" in text and ("髪" in text or "u9aea" in text)
+    assert ("┌" in text) == (encoding not in ("cp1252", "ascii"))
+
+
+def test_json_is_plain_and_says_null_for_what_was_not_measured():
+    values = json.loads(card().to_json())
+    assert values["grooms"]["/Hair"]["settling_s"] is None
+    assert values["compared"]["/Hair"]["bake"]["motion_error_median"] == 0.31
+
+
+def test_plot_is_a_picture_and_never_half_written(tmp_path):
+    pytest.importorskip("matplotlib", reason="the extra 'preview' is not installed")
+    path = card().plot(tmp_path / "curves.png")
+    assert path.read_bytes().startswith(b"\x89PNG") and [path] == list(tmp_path.iterdir())
+    with pytest.raises(NeuralocksError, match="a file, not a folder"):
+        card().plot(path / "curves.png")
+    with pytest.raises(NeuralocksError, match="end it in .png"):
+        card().plot(tmp_path / "curves.docx")

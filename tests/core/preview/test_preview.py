@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures and clips show the hair, by either canvas, and are written whole or not at all."""
+
+import sys
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+import trimesh
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview import canvas, shading
+from neuralocks_core.preview import pictures as preview
+from neuralocks_core.preview.film import Detail, Film, Scene
+
+CENTRE = np.array([0.0, 1.5, 0.0])
+SMALL = Detail(2000, 16, 1.0, 1.2, 0)
+
+
+def scene(frames=4, strands=300):
+    """A ball with hair on its upper half that turns about Y."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    body = np.array(ball.vertices) + CENTRE
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(strands, 3))
+    out[:, 1] = np.abs(out[:, 1])
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    rest = CENTRE + out[:, None] * np.linspace(0.1, 0.2, 10)[None, :, None]
+    rest[:, :, 1] -= np.linspace(0, 0.3, 10) ** 2
+    rest = rest.reshape(-1, 3)
+    head = np.tile(np.eye(4), (frames, 1, 1))
+    for i, angle in enumerate(np.linspace(0, 1, frames)):
+        turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+        head[i, :3, :3] = turn
+        head[i, :3, 3] = CENTRE - turn @ CENTRE
+
+    def posed(points):
+        return lambda i: points @ head[i, :3, :3].T + head[i, :3, 3]
+
+    return Scene(
+        np.arange(frames) / 24,
+        head,
+        np.eye(3),
+        CENTRE,
+        np.full(strands, 10),
+        rest,
+        posed(rest),
+        np.array(ball.faces),
+        posed(body),
+        body,
+    )
+
+
+@pytest.mark.parametrize("samples", [1, 2, 50])
+def test_a_clip_shows_the_nearest_sample_and_of_two_as_near_the_earlier(samples):
+    rng = np.random.default_rng(samples)
+    for times in (np.sort(rng.random(samples)), np.arange(samples) / 12, np.repeat(rng.random(), samples)):
+        clock = np.arange(times[0], times[-1] + 0.02, 1 / 24)
+        nearest = np.abs(times[None] - clock[:, None]).argmin(axis=1)
+        assert np.array_equal(preview._nearest(times, clock), nearest)
+
+
+@pytest.mark.parametrize("kind", [".png", ".mp4", ".gif"])
+def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
+    pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
+    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), panels=2, detail=SMALL)
+    assert path.stat().st_size > 500 and list(tmp_path.iterdir()) == [path]
+    if kind == ".png":
+        from PIL import Image
+
+        with Image.open(path) as image:
+            assert image.size == (2 * 96 + 4, 128)
+            reddish = np.asarray(image, int)
+        assert ((reddish[..., 0] - reddish[..., 2]) > 25).mean() > 0.02
+
+
+def test_a_pixel_a_quarter_covered_takes_a_quarter_of_the_colour():
+    drawn = np.zeros((2, 2, 4), np.uint8)
+    drawn[0, 0] = 200, 100, 40, 255
+    seen = canvas.composite(drawn, (1, 1), np.full((1, 1, 3), 100, np.float32))
+    np.testing.assert_allclose(seen[0, 0], [125, 100, 85], atol=1)
+
+
+def test_both_canvases_draw_the_same_picture():
+    """VTK and the plain rasteriser agree on where body and hair are."""
+    try:
+        canvas.VtkCanvas(8, 8, np.zeros((0, 3), int), 1, SMALL).close()
+    except Exception as error:
+        pytest.skip(f"VTK cannot draw here: {error}")
+    pictures, detail = [], Detail(600, 24, 2.0, 1.2, 4)
+    for kind in (canvas.VtkCanvas, canvas.PlainCanvas):
+        with closing(Film(scene(), 120, 160, detail, 0.02, kind)) as film:
+            pictures.append(next(film.shoot([0])).astype(float))
+    background = canvas.backdrop(120, 160).astype(float)
+    covered = [np.abs(picture - background).max(axis=2) > 12 for picture in pictures]
+    assert covered[0].mean() > 0.05
+    assert (covered[0] != covered[1]).mean() < 0.05
+
+
+def test_hair_in_front_dims_what_is_behind_it():
+    near = np.random.default_rng(0).uniform(0, 0.1, (5000, 3)) * [1, 1, 0.2] + [0, 0, 0.2]
+    shadow = shading.ShadowMap(near, np.full(5000, 1e-5))
+    behind, before, aside = shadow.depth(
+        np.array([[0.05, 0.05, 0.0], [0.05, 0.05, 0.4], [0.5, 0.05, 0.0]]), np.array([0, 0, 1.0])
+    )
+    assert behind == pytest.approx(5, rel=0.25) and before < 0.05 and aside == 0
+
+
+def never_drawn():
+    return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
+
+
+@pytest.mark.parametrize("name, said", [("hair.bmp", "unknown kind"), ("file/hair.png", "a file, not a folder")])
+def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, name, said):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(NeuralocksError, match=said):
+        preview.render(never_drawn(), tmp_path / name, size=(64, 64), panels=1)
+
+
+def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(NeuralocksError, match="imageio-ffmpeg is not installed"):
+        preview.render(never_drawn(), tmp_path / "hair.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_clip_that_the_disk_cuts_short_leaves_the_earlier_one(tmp_path, capfd):
+    pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
+    resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
+    (tmp_path / "hair.mp4").write_text("earlier")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(NeuralocksError, match="no space left"):
+            preview.render(scene(), tmp_path / "hair.mp4", size=(96, 128), detail=SMALL)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["earlier"]
+    assert capfd.readouterr().err == ""
+
+
+def test_a_canvas_that_cannot_draw_is_closed(monkeypatch):
+    class Broken:
+        closed = 0
+
+        def __init__(self, *arguments):
+            self._plotter = self
+
+        def render(self):
+            raise RuntimeError("no driver")
+
+        def close(self):
+            Broken.closed += 1
+
+    monkeypatch.setattr(canvas, "VtkCanvas", Broken)
+    assert isinstance(canvas.open_canvas(8, 8, np.zeros((0, 3), int), 1, SMALL), canvas.PlainCanvas)
+    assert Broken.closed == 1

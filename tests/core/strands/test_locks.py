@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Locks are compact, the same every time, and the same size whatever the number of strands."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.strands.locks import lock_codes, lock_of_roots, neighbours
+
+
+def scalp(strands, seed=0):
+    direction = np.random.default_rng(seed).normal(size=(strands, 3))
+    direction[:, 1] = np.abs(direction[:, 1])
+    return 0.09 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def spread(roots, lock):
+    centre = np.stack([np.bincount(lock, column) for column in roots.T], axis=1) / np.bincount(lock)[:, None]
+    return np.sqrt(((roots - centre[lock]) ** 2).sum(axis=1).mean())
+
+
+def test_locks_are_compact_and_gapless():
+    roots = scalp(3000)
+    lock = lock_of_roots(roots)
+    np.testing.assert_array_equal(np.unique(lock), np.arange(lock.max() + 1))
+    assert 6 < len(roots) / (lock.max() + 1) < 12
+    assert spread(roots, lock) < 0.008
+    np.testing.assert_array_equal(lock, lock_of_roots(roots))
+
+
+def test_lock_size_does_not_follow_the_strand_count():
+    few, many = scalp(4000), scalp(60_000)
+    assert spread(many, lock_of_roots(many)) == pytest.approx(spread(few, lock_of_roots(few)), rel=0.25)
+
+
+@pytest.mark.parametrize("roots", [np.zeros((1, 3)), np.zeros((500, 3)), scalp(2), scalp(7)])
+def test_few_or_equal_roots_make_one_lock(roots):
+    np.testing.assert_array_equal(lock_of_roots(roots), 0)
+
+
+def test_lock_codes_are_means_of_the_valid():
+    codes = np.array([[1.0, 2.0], [3.0, 4.0], [10.0, 0.0], [99.0, 99.0]])
+    lock, valid = np.array([0, 0, 1, 1]), np.array([True, True, True, False])
+    np.testing.assert_allclose(lock_codes(codes, lock, valid), [[2, 3], [2, 3], [10, 0], [10, 0]], atol=1e-3)
+    assert np.isfinite(lock_codes(codes, np.arange(4), np.zeros(4, bool))).all()
+
+
+def test_neighbours_against_brute_force():
+    random = np.random.default_rng(0)
+    rest = scalp(60)[:, None] * np.linspace(1.0, 1.3, 24)[:, None] + random.normal(size=(60, 24, 3)) * 1e-3
+    radius, count = 0.02, 4
+    found = neighbours(rest, radius=radius, count=count)
+    points = rest.reshape(-1, 3)
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    strand = np.arange(len(points)) // 24
+    distance[strand[:, None] == strand[None]] = np.inf
+    expected = np.argsort(distance, axis=1)[:, :count]
+    expected = np.where(np.take_along_axis(distance, expected, 1) <= radius, expected, -1)
+    np.testing.assert_array_equal(found.reshape(-1, count), expected)

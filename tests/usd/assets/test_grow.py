@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hairstyles on a USD character: they sit on its head, and training can read them back."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from usd.assets.groom import import_groom
+from usd.assets.grow import grow
+from usd.shot.stage import read_rigs
+
+BODY = Path(__file__).resolve().parents[3] / "examples" / "shot" / "body.usdc"
+
+
+def test_a_style_grows_on_the_head_and_is_repeatable(tmp_path):
+    paths = [grow("bob", BODY, tmp_path / f"{i}.usda", count=60, seed=3) for i in (1, 2)]
+    stages = [Usd.Stage.Open(str(path)) for path in paths]
+    grooms = [next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves)) for stage in stages]
+    points = [np.array(UsdGeom.BasisCurves(prim).GetPointsAttr().Get()) for prim in grooms]
+    assert np.array_equal(*points)
+    character = read_rigs(BODY)[0].character
+    roots = points[0].reshape(60, -1, 3)[:, 0]
+    centre = character.canonical_to_bind[:3, 3] + character.head_centre
+    assert np.linalg.norm(roots - centre, axis=1).max() < 0.2
+
+
+def test_what_is_read_is_not_written_over(tmp_path):
+    """`grow` put a groom in place of the character, and `import` one in place of the shot, by any name of theirs."""
+    folder = tmp_path / "shot"
+    shutil.copytree(BODY.parent, folder)
+    (tmp_path / "link").symlink_to(folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    missing = folder / "not there yet" / ".." / "shot.usda"
+    for out in (folder / "shot.usda", folder / "body.usdc", tmp_path / "link" / "groom.usdc", missing):
+        for work in (grow, import_groom):
+            words = ("bob", folder / "shot.usda", out, 8) if work is grow else (folder / "shot.usda", out)
+            with pytest.raises(NeuralocksError, match=f"{out.name}: is part of the shot itself"):
+                work(*words)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_unknown_styles_are_listed(tmp_path):
+    with pytest.raises(NeuralocksError, match="long_straight"):
+        grow("mullet", BODY, tmp_path / "x.usda")

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bake's contract: what it authors, and that units, axes and places do not matter."""
+
+import os
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
+
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
+from usd.border.units import open_stage
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
+
+from ..shots import CENTRE, HEAD, Recipe, samples, strand_points, world_points, write_shot
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory, model):
+    folder = tmp_path_factory.mktemp("bake")
+    shot = write_shot(folder)
+    return shot, bake(shot, folder / "bake.usdc", model)
+
+
+def test_the_layer_holds_samples_and_nothing_else(baked):
+    shot, result = baked
+    layer = Sdf.Layer.FindOrOpen(str(result.path))
+    assert list(layer.subLayerPaths) == ["./shot.usda"]
+    hair = layer.GetPrimAtPath("/Hero/Hair")
+    assert set(hair.properties.keys()) == {"points", "velocities", "extent", "skel:skeleton"}
+    assert all(p.specifier == Sdf.SpecifierOver for p in (hair, layer.GetPrimAtPath("/Hero")))
+    assert all(hair.attributes[n].default is None for n in ("points", "velocities", "extent"))
+    assert layer.ListTimeSamplesForPath("/Hero/Hair.points") == [float(t) for t in range(1, 10)]
+    stage, source = Usd.Stage.Open(layer), open_stage(shot)
+    for key in (
+        "metersPerUnit",
+        "upAxis",
+        "timeCodesPerSecond",
+        "framesPerSecond",
+        "defaultPrim",
+        "startTimeCode",
+        "endTimeCode",
+    ):
+        assert stage.GetMetadata(key) == source.GetMetadata(key), key
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    for time_code in (1.0, 5.0):
+        assert len(curves.GetPointsAttr().Get(time_code)) == sum(curves.GetCurveVertexCountsAttr().Get())
+        low, high = np.asarray(curves.GetExtentAttr().Get(time_code))
+        points = np.asarray(curves.GetPointsAttr().Get(time_code))
+        assert (low <= points.min(0)).all() and (high >= points.max(0)).all()
+    rest = UsdGeom.BasisCurves(source.GetPrimAtPath("/Hero/Hair")).GetPointsAttr().Get()
+    assert np.array_equal(curves.GetPointsAttr().Get(), rest)
+
+
+def test_validators_find_nothing(baked, tmp_path, model):
+    mesh = bake(write_shot(tmp_path, Recipe(bound="mesh", unit=0.01, up="Z")), tmp_path / "mesh.usda", model)
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    for path in (baked[1].path, mesh.path):
+        assert [f"{e.GetName()}: {e.GetMessage()}" for e in context.Validate(Usd.Stage.Open(str(path)))] == []
+
+
+def test_usd_skel_leaves_baked_hair_alone(baked):
+    stage = Usd.Stage.Open(str(baked[1].path))
+    root, cache = UsdSkel.Root(stage.GetPrimAtPath("/Hero")), UsdSkel.Cache()
+    cache.Populate(root, Usd.PrimDefaultPredicate)
+    skinned = [
+        str(query.GetPrim().GetPath())
+        for binding in cache.ComputeSkelBindings(root, Usd.PrimDefaultPredicate)
+        for query in binding.GetSkinningTargets()
+    ]
+    assert skinned == ["/Hero/Skin"]
+
+
+def test_hair_that_the_network_leaves_still_follows_the_skin_as_usd_skel_does(tmp_path, still_model):
+    shot = write_shot(tmp_path)
+    result = bake(shot, tmp_path / "still.usdc", still_model)
+    stage = open_stage(shot)
+    skeleton = UsdSkel.Cache()
+    skeleton.Populate(UsdSkel.Root(stage.GetPrimAtPath("/Hero")), Usd.PrimDefaultPredicate)
+    query = skeleton.GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig")))
+    rest = strand_points(40, 12).reshape(-1, 3)
+    for code in (1.0, 4.0, 7.5):
+        matrix = np.array(query.ComputeSkinningTransforms(code)[HEAD]).T
+        expected = rest @ matrix[:3, :3].T + matrix[:3, 3]
+        frames = bake(shot, tmp_path / "one.usdc", still_model, frames=[code]) if code % 1 else result
+        assert np.abs(world_points(frames.path, code) - expected).max() < 2e-6
+    # In the bind pose the author's own bits come back.
+    assert np.array_equal(samples(result.path, "points", at=1.0), samples(shot, "points"))
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        Recipe(unit=0.01),
+        Recipe(up="Z"),
+        Recipe(unit=0.01, up="Z", bound="mesh"),
+        Recipe(unit=0.0254, nesting="/World/Set/Hero", bound="mesh"),
+        Recipe(unit=0.01, bound="none"),
+        Recipe(skel_root=False, basis="bspline"),
+    ],
+    ids=["cm", "z_up", "cm_z_up_on_mesh", "inch_nested", "cm_by_name", "no_skel_root_cubic"],
+)
+def test_units_axes_and_nesting_do_not_matter(baked, tmp_path, model, recipe):
+    result = bake(write_shot(tmp_path, recipe), tmp_path / "bake.usdc", model)
+    for code in (1.0, 6.0):
+        here = world_points(result.path, code, f"{recipe.nesting}/Hair")
+        # Without skin the head's centre is an average one, which the network's inputs feel.
+        tolerance = 2e-2 if recipe.bound == "none" else 5e-5
+        assert np.abs(here - world_points(baked[1].path, code)).max() < tolerance
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_a_placed_and_scaled_character_moves_as_it_would_in_place(baked, tmp_path, model, scale):
+    turn = np.eye(4)
+    turn[:3, :3] = scale * np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    turn[:3, 3] = 5, 0, -3
+    recipe = Recipe(place=turn, bound="mesh")
+    # A character a hundredth of the size is scaled up again by its unit, as in files exported from centimetres.
+    shot = write_shot(tmp_path, recipe)
+    if scale != 1.0:
+        stage = Usd.Stage.Open(str(shot))
+        UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)
+        stage.GetRootLayer().Save()
+    result = bake(shot, tmp_path / "bake.usdc", model)
+    for code in (1.0, 6.0):
+        here = world_points(result.path, code) - turn[:3, 3] / scale
+        back = here @ (turn[:3, :3] / scale)
+        assert np.abs(back - world_points(baked[1].path, code)).max() < 1e-4
+
+
+def test_a_moving_root_moves_the_hair_and_its_history(tmp_path, model):
+    shots = []
+    for name, moving in (("still", False), ("moved", True)):
+        path = write_shot(tmp_path, Recipe(bound="mesh"), name)
+        stage = Usd.Stage.Open(str(path))
+        op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp()
+        for frame in range(1, 10):
+            op.Set((0.02 * (frame - 1) ** 2 if moving else 0.0, 0, 0), frame)
+        stage.GetRootLayer().Save()
+        shots.append(bake(path, tmp_path / f"{name}.usdc", model).path)
+    shift = world_points(shots[1], 9.0) - world_points(shots[0], 9.0)
+    assert np.abs(np.median(shift[:, 0]) - 0.02 * 64) < 0.05
+    assert np.ptp(shift, axis=0).max() > 1e-3  # acceleration changes the hair, not only its place
+
+
+def test_frames_without_animation_are_said(tmp_path, still_model):
+    """A shot at 1001 whose animation stayed at 1: nothing is wrong with any file, and nothing moves."""
+    shot = write_shot(tmp_path)
+    assert not any("held pose" in note for note in bake(shot, tmp_path / "a.usdc", still_model, frames="9:20").notes)
+    assert any("1 to 9" in note for note in bake(shot, tmp_path / "b.usdc", still_model, frames="1001:1003").notes)
+    stage = Usd.Stage.Open(str(shot))
+    stage.SetStartTimeCode(1001)
+    stage.SetEndTimeCode(1048)
+    stage.GetRootLayer().Save()
+    assert any("layer offsets" in note for note in inspect(shot)["spoils"])
+
+
+def test_material_and_strength_reach_the_network(tmp_path, model):
+    shot = write_shot(tmp_path)
+    plain = world_points(bake(shot, tmp_path / "a.usdc", model, frames=[6]).path, 6.0)
+    stiff = world_points(bake(shot, tmp_path / "b.usdc", model, frames=[6], material=["bend=5x"]).path, 6.0)
+    held = world_points(bake(shot, tmp_path / "c.usdc", model, frames=[6], strength=0).path, 6.0)
+    assert np.abs(stiff - plain).max() > 1e-4 and np.abs(held - plain).max() > 1e-4
+
+
+def test_a_bake_of_a_bake_is_the_bake(baked, tmp_path, model):
+    again = bake(baked[1].path, tmp_path / "again.usdc", model, frames=[5])
+    assert np.abs(world_points(again.path, 5.0) - world_points(baked[1].path, 5.0)).max() < 1e-6
+
+
+def test_a_groom_inside_an_instance_is_baked(tmp_path, model):
+    write_shot(tmp_path, name="asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for name in ("A", "B"):
+        prim = stage.DefinePrim(f"/{name}")
+        prim.GetReferences().AddReference("./asset.usda")
+        prim.SetInstanceable(True)
+    stage.SetDefaultPrim(stage.GetPrimAtPath("/A"))
+    stage.GetRootLayer().Save()
+    result = bake(tmp_path / "shot.usda", tmp_path / "bake.usdc", model, frames=[3])
+    assert [g["path"] for g in result.grooms] == ["/A/Hair", "/B/Hair"]
+    assert np.array_equal(world_points(result.path, 3.0, "/A/Hair"), world_points(result.path, 3.0, "/B/Hair"))
+
+
+def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path, still_model):
+    """USD looks for names without ./ in the folder of the stage's first layer, too."""
+    for name in ("show", "layout", "cache"):
+        (tmp_path / name).mkdir()
+    write_shot(tmp_path / "show", name="hero")
+    (tmp_path / "layout" / "set.usda").write_text('#usda 1.0\ndef "Hero" (references = @hero.usda@</Hero>)\n{\n}\n')
+    shot = tmp_path / "show" / "shot.usda"
+    shot.write_text("#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@../layout/set.usda@]\n)\n")
+    notes = {name: bake(shot, tmp_path / name / "b.usdc", still_model, frames=[2]).notes for name in ("show", "cache")}
+    assert not any("hero.usda" in note for note in notes["show"])
+    assert any("hero.usda" in note and "SEARCH_PATH" in note for note in notes["cache"])
+
+
+def test_other_values_than_a_cores_own_are_refused(tmp_path, model):
+    shot = write_shot(tmp_path)
+    with pytest.raises(NeuralocksError, match="part of the shot"):
+        bake(shot, shot, model)
+    read = read_shot(shot)
+    assert np.abs(read.grooms[0].groom.points.mean(0) - CENTRE).max() < 0.2
+    assert os.listdir(tmp_path) == ["shot.usda"]

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Strands of a character that is put elsewhere within a shot: the way there is none that hair or camera sees."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdSkel, Vt
+from typer.testing import CliRunner
+
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
+from usd.cli.app import app
+from usd.cli.options import cut_codes
+from usd.review.baked import read_baked
+from usd.review.inspect import inspect
+from usd.shot.recorded import recorded
+
+from ..shots import Recipe, samples, write_shot
+
+CUT, LAST = 13, 24
+
+
+@pytest.fixture(scope="module")
+def shots(tmp_path_factory):
+    """A shot whose character is put 3 m aside at frame 13, and the same from there on."""
+    folder = tmp_path_factory.mktemp("cuts")
+    path = write_shot(folder, Recipe(frames=LAST, strands=8))
+    stage = Usd.Stage.Open(str(path))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    for code in range(CUT, LAST + 1):
+        places = np.array(motion.GetTranslationsAttr().Get(code))
+        places[0, 0] += 3
+        motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(places), code)
+    stage.GetRootLayer().Save()
+    for code in range(1, CUT):
+        motion.GetTranslationsAttr().ClearAtTime(code)
+        motion.GetRotationsAttr().ClearAtTime(code)
+    stage.SetStartTimeCode(CUT)
+    stage.GetRootLayer().Export(str(folder / "after.usda"))
+    return path, folder / "after.usda"
+
+
+@pytest.fixture(scope="module")
+def bakes(shots, model):
+    whole, after = shots
+    wanted = {"found": (whole, None), "given": (whole, [CUT]), "none": (whole, []), "after": (after, None)}
+    return {
+        name: bake(shot, whole.with_name(f"{name}.usdc"), model, cuts=cuts) for name, (shot, cuts) in wanted.items()
+    }
+
+
+def test_hair_starts_anew_after_a_cut(bakes):
+    assert any(note.startswith("/Hero/Rig: its head is put elsewhere at 13;") for note in bakes["found"].notes)
+    assert not any("elsewhere" in note for name in ("given", "none", "after") for note in bakes[name].notes)
+    for code in (1, CUT - 1, CUT, CUT + 3):
+        found, given = (samples(bakes[name].path, "points", at=code) for name in ("found", "given"))
+        np.testing.assert_array_equal(found, given)
+    for code in (CUT, CUT + 3, LAST):
+        found, after, none = (samples(bakes[name].path, "points", at=code) for name in ("found", "after", "none"))
+        assert np.abs(found - after).max() < 1e-5
+        assert code == LAST or np.abs(none - after).max() > 1e-3
+
+
+def test_velocities_do_not_span_a_cut(bakes):
+    """Else motion blur would draw the hair over the whole way."""
+    for code in (CUT - 2, CUT - 1, CUT, CUT + 1):
+        found, none = (samples(bakes[name].path, "velocities", at=code) for name in ("found", "none"))
+        assert np.abs(found).max() < 5 and np.abs(none).max() > 5
+        if code >= CUT:
+            assert np.abs(found - samples(bakes["after"].path, "velocities", at=code)).max() < 1e-3
+
+
+def test_a_bake_tells_the_cuts_that_were_given(bakes):
+    for name, cuts in (("given", [CUT]), ("none", [])):
+        item = read_baked(bakes[name].path).shot.grooms[0]
+        assert list(recorded(item.prim)["cuts"]) == cuts
+        assert len(item.attachment.rig.clip.cuts) == len(cuts)
+    found = read_baked(bakes["found"].path).shot.grooms[0]
+    assert "cuts" not in recorded(found.prim) and len(found.attachment.rig.clip.cuts) == 1
+
+
+def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
+    """One bake over another, of two characters in a shot."""
+    stage = Usd.Stage.Open(str(shots[0]))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero", stage.GetRootLayer(), "/Twin")
+    stage.GetRootLayer().Export(str(tmp_path / "two.usda"))
+    first = bake(tmp_path / "two.usda", tmp_path / "first.usdc", model, ["/Hero"], cuts=[7, 5, 7]).path
+    second = bake(first, tmp_path / "second.usdc", model, ["/Twin"], cuts=np.zeros(0)).path
+    rigs = {item.attachment.rig.path: item.attachment.rig for item in read_baked(second).shot.grooms}
+    assert rigs["/Hero/Rig"].clip.cuts * 24 == pytest.approx([5, 7])
+    assert not len(rigs["/Twin/Rig"].clip.cuts)
+    assert not any("elsewhere" in note for note in inspect(second)["spoils"])
+
+
+def test_a_loop_has_no_cuts(shots, tmp_path, model):
+    loops = [
+        bake(shots[0], tmp_path / f"{i}.usdc", model, loop=True, cuts=cuts).path for i, cuts in enumerate((None, []))
+    ]
+    for name in ("points", "velocities"):
+        assert (samples(loops[0], name, at=CUT) == samples(loops[1], name, at=CUT)).all()
+    assert not len(read_baked(loops[0]).shot.rigs[0].clip.cuts)
+
+
+def test_the_reference_starts_anew_too(bakes):
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    from neuralocks_core.evaluation.comparison import simulated
+    from neuralocks_core.strands.strand_set import strands_on
+
+    moved = {}
+    for name in ("given", "after", "none", "late"):
+        baked = read_baked(bakes["given" if name == "late" else name].path)
+        item = baked.shot.grooms[0]
+        character = item.attachment.character
+        times = baked.times[baked.codes >= CUT] if name in ("after", "late") else baked.times
+        moved[name] = simulated(character, strands_on(character, item.groom), item.attachment.rig.clip, times)
+    length = LAST + 1 - CUT
+    for name in ("given", "late"):
+        assert np.abs(moved[name][-length:] - moved["after"]).max() < 2e-3
+    assert np.abs(moved["none"][-length:] - moved["after"]).max() > 0.02
+
+
+def test_cuts_may_be_given_at_once_or_one_by_one():
+    assert cut_codes(["5,7"]) == cut_codes(["5", "7"]) == [5, 7]
+    assert cut_codes(["none"]) == []
+    assert cut_codes(None) is cut_codes([]) is None
+
+
+def test_what_no_cut_can_be_is_refused(shots, tmp_path, model):
+    out = tmp_path / "bad.usdc"
+    for options, words in (
+        ({"cuts": [99]}, "--cuts 99: lies outside"),
+        ({"cuts": [5], "loop": True}, "leave out --loop"),
+    ):
+        with pytest.raises(NeuralocksError, match=words):
+            bake(shots[0], out, model, **options)
+    told = CliRunner().invoke(app, ["bake", str(shots[0]), "-o", str(out), "--cuts", "5;7"])
+    assert told.exit_code != 0
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of a range, baked by the machines of a farm, are the one bake."""
+
+import json
+import os
+
+import pytest
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from typer.testing import CliRunner
+
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
+from usd.baking.join import join
+from usd.cli.app import app
+
+from ..shots import Recipe, samples, write_shot
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    return write_shot(tmp_path_factory.mktemp("join"), Recipe(bound="mesh", frames=12))
+
+
+def parts_of(shot, folder, model, ranges=("7:12", "1:4", "5:6"), **options):
+    baked = [(folder / f"part{i}.usdc", frames) for i, frames in enumerate(ranges)]
+    return [bake(shot, path, model, frames=frames, **options).path for path, frames in baked]
+
+
+@pytest.mark.parametrize(
+    ("ending", "options"), [("usdc", {}), ("usda", {"subframes": 3}), ("usdc", {"velocities": False, "cuts": [4]})]
+)
+def test_joined_parts_are_the_one_bake_byte_for_byte(shot, tmp_path, model, ending, options):
+    whole = bake(shot, tmp_path / f"whole.{ending}", model, **options).path
+    (tmp_path / "farm").mkdir()
+    joined = join(parts_of(shot, tmp_path / "farm", model, **options), tmp_path / f"hair.{ending}")
+    assert joined.path.read_bytes() == whole.read_bytes()
+    assert not joined.notes and len(joined.frames) == 12 * options.get("subframes", 1)
+    assert sorted(os.listdir(tmp_path)) == sorted(["farm", whole.name, joined.path.name])
+
+
+@pytest.mark.parametrize("subframes", [1, 3])
+def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model, subframes):
+    """Their frames are no whole numbers; what lies beyond a part is told by the same ones as within it."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "seconds.usda"))
+    stage.SetTimeCodesPerSecond(1)
+    stage.SetFramesPerSecond(24)
+    stage.GetRootLayer().subLayerPaths.append(str(shot))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    stage.SetStartTimeCode(1 / 24)
+    stage.SetEndTimeCode(12 / 24)
+    stage.Save()
+    whole = bake(tmp_path / "seconds.usda", tmp_path / "whole.usdc", model, subframes=subframes)
+    assert len(whole.frames) == 12 * subframes
+    ranges = (f"0.0416667:{whole.frames[6 * subframes]}", f"{whole.frames[7 * subframes]:.6g}:0.5")
+    parts = parts_of(tmp_path / "seconds.usda", tmp_path, model, ranges, subframes=subframes)
+    joined = join(parts, tmp_path / "hair.usdc").path
+    assert joined.read_bytes() == whole.path.read_bytes()
+
+
+def test_usds_own_stitching_gives_the_same_values(shot, tmp_path, model):
+    """What `usdstitch` does; layers over each other would hide the weaker's samples."""
+    parts = parts_of(shot, tmp_path, model)
+    stitched = Sdf.Layer.CreateAnonymous(".usda")
+    for part in parts:
+        UsdUtils.StitchLayers(stitched, Sdf.Layer.FindOrOpen(str(part)))
+    joined = join(parts, tmp_path / "hair.usdc").path
+    assert stitched.ExportToString() == Sdf.Layer.FindOrOpen(str(joined)).ExportToString()
+
+
+def test_several_grooms_and_shots_without_a_range(tmp_path, model):
+    """Grooms come in the shot's order, and the range is that of all parts."""
+    path = write_shot(tmp_path, Recipe(frames=12))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    Sdf.CopySpec(layer, "/Hero/Hair", layer, "/Hero/Beard")
+    for key in ("startTimeCode", "endTimeCode"):
+        layer.pseudoRoot.ClearInfo(key)
+    layer.Save()
+    whole = bake(path, tmp_path / "whole.usdc", model).path
+    joined = join(parts_of(path, tmp_path, model), tmp_path / "hair.usdc")
+    assert joined.grooms == ["/Hero/Hair", "/Hero/Beard"]
+    assert joined.path.read_bytes() == whole.read_bytes()
+
+
+def test_overlaps_and_gaps(shot, tmp_path, model):
+    parts = parts_of(shot, tmp_path, model, ("1:4", "3:5", "9:12"))
+    result = CliRunner().invoke(app, ["join", *map(str, parts), "-o", str(tmp_path / "hair.usdc"), "--json"])
+    told = json.loads(result.stdout)
+    assert told["frames"] == [1, 2, 3, 4, 5, 9, 10, 11, 12]
+    assert told["notes"] == ["no part has samples between 5 and 9"]
+    whole = bake(shot, tmp_path / "whole.usdc", model).path
+    for code in told["frames"]:
+        assert (
+            samples(tmp_path / "hair.usdc", "points", at=code).tobytes() == samples(whole, "points", at=code).tobytes()
+        )
+
+
+def test_steps_are_no_gaps(shot, tmp_path, model):
+    parts = parts_of(shot, tmp_path, model, ("3:5:2", "7:9:2"), subframes=3)
+    joined = join(parts, tmp_path / "hair.usdc")
+    assert joined.notes == ["no part has samples before 3, after 9.66667"]
+    whole = bake(shot, tmp_path / "whole.usdc", model, frames="3:9:2", subframes=3).path
+    assert joined.path.read_bytes() == whole.read_bytes()
+
+
+def test_an_open_stage_sees_what_was_joined(shot, tmp_path, model):
+    parts = parts_of(shot, tmp_path, model)
+    out = join(parts[:1], tmp_path / "hair.usdc").path
+    stage = Usd.Stage.Open(str(out))
+    points = stage.GetAttributeAtPath("/Hero/Hair.points")
+    assert points.GetNumTimeSamples() == 6
+    join(parts, out)
+    assert points.GetNumTimeSamples() == 12
+
+
+def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
+    part, other = tmp_path / "part.usdc", tmp_path / "other.usdc"
+    bake(shot, part, model, frames="1:4")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "empty.usda"))
+    stage.GetRootLayer().Save()
+    for name, prim in (("shot", ("/Hero", "shot")), ("unsampled", ("/Hero/Hair", {"solver": "rods"}))):
+        stage = Usd.Stage.CreateNew(str(tmp_path / f"{name}_alone.usda"))
+        stage.OverridePrim(prim[0]).SetCustomDataByKey("neuralocks", prim[1])
+        stage.GetRootLayer().Save()
+    (tmp_path / "broken.usdc").write_bytes(part.read_bytes()[:-300])
+    elsewhere = write_shot(tmp_path, Recipe(bound="mesh", frames=12), "elsewhere")
+    for frames_of, options, said in (
+        (
+            shot,
+            {"material": ["stiffness=2x"]},
+            "other.usdc: /Hero/Hair was baked with other material than in .*part.usdc",
+        ),
+        (shot, {"strength": 0.5, "resolve": False}, "other resolve, strength than"),
+        (shot, {"joints": {"upper_chest": "spine"}}, "other joints than"),
+        (shot, {"velocities": False}, "other velocities than"),
+        (elsewhere, {}, "is a bake of another shot than .*part.usdc is"),
+        (None, "empty.usda", "is no bake"),
+        (None, "shot_alone.usda", "is no bake"),
+        (None, "unsampled_alone.usda", "is no bake"),
+        (None, "broken.usdc", "broken.usdc: cannot be read"),
+        (None, "missing.usdc", "missing.usdc: cannot be read|no such file"),
+    ):
+        second = (
+            tmp_path / options if frames_of is None else bake(frames_of, other, model, frames="5:6", **options).path
+        )
+        with pytest.raises(NeuralocksError, match=said):
+            join([part, second], tmp_path / "hair.usdc")
+    with pytest.raises(NeuralocksError, match="is one of the parts"):
+        join([part], part)
+    with pytest.raises(NeuralocksError, match="is part of the shot itself"):
+        join([part], shot)
+    assert not (tmp_path / "hair.usdc").exists() and not list(tmp_path.glob(".*"))
+
+
+def test_a_stopped_join_leaves_nothing(shot, tmp_path, model):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    parts = parts_of(shot, tmp_path, model)
+    with pytest.raises(KeyboardInterrupt):
+        join(parts, tmp_path / "hair.usdc", progress=stop)
+    assert sorted(os.listdir(tmp_path)) == sorted(part.name for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("rate", "frames", "begin", "end", "parts"),
+    [(24.0, 12, 0.3, 12.8, ("1:6", "7:12")), (1000.0, 120, 1, 120, ("1:50", "84.333333:120"))],
+)
+def test_less_than_a_frame_at_the_ends_of_a_shot_is_no_gap(tmp_path, model, rate, frames, begin, end, parts):
+    path = write_shot(tmp_path, Recipe(rate=rate, frames=frames))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(begin)
+    stage.SetEndTimeCode(end)
+    stage.Save()
+    whole = bake(path, tmp_path / "whole.usdc", model)
+    joined = join(parts_of(path, tmp_path, model, parts), tmp_path / "hair.usdc")
+    assert joined.frames == whole.frames and not joined.notes

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The top of an override layer: opened instead of the shot, it must show all of it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+
+from usd.baking.bake import bake
+from usd.baking.override import write_header
+from usd.border.units import Border, used_files
+
+from ..shots import samples, write_shot
+
+SHOT = """#usda 1.0
+(
+    colorConfiguration = @./show.ocio@
+    customLayerData = { asset plate = @../plates/a.exr@ }
+    defaultPrim = "Hero"
+    expressionVariables = { string CHARACTER = "hero" }
+    metersPerUnit = 0.01
+    owner = "layout"
+    renderSettingsPrimPath = "/Render/main"
+    upAxis = "Z"
+)
+def "Hero" (references = @`"./${CHARACTER}.usda"`@)
+{
+}
+"""
+
+
+def _header(shot, out):
+    stage = Usd.Stage.Open(str(shot))
+    layer = Sdf.Layer.CreateNew(str(out))
+    write_header(layer, stage, Border.of(stage), shot, out, [1.0])
+    layer.Save()
+    return layer
+
+
+@pytest.fixture
+def shot(tmp_path):
+    """A shot that says at its top what its references need."""
+    folder = tmp_path / "show" / "shots"
+    folder.mkdir(parents=True)
+    (folder / "hero.usda").write_text('#usda 1.0\n(defaultPrim = "Hero")\ndef Xform "Hero" {\n  def "Hair" {\n}\n}\n')
+    (folder / "shot.usda").write_text(SHOT)
+    return folder / "shot.usda"
+
+
+def test_what_usd_reads_of_the_first_layer_only_is_repeated(shot, tmp_path):
+    (tmp_path / "cache").mkdir()
+    layer = _header(shot, tmp_path / "cache" / "hair.usda")
+    stage = Usd.Stage.Open(layer)
+    assert stage.GetPrimAtPath("/Hero/Hair") and not stage.GetCompositionErrors()
+    assert stage.GetMetadata("renderSettingsPrimPath") == "/Render/main"
+    assert layer.colorConfiguration.path == "../show/shots/show.ocio"
+    assert layer.customLayerData["plate"].path == "../show/plates/a.exr"
+    assert not layer.owner and list(layer.subLayerPaths) == ["../show/shots/shot.usda"]
+
+
+def test_a_default_prim_below_another_is_repeated(shot, tmp_path):
+    shot.write_text('#usda 1.0\n(defaultPrim = "/World/Hero")\ndef "World" {\n  def "Hero" {\n}\n}\n')
+    assert str(Usd.Stage.Open(_header(shot, tmp_path / "hair.usda")).GetDefaultPrim().GetPath()) == "/World/Hero"
+
+
+def test_every_process_writes_the_same_bytes(shot, tmp_path):
+    code = "import sys; from pathlib import Path; from tests.usd.baking.test_override import _header; _header(*map(Path, sys.argv[1:]))"
+    written = []
+    for number in range(3):
+        out = tmp_path / str(number) / "hair.usdc"
+        out.parent.mkdir()
+        subprocess.run([sys.executable, "-c", code, str(shot), str(out)], check=True, cwd=Path(__file__).parents[3])
+        written.append(out.read_bytes())
+    assert written[0] == written[1] == written[2]
+
+
+def test_a_shot_behind_a_link_is_named_as_it_was_given(shot, tmp_path):
+    # A store of files by content: names without meaning and ending, and nothing beside them.
+    (tmp_path / "store").mkdir()
+    os.rename(shot, tmp_path / "store" / "5f3a")
+    shot.symlink_to(tmp_path / "store" / "5f3a")
+    stage = Usd.Stage.Open(_header(shot, shot.parent / "hair.usda"))
+    assert stage.GetPrimAtPath("/Hero/Hair")
+
+
+def test_an_output_folder_behind_a_link_leads_to_the_shot_from_the_name_it_was_given(shot, tmp_path):
+    real = tmp_path / "disk" / "deep" / "cache"
+    real.mkdir(parents=True)
+    (tmp_path / "cache").symlink_to(real)
+    _header(shot, tmp_path / "cache" / "hair.usda")
+    assert Usd.Stage.Open(str(tmp_path / "cache" / "hair.usda")).GetPrimAtPath("/Hero/Hair")
+
+
+def test_a_layer_inside_a_package_is_of_the_packages_file(shot, tmp_path):
+    package = tmp_path / "show.usdz"
+    with Sdf.ZipFileWriter.CreateNew(str(package)) as archive:
+        archive.AddFile(str(shot), "shot.usda")
+        archive.AddFile(str(shot.parent / "hero.usda"), "hero.usda")
+    stage = Usd.Stage.CreateInMemory()
+    stage.DefinePrim("/Hero").GetReferences().AddReference(f"{package}[hero.usda]")
+    assert stage.GetPrimAtPath("/Hero/Hair") and used_files(stage) == [str(package)]
+
+
+def test_the_extent_holds_hair_that_grows_wider_over_the_shot(tmp_path, still_model):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    widths = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetWidthsAttr()
+    widths.Clear()
+    widths.Set([0.001], 1)
+    widths.Set([0.5], 9)
+    stage.Save()
+    baked = bake(path, tmp_path / "a.usdc", still_model, frames="1").path
+    points, extent = samples(baked, "points", "extent", at=1)
+    np.testing.assert_allclose(extent, [points.min(axis=0) - 0.25, points.max(axis=0) + 0.25], atol=1e-5)

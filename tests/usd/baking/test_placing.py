@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Placing a groom part by part gives what the whole gives."""
+
+import numpy as np
+
+import usd.baking.placing as placing
+from neuralocks_core.strands.strand_set import strands_on
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, write_shot
+
+
+def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch):
+    item = read_shot(write_shot(tmp_path, Recipe(strands=300, vertices=10, bound="mesh"))).grooms[0]
+    character = item.attachment.character
+    whole = strands_on(character, item.groom)
+    # As hair moves: each strand its own way, more towards the tip.
+    along = np.linspace(0, 1, whole.rest.shape[1], dtype=np.float32)[:, None]
+    moved = np.random.default_rng(0).normal(0, 0.02, (len(whole.rest), 1, 3)).astype(np.float32) * along
+    joints = item.attachment.rig.joints_at(5.0)
+
+    def placed(block, part):
+        monkeypatch.setattr(placing, "BLOCK", block)
+        monkeypatch.setattr(placing, "PART", part)
+        placer = placing.GroomPlacer(item)
+        assert np.abs(placer.strands.rest - whole.rest).max() < 1e-6
+        assert (placer.strands.lock == whole.lock).mean() > 0.98
+        return placer.points(5.0, joints, lambda strands: moved[strands])
+
+    one = placed(512, 16384)
+    assert np.array_equal(placed(32, 16384), one)
+    assert np.abs(placed(32, 64) - one).max() < 1e-5
+    rigid = item.groom.points @ character.carrying(joints)[:3, :3].T + character.carrying(joints)[:3, 3]
+    assert 1e-3 < np.abs(one - rigid).max() < 0.1

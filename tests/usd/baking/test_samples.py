@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writing samples: only shot, model and time matter, and kills leave no trace."""
+
+import importlib.util
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from usd.baking.bake import bake
+from usd.baking.simulate import simulate
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, samples, write_shot
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_order_chunks_and_jobs_give_the_same_bytes(tmp_path, model):
+    shot = write_shot(tmp_path, Recipe(strands=1500, vertices=9))
+    whole = bake(shot, tmp_path / "bake.usdc", model, jobs=2, subframes=2).path.read_bytes()
+    again = bake(shot, tmp_path / "bake.usdc", model, jobs=1, subframes=2).path.read_bytes()
+    codes = [t + s for t in range(1, 10) for s in (0, 0.5)]
+    np.random.default_rng(0).shuffle(codes)
+    shuffled = bake(shot, tmp_path / "bake.usdc", model, frames=codes).path.read_bytes()
+    assert whole == again == shuffled
+    part = bake(shot, tmp_path / "part.usdc", model, frames="4:6")
+    for code in (4.0, 5.0, 6.0):
+        one, other = (
+            samples(p, "points", "velocities", "extent", at=code) for p in (tmp_path / "bake.usdc", part.path)
+        )
+        assert [a.tobytes() for a in one] == [a.tobytes() for a in other]
+
+
+def test_large_grooms_are_written_in_blocks_that_leave_no_trace(tmp_path, model, monkeypatch):
+    shot = write_shot(tmp_path, Recipe(strands=60, vertices=9))
+    whole = bake(shot, tmp_path / "bake.usdc", model).path.read_bytes()
+    monkeypatch.setattr("usd.baking.samples.BLOCK", 100)
+    assert bake(shot, tmp_path / "bake.usdc", model).path.read_bytes() == whole
+
+
+def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
+    shot = write_shot(tmp_path, Recipe(frames=30, strands=2000, vertices=16))
+    out = tmp_path / "bake.usdc"
+    whole = bake(shot, out, model).path.read_bytes()
+    out.unlink()
+    command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+    spool = tmp_path / ".bake.usdc.baking"
+    while len(list(spool.glob("*.frame"))) < 3 and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not out.exists() and spool.exists(), "the bake was over before it could be killed"
+    result = bake(shot, out, model)
+    assert result.resumed >= 3
+    assert out.read_bytes() == whole
+    assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "bake.usdc"}
+
+
+def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model):
+    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
+
+    def stop(done, total, message):
+        if done == 4:
+            raise KeyboardInterrupt
+
+    for again, taken in ((model, 4), (still_model, 0)):
+        with pytest.raises(KeyboardInterrupt):
+            bake(shot, out, model, progress=stop)
+        assert not out.exists()
+        assert abs(bake(shot, out, again).resumed - taken) <= 1
+        out.unlink()
+
+
+def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, model, monkeypatch):
+    shot, out, own = write_shot(tmp_path), tmp_path / "bake.usdc", tmp_path / "posing.py"
+
+    def stop(done, total, message):
+        if done == 4:
+            raise KeyboardInterrupt
+
+    own.write_text("one")
+    monkeypatch.setattr("usd.baking.samples.program_files", lambda: [own])
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    own.write_text("another")
+    assert bake(shot, out, model).resumed == 0
+
+
+def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
+    """Neither by a bake nor by a simulation, and whoever read it: hair would swing about another joint from there on."""
+    path, out = write_shot(tmp_path, Recipe(bound="none")), tmp_path / "bake.usdc"
+    makers = [lambda shot, **options: bake(shot, out, model, **options)]
+    if importlib.util.find_spec("warp"):
+        makers.append(lambda shot, **options: simulate(shot, out, strands=4, **options))
+
+    def stop(done, total, message):
+        if done == 4 and message.startswith("/"):
+            raise KeyboardInterrupt
+
+    for make in makers:
+        for other in ({"head": "neck"}, {"cuts": [3]}):
+            for again, taken in (({}, 0), (other, 1)):
+                with pytest.raises(KeyboardInterrupt):
+                    make(path, **other, progress=stop)
+                assert (make(read_shot(path, **again)).resumed > 0) == taken

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reference solver writes the same kind of layer as a bake."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.simulate import simulate
+
+from ..shots import Recipe, samples, world_points, write_shot
+
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+
+
+def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", strands=12, bound="mesh"))
+    result = simulate(shot, tmp_path / "out.usdc", strands=12)
+    first = world_points(result.path, 1.0)
+    assert np.abs(first - world_points(shot, 1.0)).max() < 1e-3
+    last = world_points(result.path, 9.0).reshape(12, 12, 3)
+    lengths = [np.linalg.norm(np.diff(p.reshape(12, 12, 3), axis=1), axis=-1).sum(1) for p in (first, last)]
+    assert np.abs(lengths[1] / lengths[0] - 1).max() < 0.05
+    assert np.abs(samples(result.path, "velocities", at=5.0)).max() > 1
+
+
+def test_what_would_take_for_ever_or_means_nothing_is_refused(tmp_path):
+    """Frames far from the animation, from which the solver starts, ended in a traceback or in no memory."""
+    shot = write_shot(tmp_path)
+    for wrong, said in (
+        ({"frames": "1e308:1e308"}, "10000 are the most"),
+        ({"frames": "9000000:9000001"}, "10000 are the most"),
+        ({"volume": 1e308}, "--volume 1e\\+308: must be a number from 0 to 100"),
+        ({"strands": 0}, "--strands 0: must be a whole number from 1 on"),
+        ({"strands": "40"}, "--strands '40': must be"),
+        ({"joints": {"nose": "head"}}, "--joint nose=...: there is no such meaning"),
+    ):
+        with pytest.raises(NeuralocksError, match=said):
+            simulate(shot, tmp_path / "slow.usdc", **wrong)
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
+
+
+def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_path):
+    """So that parts of a range are the whole; before it, hair is at rest."""
+    shot = write_shot(tmp_path, Recipe(strands=6))
+    early, late = (
+        simulate(shot, tmp_path / f"{name}.usdc", strands=6, frames=frames).path
+        for name, frames in (("early", "-3:5"), ("late", "4:5"))
+    )
+    assert samples(early, "points", at=5).tobytes() == samples(late, "points", at=5).tobytes()
+    assert samples(early, "points", at=-3).tobytes() == samples(early, "points", at=1).tobytes()
+    before = simulate(shot, tmp_path / "before.usdc", strands=1, frames="-3:-2")
+    assert any("none of it within -3 to -2" in note for note in before.notes)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Velocities are those of the points, at frames that are those of the shot."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
+
+from usd.baking.bake import bake
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, samples, write_shot
+
+
+def test_velocities_are_those_of_the_points(tmp_path, model):
+    shot = write_shot(tmp_path, Recipe(unit=0.01))
+    result = bake(shot, tmp_path / "bake.usdc", model)
+    at = {code: samples(result.path, "points", at=code).astype(float) for code in range(1, 10)}
+    middle = (8 * (at[6] - at[4]) - (at[7] - at[3])) * 24 / 12
+    first, second = (-3 * at[1] + 4 * at[2] - at[3]) * 12, (at[3] - at[1]) * 12
+    for code, expected in ((5, middle), (1, first), (2, second)):
+        assert np.allclose(samples(result.path, "velocities", at=code), expected, atol=5e-3)
+    # A half frame to both sides says nearly the same, in the middle of a smooth motion.
+    few = bake(shot, tmp_path / "few.usdc", model, frames=[4.5, 5.5]).path
+    near = (samples(few, "points", at=5.5).astype(float) - samples(few, "points", at=4.5)) * 24
+    assert np.linalg.norm(near - middle) < 0.1 * np.linalg.norm(near)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1000.0])
+def test_frames_are_the_shots_where_its_time_codes_are_seconds_or_milliseconds(tmp_path, model, rate):
+    shots = [write_shot(tmp_path, Recipe(rate=24, frames=9), "frames"), tmp_path / "counted.usda"]
+    stage = Usd.Stage.Open(Usd.Stage.Open(str(shots[0])).Flatten())
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate if rate > 24 else 24)
+    stage.SetStartTimeCode(rate / 24)
+    stage.SetEndTimeCode(9 * rate / 24)
+    motion = stage.GetPrimAtPath("/Hero/Rig/Motion")
+    for attribute in motion.GetAttributes():
+        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()}
+        if values:
+            attribute.Clear()
+        for code, value in values.items():
+            attribute.Set(value, code * rate / 24)
+    stage.GetRootLayer().Export(str(shots[1]))
+    read = [read_shot(shot).rigs[0].clip for shot in shots]
+    assert len(read[1].times) == 9 and np.allclose(read[0].times, read[1].times)
+    assert np.abs(read[0].joints - read[1].joints).max() < 1e-6
+    bakes = [bake(shot, shot.with_suffix(".usdc"), model, subframes=2) for shot in shots]
+    assert np.allclose(np.array(bakes[1].frames) * 24 / rate, bakes[0].frames)
+    for code, seconds in zip(bakes[0].frames, bakes[1].frames, strict=True):
+        frames, counted = (
+            samples(done.path, "points", "velocities", at=at) for done, at in zip(bakes, (code, seconds))
+        )
+        assert np.abs(frames[0] - counted[0]).max() < 1e-5
+        assert np.abs(frames[1] - counted[1]).max() < 1e-3 * np.abs(frames[1]).max() + 1e-5
+
+
+def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
+    first = bake(write_shot(tmp_path), tmp_path / "first.usdc", model, frames=[4, 5])
+    again = bake(first.path, tmp_path / "again.usdc", model, frames=[5], velocities=False, material=["weight=2"])
+    stage = Usd.Stage.Open(str(again.path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    assert curves.GetPointsAttr().GetTimeSamples() == [5] and not curves.GetVelocitiesAttr().HasValue()

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C in the middle of what takes it for something else."""
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+
+import pytest
+import typer
+
+from usd.__main__ import main
+from usd.border.stopping import INTERRUPTED, deferred, stoppable
+from usd.border.units import write_stage
+from usd.cli import app as cli
+from usd.cli.command import command_of
+from usd.cli.progress import progress_bar
+
+
+@pytest.fixture(autouse=True)
+def _heard():
+    """Whatever started the tests may have them deaf to Ctrl-C, as a shell's background jobs are."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def _press() -> None:
+    """Press Ctrl-C."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def _swallowed() -> None:
+    """As USD does while it loads its modules; work then goes on to its next step."""
+    try:
+        _press()
+    except KeyboardInterrupt:
+        pass
+    with progress_bar("baking") as say:
+        say(0, 1, "reading")
+    raise AssertionError("it went on")
+
+
+def _turned_into_another() -> None:
+    """As compiled modules do that call Python and forget to ask how it went."""
+    try:
+        _press()
+    except KeyboardInterrupt as error:
+        raise SystemError("returned a result with an exception set") from error
+
+
+@pytest.mark.parametrize("work", [_press, _swallowed, _turned_into_another])
+def test_ctrl_c_ends_a_command_whatever_it_meets(work, capsys):
+    app = typer.Typer()
+    command_of(app)("work")(work)
+    with pytest.raises(SystemExit) as caught:
+        app([])
+    assert caught.value.code == INTERRUPTED
+    assert capsys.readouterr().err == "stopped\n"
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_farm_ends_a_command_as_ctrl_c_does(capsys):
+    """So it has time to take away what is half written."""
+    app = typer.Typer()
+
+    def work():
+        """As a scheduler does that needs the machine."""
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    command_of(app)("work")(work)
+    with pytest.raises(SystemExit) as caught:
+        app([])
+    assert (caught.value.code, capsys.readouterr().err) == (128 + signal.SIGTERM, "stopped\n")
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_ctrl_c_waits_while_modules_load(capsys):
+    """They stay half made where it breaks into their loading, and what is loaded next may crash."""
+    loaded = []
+
+    def work():
+        """As a command that draws does."""
+        with deferred():
+            _press()
+            loaded.append("whole")
+        raise AssertionError("it went on")
+
+    app = typer.Typer()
+    command_of(app)("work")(work)
+    with pytest.raises(SystemExit) as caught:
+        app([])
+    assert (caught.value.code, capsys.readouterr().err, loaded) == (INTERRUPTED, "stopped\n", ["whole"])
+
+
+def test_ctrl_c_that_was_swallowed_puts_no_file_under_its_name(tmp_path, capsys):
+    def author(stage):
+        stage.DefinePrim("/Hero")
+        with suppress(KeyboardInterrupt):
+            _press()
+
+    with pytest.raises(SystemExit), stoppable():
+        write_stage(tmp_path / "a.usda", author)
+    assert not list(tmp_path.iterdir()) and capsys.readouterr().err == "stopped\n"
+
+
+def test_ctrl_c_while_the_command_line_is_read_is_one_word(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "app", lambda words: _press())
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert (caught.value.code, capsys.readouterr().err) == (INTERRUPTED, "stopped\n")
+
+
+@pytest.mark.parametrize("module", ["usd.cli.app", "pxr.Gf"])
+def test_ctrl_c_is_one_word_from_the_beginning(module, tmp_path):
+    """While the command line is loaded, and while USD is."""
+    code = """import importlib.abc, os, signal, sys
+class Pressed(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, *_):
+        if name == sys.argv[0]:
+            os.kill(os.getpid(), signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Pressed())
+from usd.__main__ import main
+sys.argv = sys.argv[1:]
+main()"""
+    words = [module, "inspect", str(tmp_path / "none.usda")]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")

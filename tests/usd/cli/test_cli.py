@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: the same as Python, statuses, one line of error, and a quick start."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+import pytest
+
+from neuralocks_core import model as model_file
+from usd.assets.groom import import_groom, write_groom
+from usd.baking.bake import bake
+from usd.cli.app import main
+from usd.review.inspect import inspect
+
+from ..shots import Recipe, write_shot
+
+ROOT = Path(__file__).parents[3]
+GROOMS = ROOT.parent / "shared" / "data" / "grooms"
+
+
+def status(*words) -> int:
+    """Exit status of a command line."""
+    with pytest.raises(SystemExit) as caught:
+        main([str(word) for word in words])
+    return int(caught.value.code or 0)
+
+
+def test_bake_is_the_python_function(tmp_path, model, capsys):
+    shot = write_shot(tmp_path, Recipe(unit=0.01))
+    words = ("bake", shot, "-o", tmp_path / "a.usdc", "--model", model, "--groom", "/Hero/Hair", "--frames", "2:6:2",
+             "--material", "bend=2x", "--material", "weight=1.2", "--jobs", "2", "--json")  # fmt: skip
+    assert status(*words) == 0
+    told = json.loads(capsys.readouterr().out)
+    bake(shot, tmp_path / "b.usdc", model, ["/Hero/Hair"], frames="2:6:2", material={"bend": "2x", "weight": 1.2})
+    assert (tmp_path / "a.usdc").read_bytes() == (tmp_path / "b.usdc").read_bytes()
+    assert told["frames"] == [2.0, 4.0, 6.0] and told["grooms"][0]["joint"].endswith("head")
+
+
+def test_errors_are_one_line_and_status_one(tmp_path, model, capsys):
+    for words in (
+        ("bake", tmp_path / "nope.usda", "-o", tmp_path / "a.usdc", "--model", model),
+        ("inspect", tmp_path / "nope.usda"),
+        ("import", tmp_path / "nope.tfx", "-o", tmp_path / "a.usdc"),
+        ("export", tmp_path / "nope.neuralocks", "-o", tmp_path),
+    ):
+        assert status(*words) == 1
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1 and captured.err.startswith("error: "), captured
+        assert "nope" in captured.err
+
+
+def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys):
+    odd = tmp_path / os.fsdecode(b"sh\xff.usda")
+    try:
+        write_shot(tmp_path).rename(odd)
+    except (OSError, UnicodeError):
+        pytest.skip("this disk takes only text")
+    for words in (
+        ("bake", odd, "-o", tmp_path / "a.usdc", "--model", model),
+        ("inspect", odd),
+        ("train", "--character", odd, "-o", tmp_path / "a.neuralocks"),
+        ("rig", "export-c", "-o", odd.with_suffix(".h")),
+    ):
+        assert status(*words) == 1
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1 and "not UTF-8" in captured.err, captured
+
+
+def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
+    """A redirected stdout is often no UTF-8; the card's frames ended in a traceback there."""
+    shot, baked = write_shot(tmp_path), tmp_path / "髪.usdc"
+    environment = {**os.environ, "PYTHONIOENCODING": "cp1252"}
+    for words in (["bake", shot, "-o", baked, "--model", model], ["evaluate", baked]):
+        command = [sys.executable, "-m", "usd", *map(str, words)]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, env=environment)
+        assert done.returncode == 0, done.stderr.decode()
+    assert "vertices in the body" in done.stdout.decode("cp1252") and b"u2500" not in done.stdout
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
+    command = [sys.executable, "-m", "usd", "inspect", str(write_shot(tmp_path))]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and done.stderr.startswith("error: output: ") and "Traceback" not in done.stderr
+    read, write = os.pipe()
+    os.close(read)  # as `neuralocks inspect | head` does once it has its lines
+    with open(write, "w") as gone:
+        done = subprocess.run(command, cwd=ROOT, stdout=gone, stderr=subprocess.PIPE, text=True)
+    assert done.stderr == ""
+
+
+def test_an_empty_word_is_refused(tmp_path, capsys):
+    """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
+    for words in (("bake", "s.usda", "-o", "o.usdc", "--head", ""), ("rig", "inspect", "s.usda", "--chains", " ")):
+        assert status(*words) == 1
+        assert capsys.readouterr().err == f"error: {words[-2][2:]}: is empty; give a value, or leave it out\n"
+
+
+def test_a_seed_is_one_of_numpys(capsys):
+    for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
+        assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
+    capsys.readouterr()
+
+
+def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    assert status("bake", "--help") == 0
+    assert "mute it to have the shot back. A bake that was stopped goes on" in capsys.readouterr().out
+
+
+def test_the_version_is_told(capsys):
+    assert status("--version") == 0
+    assert capsys.readouterr().out.split()[0] == "neuralocks"
+
+
+def test_a_source_tree_that_is_not_installed_has_no_version(capsys, monkeypatch):
+    monkeypatch.setattr("importlib.metadata.Distribution.from_name", missing)
+    assert status("--version") == 0 and capsys.readouterr().out.startswith("neuralocks of a source tree")
+
+
+def missing(name):
+    raise PackageNotFoundError(name)
+
+
+def test_wrong_usage_is_status_two(capsys):
+    assert status("bake") == 2
+    assert status("bake", "a.usd", "-o", "b.usdc", "--jobs", "many") == 2
+    assert status("unknown") == 2
+
+
+def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
+    shot, written, write = write_shot(tmp_path), [], Path.write_bytes
+
+    def full(self, data):
+        if len(written) == 2:
+            raise OSError(28, "No space left on device")
+        written.append(self)
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert status("export", model, "-o", tmp_path / "onnx", "--shot", shot) == 1
+    assert "no space left" in capsys.readouterr().err
+    assert len(written) == 2 and list(tmp_path.iterdir()) == [shot]
+
+
+def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
+    import onnxruntime
+
+    assert status("export", model, "-o", tmp_path / "onnx") == 0
+    description = json.loads((tmp_path / "onnx" / "description.json").read_text())
+    for name, graph in description["graphs"].items():
+        session = onnxruntime.InferenceSession(tmp_path / "onnx" / name, providers=["CPUExecutionProvider"])
+        assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
+    assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
+    capsys.readouterr()
+
+
+def test_what_is_exported_without_a_name_is_the_shipped_model(tmp_path, capsys):
+    assert status("export", "-o", tmp_path) == 0
+    assert len(capsys.readouterr().out.split()) == 5
+    description = (tmp_path / "description.json").read_text()
+    assert len(description) < 20_000 and "curve" not in json.loads(description)["model"]["training"]
+    assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model_file.shipped()).graphs["tail.onnx"]
+    assert status("export", "-o", tmp_path, "--groom", "/Hair") == 1 and "--shot" in capsys.readouterr().err
+    assert status("rig", "export-onnx", "-o", tmp_path / "rig") == 1
+    assert "ends in .onnx" in capsys.readouterr().err and not (tmp_path / "rig").exists()
+
+
+@pytest.mark.parametrize("kind", ["strands", "rig"])
+def test_every_graph_and_every_part_of_its_input_is_described(tmp_path, kind, capsys):
+    assert status("export", model_file.shipped(kind), "-o", tmp_path) == 0
+    capsys.readouterr()
+    told = json.loads((tmp_path / "description.json").read_text())
+    assert all(graph["what"] for graph in told["graphs"].values())
+    vector = told["boundary vector"]
+    assert set(vector["parts"]) <= set(vector["how"]) and len(vector["bin weights"]) == len(
+        told["model"]["boundary"]["bins"]
+    )
+    read = vector["parts"] if kind == "strands" else {n: vector["parts"][n] for n in ("pose", "gravity", "history")}
+    first = told["graphs"]["frame.onnx" if kind == "strands" else "rig.onnx"]["inputs"]
+    assert sum(stop - start for start, stop in read.values()) == next(iter(first.values()))[1]
+
+
+def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
+    file = model_file.read(model)
+    bad = model_file.write(tmp_path / "bad.neuralocks", file.meta, file.graphs | {"tail.onnx": b"nonsense"})
+    for words in (("export", bad, "-o", tmp_path / "onnx"), ("inspect", bad)):
+        assert status(*words) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "bad.neuralocks: tail.onnx cannot be loaded" in error
+
+
+def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", bound="mesh"))
+    assert status("inspect", shot, "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["unit [m]"], facts["up axis"], facts["rate [1/s]"], facts["frames"]) == (0.01, "Z", 24.0, [1.0, 9.0])
+    rig, groom = facts["skeletons"][0], facts["grooms"][0]
+    assert rig["head"].endswith("head") and abs(rig["head width [m]"] - 0.2) < 0.01 and rig["joints"] == 8
+    assert groom["strands"] == 40 and "Skin" in groom["carried by"] and facts["stops"] == []
+    assert status("inspect", shot) == 0
+    assert "head width [m]: 0.2" in capsys.readouterr().out
+
+
+def test_inspect_tells_of_a_model_what_a_person_reads(capsys):
+    shipped = Path(__file__).parents[3] / "neuralocks_core" / "shipped" / "strands.neuralocks"
+    assert status("inspect", shipped) == 0
+    text = capsys.readouterr().out
+    assert "inputs of the body" in text and text.count("\n") < 150  # the curve alone has 200 points
+
+
+def test_a_wrong_unit_is_noticed(tmp_path):
+    from pxr import Usd, UsdGeom
+
+    shot = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(shot))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.GetRootLayer().Save()
+    assert any("metersPerUnit" in line for line in inspect(shot)["spoils"])
+
+
+def test_help_comes_without_the_heavy_parts():
+    heavy = ("pxr", "numpy", "onnxruntime", "torch")
+    code = f"import sys; from usd.cli.app import app; print([m for m in {heavy} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+    words = [sys.executable, "-m", "usd", "--help"]
+    assert "bake" in subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_runtime_imports_only_what_inference_needs():
+    """Half a second to start is kept by what is not imported: no training, drawing or statistics."""
+    absent = ("torch", "warp", "onnx", "bpy", "trimesh", "pyvista", "matplotlib", "PIL", "pandas", "sympy",
+              "scipy.stats", "scipy.signal", "scipy.ndimage", "scipy.integrate")  # fmt: skip
+    code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
+    for module in (
+        "neuralocks_core.runtime, neuralocks_core.deformation.resolve",
+        "usd.baking.bake, usd.baking.posing, usd.shot.stage",
+    ):
+        command = [sys.executable, "-c", code % module]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == "[]", module
+
+
+def test_a_bake_needs_no_torch(tmp_path, model):
+    shot = write_shot(tmp_path)
+    code = (
+        "import sys\n"
+        "class Absent:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('torch', 'warp', 'bpy', 'onnx'): raise ModuleNotFoundError(name)\n"
+        "sys.meta_path.insert(0, Absent())\n"
+        f"from usd.baking.bake import bake; bake({str(shot)!r}, {str(tmp_path / 'a.usdc')!r}, {str(model)!r}, frames='1:2')"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+    assert (tmp_path / "a.usdc").exists()
+
+
+@pytest.mark.skipif(not GROOMS.exists(), reason="../shared/data/grooms is not there")
+def test_a_hair_file_becomes_a_usd_groom(tmp_path, capsys):
+    import numpy as np
+    from pxr import Usd, UsdGeom, UsdValidation
+
+    file = GROOMS / "mohawk" / "ratboy_mohawk.tfx"
+    assert status("import", file, "-o", tmp_path / "groom.usdc", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    stage = Usd.Stage.Open(str(tmp_path / "groom.usdc"))
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    assert [e.GetMessage() for e in context.Validate(stage)] == []
+    prim = next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves))
+    counts = UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr().Get()
+    assert len(counts) == told["grooms"][0]["strands"] == 2228 and sum(counts) == told["grooms"][0]["vertices"]
+    uv = UsdGeom.PrimvarsAPI(prim).GetPrimvar("groom_root_uv")
+    assert uv.GetInterpolation() == "uniform" and len(uv.Get()) == 2228
+    # And once more through USD: nothing changes but the file.
+    again, _ = import_groom(tmp_path / "groom.usdc", tmp_path / "again.usda")
+    points = np.asarray(UsdGeom.BasisCurves(prim).GetPointsAttr().Get())
+    assert np.array_equal(again[0].points, points)
+    assert write_groom(tmp_path / "third.usda", again[0]).exists()
+
+
+def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_path, capsys):
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    out = tmp_path / "m.neuralocks"
+    selfsupervised = ("--method", "selfsupervised")
+    for words, said in (
+        (("--method", "magic"), "selfsupervised"),
+        (("--paper",), "--method"),
+        (("--minutes", "0"), "--minutes"),
+        (("--minutes", "nan"), "--minutes"),
+        (("--steps", "-1"), "--steps"),
+        (("--rollouts", "0"), "--rollouts"),
+        ((*selfsupervised, "--set", "colour=red"), "undetached"),
+        ((*selfsupervised, "--set", "form=round"), "constant"),
+        ((*selfsupervised, "--set", "rate=nan"), "rate"),
+        ((*selfsupervised, "--set", "style=1,nan"), "style"),
+        (("--set", "minutes=-5"), "--minutes"),
+        (("--set", "rate=-1"), "rate"),
+        (("--set", "clips=0"), "clips"),
+        (("--set", "motion=magic"), "modulated"),
+        (("--set", "seed=-1"), "--seed"),
+        (("--processes", "100000"), "at most 256"),
+        (("--device", "abacus"), "--device abacus"),
+    ):
+        assert status("train", "--character", tmp_path / "nope.usda", "-o", out, *words) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and said in error and "nope" not in error
+
+
+def test_settings_are_words_for_fields():
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    from neuralocks_core.physics.bend_twist import Cosserat
+    from neuralocks_core.training.moment_options import SelfSupervisedOptions
+    from usd.models.train import parsed
+
+    words = {"form": "direct", "paper_adhesion": "yes", "style": "1,2.5", "poses": "4", "rate": "1e-4", "steps": "7"}
+    values = parsed(SelfSupervisedOptions, words)
+    assert values == {
+        "form": Cosserat.DIRECT, "paper_adhesion": True, "style": (1.0, 2.5), "poses": 4, "rate": 1e-4, "steps": 7
+    }  # fmt: skip
+    assert SelfSupervisedOptions.paper(**values).output == "displacement"

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far long work is: lines in a log, with the time left of each step; a bar on a terminal."""
+
+import re
+import sys
+
+from usd.cli import progress
+
+
+def test_a_log_tells_the_time_left_of_the_step_that_it_is_at(monkeypatch, capsys):
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.progress_bar("baking") as say:
+        for done in (40, 50, 70):  # resumed at 40
+            say(done, 100, f"frame {done}")
+        say(0, 10, "writing")
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "baking: 40% frame 40"
+    assert [float(re.search(r", ([\d.]+) min left", line)[1]) for line in lines[1:3]] == [2.5, 1.0]
+    assert lines[3] == "baking: 0% writing"
+
+
+def test_the_time_before_work_gets_going_is_not_taken_for_its_speed(monkeypatch, capsys):
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.progress_bar("training") as say:
+        for done in (0, 0, 0, 0, 50):
+            say(done, 100, "first simulations" if not done else "")
+    assert ", 0.5 min left" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_nothing_is_foretold_of_the_first_frame_alone(monkeypatch, capsys):
+    clock = iter(range(0, 10_000, 30))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.progress_bar("baking") as say:
+        for done in (0, 1, 50):
+            say(done, 241, "Hair")
+    assert ["left" in line for line in capsys.readouterr().err.splitlines()] == [False, False, True]
+
+
+def test_quick_work_shows_nothing_and_slow_work_on_a_terminal_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with progress.progress_bar("baking") as say:
+        say(1, 2, "frame 1")
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(progress, "QUIET_FOR", -1.0)
+    with progress.progress_bar("baking") as say:
+        say(1, 2, "frame 1")
+        say(0, 3, "another step")
+    assert "baking" in capsys.readouterr().err

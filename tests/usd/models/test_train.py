@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `neuralocks train` begins with, decided before anything large is read."""
+
+import pytest
+from pxr import Sdf, Usd
+
+from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+pytest.importorskip("onnx", reason="the extra 'train' is not installed")
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.regression import RegressionOptions
+from usd.assets.grow import grow
+from usd.cli.train import one_by_one
+from usd.models.train import begins_with
+from usd.models.training_scene import MOST_STRANDS, read_clip, training_scene
+
+from ..shots import Recipe, write_shot
+
+SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
+LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSupervisedOptions.paper()
+
+
+def test_left_out_it_is_the_shipped_model_where_that_fits():
+    assert begins_with(None, False, SPEC, LIKE) == model.shipped()
+    for spec, options in ((OTHER, LIKE), (SPEC, STILL), (SPEC, PAPER)):
+        assert begins_with(None, False, spec, options) is None
+    assert begins_with(None, True, SPEC, LIKE) is None, "a resumed training has its own beginning"
+
+
+def test_what_is_named_is_taken_or_refused(tmp_path):
+    assert begins_with("shipped", False, SPEC, LIKE) == model.shipped()
+    assert begins_with("nothing", False, SPEC, LIKE) is None
+    with pytest.raises(NeuralocksError, match="strands.neuralocks: differs from this training in static"):
+        begins_with("shipped", False, SPEC, STILL)
+    with pytest.raises(NeuralocksError, match="none.neuralocks: no such model file"):
+        begins_with(tmp_path / "none.neuralocks", False, SPEC, LIKE)
+
+
+def test_what_a_training_should_know_is_told_before_it(tmp_path):
+    """Of several skeletons the first is taken, and motion is that of the one with the character's joints."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", strands=MOST_STRANDS + 40, vertices=3))
+    stage = Usd.Stage.Open(str(path))
+    layer = stage.GetRootLayer()
+    Sdf.CopySpec(layer, "/Hero/Rig", layer, "/Hero/Another")
+    layer.Save()
+    told, grown = [], []
+    scene = training_scene(path, motion=[str(path)], tell=told.extend)
+    grow("bob", path, tmp_path / "bob.usda", 20, tell=grown.extend)
+    for notes in (told, grown):
+        assert any("/Hero/Rig: the first of 2 skeletons is taken" in note for note in notes)
+    assert any("no joint found for" in note for note in told)
+    assert len(scene.grooms[0].rest) == MOST_STRANDS and len(scene.clips) == 1
+    stage.GetPrimAtPath("/Hero/Rig").GetRelationship("skel:animationSource").SetTargets([])
+    layer.Save()
+    assert len(read_clip(str(path), scene.character).times) > 1
+
+
+def test_options_take_as_many_words_as_follow():
+    """As the shell's own `--motion clips/*.bvh` gives them."""
+    words = one_by_one("train --groom a.usd b.usd --motion c.bvh -o m --groom d.usd e.usd --resume".split())
+    assert (
+        " ".join(words) == "train --groom a.usd --groom b.usd --motion c.bvh -o m --groom d.usd --groom e.usd --resume"
+    )

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report card, the preview and the demo on bakes whose answers are known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import Material
+from usd.baking.bake import bake
+from usd.cli.app import main
+from usd.review.baked import read_baked
+from usd.review.demo import demo, shipped_shot
+from usd.review.evaluate import evaluate
+from usd.review.inspect import inspect
+from usd.shot.recorded import record, recorded
+
+from ..shots import Recipe, write_shot
+
+FRAMES = "1:60:4"
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory, still_model):
+    out = tmp_path_factory.mktemp("bakes") / "rigid.usdc"
+    bake(shipped_shot(), out, still_model, frames=FRAMES, velocities=False, resolve=False)
+    return out
+
+
+def test_a_rigid_bake_has_no_motion_no_droop_and_exact_lengths(rigid):
+    values = next(iter(evaluate(rigid).grooms.values()))
+    assert values["frames"] == 15
+    for name in ("droop_cm", "speed_cm_s", "swing_percent", "energy_bend", "energy_gravity"):
+        assert values[name] == pytest.approx(0, abs=1e-3), name
+    assert values["stretch_percent_max"] < 0.01
+
+
+def test_a_moving_bake_moves_and_keeps_its_lengths(tmp_path, model):
+    bake(shipped_shot(), tmp_path / "moving.usdc", model, frames=FRAMES, velocities=False)
+    values = next(iter(evaluate(tmp_path / "moving.usdc").grooms.values()))
+    assert values["speed_cm_s"] > 0.02 and values["swing_percent"] > 0.02
+    assert values["energy_bend"] > 0
+    # Hair of exact length stores nothing by stretch, however finer than the network's vertices it winds.
+    assert values["stretch_percent_max"] < 0.01 and values["energy_stretch"] < 1e-5
+
+
+def test_resolving_takes_hair_out_of_the_body(tmp_path, model):
+    share = {}
+    for resolve in (False, True):
+        out = tmp_path / f"resolved-{resolve}.usdc"
+        bake(shipped_shot(), out, model, frames="20:60:20", resolve=resolve, velocities=False)
+        share[resolve] = next(iter(evaluate(out).grooms.values()))["penetration_percent"]
+    assert share[False] > 1
+    assert share[True] < 0.1 * share[False]
+
+
+def test_the_command_draws_the_curves_of_the_card(rigid, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the extra 'preview' is not installed")
+    with pytest.raises(SystemExit) as ended:
+        main(["evaluate", str(rigid), "--json", "--groom", "/Body", "--plot", str(tmp_path / "tips.png")])
+    assert ended.value.code == 0 and json.loads(capsys.readouterr().out)["grooms"]
+    assert (tmp_path / "tips.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_part_of_a_shot_is_compared_with_hair_that_knows_what_came_before(tmp_path, model):
+    """The network reads the motion before the first frame baked; a reference at rest there would be another shot's."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    shot, tips = write_shot(tmp_path, Recipe(frames=24, strands=8)), []
+    for frames in ("1:24", "13:24"):
+        bake(shot, tmp_path / "hair.usdc", model, frames=frames, velocities=False)
+        tips.append(evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"])
+    assert np.linalg.norm(tips[1][0]) > 0.005
+    np.testing.assert_allclose(tips[1], tips[0][12:], atol=1e-5)
+
+
+def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
+    shot = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    roots = np.array(points.Get()).reshape(40, 12, 3)[:, :1]
+    points.Set(Vt.Vec3fArray.FromNumpy(np.repeat(roots, 12, axis=1).reshape(-1, 3)))
+    stage.Save()
+    bake(shot, tmp_path / "hair.usdc", model)
+    card = evaluate(tmp_path / "hair.usdc", reference=True)
+    assert card.grooms["/Hero/Hair"] == {"strands": 40, "measured": 0, "frames": 9}
+    assert any("nothing is measured" in note for note in card.notes)
+
+
+def test_a_stage_without_samples_is_no_bake():
+    with pytest.raises(NeuralocksError, match="no animated points"):
+        read_baked(shipped_shot())
+
+
+def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch, capsys):
+    import usd.review.demo
+
+    short = lambda *args, **options: bake(*args, frames="1:9:2", **options)  # noqa: E731
+    monkeypatch.setattr(usd.review.demo, "bake", short)
+    done = demo(tmp_path / "out", still_model, clip=False)
+    assert all(path.is_file() for path in done.outputs.values())
+    assert json.loads(done.outputs["report card"].read_text())["grooms"]
+    told = replace(done, bake=replace(done.bake, notes=["of the bake"]), notes=["of the picture"])
+    monkeypatch.setattr(usd.review.demo, "demo", lambda *args, **options: told)
+    with pytest.raises(SystemExit):
+        main(["demo", "--json"])
+    assert json.loads(capsys.readouterr().out)["notes"] == ["of the bake", "of the picture"]
+
+
+def test_only_what_was_baked_is_measured(tmp_path, model):
+    """A beard that the same skeleton still skins: its points stand at rest, and are no bake."""
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
+    stage.GetRootLayer().Save()
+    bake(stage.GetRootLayer().realPath, tmp_path / "hair.usdc", model, ["/Hero/Hair"])
+    card = evaluate(tmp_path / "hair.usdc")
+    assert list(card.grooms) == ["/Hero/Hair"]
+    assert any("/Hero/Beard" in note for note in card.notes)
+
+
+def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
+    """Through a layer on top, too; a given one wins, and one that is none is told."""
+    shot, out, above = write_shot(tmp_path), tmp_path / "hair.usdc", tmp_path / "above.usda"
+    soft = Material(bend=4e-4, weight=1.5)
+    bake(shot, out, model, material=soft, strength=0.5)
+    layer = Sdf.Layer.CreateNew(str(above))
+    layer.subLayerPaths.append("hair.usdc")
+    layer.Save()
+    told, given, other = (evaluate(above, material=material).to_json() for material in (None, soft, Material()))
+    assert told == given != other
+    with_it = next(groom["baked with"] for groom in inspect(above)["grooms"])
+    assert with_it["material"]["bend"] == 4e-4 and with_it["strength"] == 0.5
+    stage = Usd.Stage.Open(str(above))
+    prim = stage.OverridePrim("/Hero/Hair")
+    for wrong in ({"bend": 1.0}, {"bend": "stiff"}, {"colour": 1.0}, "soft"):
+        prim.SetCustomDataByKey("neuralocks:material", wrong)
+        stage.Save()
+        with pytest.raises(NeuralocksError, match="/Hero/Hair: customData 'neuralocks' has no material .*--material"):
+            evaluate(above)
+        assert evaluate(above, material=soft).to_json() == given
+        prim.ClearCustomDataByKey("neuralocks:material")
+
+
+def test_a_bake_over_a_bake_tells_of_itself_alone(tmp_path, model):
+    """USD composes dictionaries of all layers into one: what the lower bake was made with would shine through."""
+    bake(write_shot(tmp_path), tmp_path / "hair.usdc", model, material=Material(bend=4e-4))
+    below = Sdf.Layer.FindOrOpen(str(tmp_path / "hair.usdc"))
+    record(below.GetPrimAtPath("/Hero/Hair"), {"solver": "rods"})
+    below.Save()
+    bake(tmp_path / "hair.usdc", tmp_path / "over.usdc", model)
+    stage = Usd.Stage.Open(str(tmp_path / "over.usdc"))
+    told = recorded(stage.GetPrimAtPath("/Hero/Hair"))
+    assert "solver" not in told and told["material"]["bend"] == Material().bend
+
+
+def test_a_model_without_a_reference_is_refused(rigid, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["evaluate", str(rigid), "--model", "strands.neuralocks"])
+    assert ended.value.code == 1 and "--reference" in capsys.readouterr().err
+
+
+def test_of_very_many_vertices_distances_are_measured_of_some(tmp_path, still_model, monkeypatch):
+    baked, shares = bake(write_shot(tmp_path), tmp_path / "a.usdc", still_model, frames="1").path, []
+    for most in (100_000, 120):
+        monkeypatch.setattr("usd.review.evaluate.COLLISION_VERTICES", most)
+        shares.append(next(iter(evaluate(baked).grooms.values()))["inside_at_rest_percent"])
+    assert shares[0] > 5 and shares[1] == pytest.approx(shares[0], abs=4) and shares[1] != shares[0]

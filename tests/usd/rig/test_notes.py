@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What commands for mesh hair tell of rigs that would be baked otherwise than somebody expects."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.network import RigSampler
+from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.rig.stage import check_patterns, read_rigged_hair, rigged_notes
+
+from ..rig_shots import model_for, small_shot
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """Makes a small shot in which a function changed the stage."""
+
+    def make(change, **options):
+        path = small_shot(tmp_path / "shot.usda", **options)
+        stage = Usd.Stage.Open(str(path))
+        change(stage)
+        stage.GetRootLayer().Save()
+        return path
+
+    return make
+
+
+def _retyped(name: str, kind, value):
+    """A change that gives a channel of the animation another type with the same numbers."""
+
+    def change(stage):
+        prim = stage.GetPrimAtPath("/Who/Motion")
+        old = prim.GetAttribute(name)
+        samples, array = {code: old.Get(code) for code in old.GetTimeSamples()}, type(kind.defaultValue)
+        still = old.Get()
+        prim.RemoveProperty(name)
+        layer = stage.GetRootLayer()
+        spec = Sdf.AttributeSpec(
+            layer.GetPrimAtPath(prim.GetPath()), name, kind
+        )  # a stage would take the schema's type
+        for code, values in samples.items():
+            layer.SetTimeSample(spec.path, code, array([value(one) for one in values]))
+        if not samples:
+            spec.default = array([value(one) for one in still])
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "value"),
+    [
+        ("rotations", Sdf.ValueTypeNames.QuathArray, Gf.Quath),
+        ("translations", Sdf.ValueTypeNames.Double3Array, Gf.Vec3d),
+        ("scales", Sdf.ValueTypeNames.Float3Array, lambda v: Gf.Vec3f(*map(float, v))),
+    ],
+)
+def test_channels_of_another_type_are_those_that_usd_ignores(edited, tmp_path, name, kind, value):
+    """Read all the same, the body would begin to move in the bake."""
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda")))
+    shot = edited(_retyped(name, kind, value))
+    with pytest.raises(NeuralocksError, match=f"/Who/Motion: its {name} are .*UsdSkel ignores the animation; author "):
+        bake_rig(shot, tmp_path / "out.usda", model)
+    stage = Usd.Stage.Open(str(shot))
+    query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")))
+    posed = [np.array(query.ComputeJointLocalTransforms(code)) for code in (1, 7)]
+    assert np.array_equal(*posed), "USD shows motion"
+
+
+def test_rotations_that_stretch_are_told(edited):
+    """UsdSkel takes quaternions as they come."""
+
+    def change(stage):
+        rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+        for code in rotations.GetTimeSamples():
+            rotations.Set(Vt.QuatfArray([q * 1.5 for q in rotations.Get(code)]), code)
+
+    notes = rigged_notes(read_rigged_hair(edited(change)).source)
+    assert sum("joint 'hips' at time code 1 is not of unit length" in note for note in notes) == 1
+
+
+def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
+    """The network reads the neck: which joint that is changes the hair, so it is told where it was not found."""
+
+    def change(stage):
+        skeleton, motion = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")), stage.GetPrimAtPath("/Who/Motion")
+        names = [name.replace("hips/head", "hips/b02/head") for name in skeleton.GetJointsAttr().Get()]
+        names.insert(1, "hips/b02")
+        skeleton.GetJointsAttr().Set(names)
+        for attribute in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()):
+            values = list(attribute.Get())
+            attribute.Set([values[0], values[0] if "bind" in attribute.GetName() else type(values[0])(1), *values[1:]])
+        mesh = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar()
+        mesh.Set([index + 1 for index in mesh.Get()])
+        motion.GetAttribute("joints").Set([name for name in names if name != "hips/b02"])
+
+    shot = edited(change)
+    hair = read_rigged_hair(shot)
+    assert any("no joint found for neck" in note for note in rigged_notes(hair.source))
+    model = model_for(hair)
+    named = bake_rig(shot, tmp_path / "named.usda", model, joints={"neck": "b02"})
+    assert not any("no joint found for neck" in note for note in named.notes)
+    with pytest.raises(NeuralocksError, match="b03"):
+        bake_rig(shot, tmp_path / "out.usda", model, joints={"neck": "b03"})
+
+
+def test_a_pattern_that_stands_for_nothing_is_refused(tmp_path):
+    hair = read_rigged_hair(small_shot(tmp_path / "shot.usda"), chains=["hair_*", "tuft_*"])
+    with pytest.raises(NeuralocksError, match=r"--chains tuft_\*: no joint of the hair has such a name"):
+        check_patterns(hair, ["hair_*", "tuft_*"])
+
+
+def test_what_is_wrong_with_a_rig_is_told_by_its_own_commands(tmp_path):
+    """As `inspect` tells it; joints that no bone model reads are left out."""
+    shot = small_shot(tmp_path / "shot.usda", scale=100.0)
+    told = inspect(shot)["spoils"]
+    assert not any("shoulder" in note for note in told)
+    assert set(rigged_notes(read_rigged_hair(shot).source)) <= set(told)
+
+
+def test_features_that_do_not_fit_are_refused(tmp_path):
+    hair = read_rigged_hair(small_shot(tmp_path / "shot.usda"))
+    model = model_for(hair)
+    with pytest.raises(NeuralocksError, match="reads 15 numbers"):
+        model.evaluate(np.zeros((2, 3, 15)))
+    assert np.isfinite(model.evaluate(np.full(15, 1e300))).all()
+    with pytest.raises(NeuralocksError, match="times: hold NaN"):
+        RigSampler(model.spec, hair.source.character, hair.source.clip).features([0.0, np.nan])

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of mesh hair: what is hair of a skinned mesh, and that it moves."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from usd.rig.bake import bake_rig
+from usd.rig.picture import rigged_scene
+from usd.rig.stage import read_rigged_hair
+
+from ..rig_shots import EXAMPLE, model_for, small_shot
+
+
+def test_a_picture_of_mesh_hair(tmp_path):
+    """Whole locks are hair, their roots on the head too, and nothing of the body is; hair that moves is drawn elsewhere."""
+    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+    from PIL import Image
+
+    from usd.review.picture import preview
+
+    baked = tmp_path / "baked.usda"
+    bake_rig(EXAMPLE / "shot.usda", baked)
+    stage = Usd.Stage.Open(str(baked))  # a cable in the set, which is no hair
+    cable = UsdGeom.BasisCurves.Define(stage, "/Set/Cable")
+    cable.CreatePointsAttr([(3, 0, 0), (3, 4, 0)])
+    cable.CreateCurveVertexCountsAttr([2])
+    stage.GetRootLayer().Save()
+    rigged = read_rigged_hair(baked)
+    scene, meshes = rigged_scene(rigged), rigged.source.meshes
+    begin = 0
+    for mesh in meshes:
+        end = begin + len(mesh.points)
+        assert (scene.mesh_hair[begin:end] == ("hair" in mesh.prim.GetName().lower())).all()
+        begin = end
+    picture = np.asarray(Image.open(preview(baked, tmp_path / "hair.png", size=(120, 160))).convert("RGB"), float)
+    assert picture.shape == (160, 6 * 124 - 4, 3)
+    brown = picture[..., 0] - picture[..., 2] > 30
+    panels = [brown[:, i * 124 : i * 124 + 120] for i in range(6)]
+    assert all(panel.mean() > 0.02 for panel in panels)
+    assert (panels[0] != panels[4]).mean() > 0.02
+
+
+def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
+    shot = small_shot(tmp_path / "one.usda")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("A", "B"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(shot))
+    stage.Save()
+    model = model_for(read_rigged_hair(shot))
+    baked = bake_rig(tmp_path / "two.usda", tmp_path / "out.usda", model, skeleton="/B/Rig").path
+    assert read_rigged_hair(baked, baked_first=True).source.path == "/B/Rig"
+    assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).source.path == "/A/Rig"
+    with pytest.raises(NeuralocksError, match="several skeletons"):
+        read_rigged_hair(baked)
+
+
+def test_joints_without_a_mesh_have_no_picture(tmp_path):
+    pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
+    from usd.review.picture import preview
+
+    path = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(path))
+    stage.RemovePrim("/Who/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="no mesh"):
+        preview(path, tmp_path / "hair.png")
+    assert not (tmp_path / "hair.png").exists()

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which curves are hair, and which skeleton and joint carries them."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
+from usd.review.baked import read_baked
+from usd.review.evaluate import evaluate
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, strand_points, write_shot
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [("own", "own skel binding"), ("mesh", "on which it sits"), ("none", "name")]
+)
+def test_what_carries_the_groom_is_said(tmp_path, bound, words):
+    shot = read_shot(write_shot(tmp_path, Recipe(bound=bound)))
+    assert shot.grooms[0].joint == "hips/spine/neck/head"
+    assert words in shot.grooms[0].attachment.how
+    assert np.abs(shot.grooms[0].groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-6
+
+
+def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
+    free = read_shot(write_shot(tmp_path, Recipe(bound="none"), "free"), head="neck")
+    assert free.grooms[0].joint == "hips/spine/neck"
+    path = write_shot(tmp_path, Recipe(), "bound")
+    bound = read_shot(path, head="neck")
+    assert bound.grooms[0].joint == "hips/spine/neck/head"
+    said = set(bound.notes) - set(read_shot(path).notes)
+    assert len(said) == 1 and "--head neck is not used" in said.pop(), "nor is what it would have spoiled a matter"
+
+
+def _without_a_head_by_name(path):
+    path.write_text(path.read_text().replace("spine/neck", "spine/Hals").replace("Hals/head", "Hals/Kopf"))
+    return path
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
+    named = read_shot(write_shot(tmp_path, Recipe(bound=bound), "named")).grooms[0]
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound=bound)))
+    found = read_shot(path).grooms[0]
+    assert found.joint == "hips/spine/Hals/Kopf"
+    assert found.attachment.character.humanoid.joints == named.attachment.character.humanoid.joints
+    assert np.array_equal(found.groom.points, named.groom.points)
+    (skeleton,) = inspect(path)["skeletons"]
+    assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found by"]
+
+
+def test_a_hat_takes_no_hair_from_the_head_under_it(tmp_path):
+    """Its skeleton has no joint named like a head, and hair sits on its mesh as well as on the skin."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    layer = stage.GetRootLayer()
+    for name, copy in (("Rig", "A_Hat"), ("Skin", "A_Felt")):
+        Sdf.CopySpec(layer, f"/Hero/{name}", layer, f"/Hero/{copy}")
+    hat = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/A_Hat"))
+    joints = [joint.replace("neck", "band").replace("head", "crown") for joint in hat.GetJointsAttr().Get()]
+    hat.GetJointsAttr().Set(joints)
+    stage.GetPrimAtPath("/Hero/A_Hat/Motion").GetAttribute("joints").Set(joints)
+    UsdSkel.BindingAPI(hat.GetPrim()).GetAnimationSourceRel().SetTargets(["/Hero/A_Hat/Motion"])
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/A_Felt")).GetSkeletonRel().SetTargets(["/Hero/A_Hat"])
+    layer.Save()
+    shot = read_shot(path)
+    assert shot.grooms[0].attachment.rig.path == "/Hero/Rig"
+    assert any("/Hero/A_Hat: no joint is named like a head" in note for note in shot.notes)
+    assert read_shot(path, skeleton="/Hero/A_Hat").grooms[0].joint == "hips/spine/band/crown"
+
+
+def test_a_bake_tells_the_head_that_its_user_named(tmp_path):
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
+    with pytest.raises(NeuralocksError, match="no joint is named like a head; name it with --head JOINT"):
+        read_shot(path)
+    bake(path, tmp_path / "bake.usda", head="Kopf", frames="1:2")
+    assert read_baked(tmp_path / "bake.usda").shot.grooms[0].joint == "hips/spine/Hals/Kopf"
+
+
+def test_a_bake_tells_the_head_where_another_joint_is_named_like_one(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="none"))
+    bake(path, tmp_path / "bake.usda", head="neck", frames="1:3")
+    again = read_baked(tmp_path / "bake.usda")
+    assert again.shot.grooms[0].joint == "hips/spine/neck"
+    assert not any("--head" in note for note in again.shot.notes)
+    named = read_baked(tmp_path / "bake.usda", head="hips/spine/neck/head")
+    assert named.shot.grooms[0].joint == "hips/spine/neck/head", "what the user says now wins"
+    assert evaluate(tmp_path / "bake.usda").to_json() == evaluate(tmp_path / "bake.usda", head="neck").to_json()
+
+
+def test_each_groom_finds_its_own_character(tmp_path):
+    write_shot(tmp_path, Recipe(bound="mesh"), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for name, x in (("A", 0.0), ("B", 2.0)):
+        prim = UsdGeom.Xform.Define(stage, f"/{name}")
+        prim.AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
+        model = stage.DefinePrim(f"/{name}/Model")
+        model.GetReferences().AddReference("./asset.usda")
+    stage.GetRootLayer().Save()
+    shot = read_shot(tmp_path / "two.usda")
+    assert [(g.path, g.attachment.rig.path) for g in shot.grooms] == [
+        ("/A/Model/Hair", "/A/Model/Rig"),
+        ("/B/Model/Hair", "/B/Model/Rig"),
+    ]
+    only = read_shot(tmp_path / "two.usda", skeleton="/B/Model/Rig", grooms=["/B"])
+    assert [g.path for g in only.grooms] == ["/B/Model/Hair"]
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh", "none"])
+@pytest.mark.parametrize("places", [(2.0, 0.0), (0.0, 0.0)])
+def test_hair_at_the_origin_is_not_another_characters(tmp_path, bound, places):
+    """Hair lies there as any character's does in its bind pose."""
+    write_shot(tmp_path, Recipe(bound=bound), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, x in zip("AB", places, strict=True):
+        UsdGeom.Xform.Define(stage, f"/{name}").AddTranslateOp().Set(Gf.Vec3d(x, 0, 0))
+        stage.DefinePrim(f"/{name}/Model").GetReferences().AddReference("./asset.usda")
+    stage.GetRootLayer().Save()
+    for chosen in (None, "/A/Model/Rig", "/B/Model/Rig"):
+        shot = read_shot(tmp_path / "two.usda", skeleton=chosen)
+        pairs = [(item.path[:2], item.attachment.rig.path[:2]) for item in shot.grooms]
+        assert pairs == [(name, name) for name in ("/A", "/B") if chosen is None or chosen.startswith(name)]
+
+
+def _curves(stage, path, points):
+    """Curves (n, 2, 3) [m] without a binding."""
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr("linear")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    curves.CreateCurveVertexCountsAttr([2] * len(points))
+
+
+def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    roots = np.random.default_rng(0).uniform(-4, 4, (50, 1, 3)) * [1, 0, 1] + [6, 0, 0]
+    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot = read_shot(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"]
+    assert sum("/Set/Grass" in note and "--groom" in note for note in shot.notes) == 1
+    facts = inspect(path)
+    assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
+    assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
+    assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
+    for number in range(30):
+        Sdf.CopySpec(stage.GetRootLayer(), "/Set/Grass", stage.GetRootLayer(), f"/Set/Grass{number}")
+    stage.GetRootLayer().Save()
+    assert len([note for note in read_shot(path).notes if "Grass" in note or "28 more" in note]) == 4
+    stage.RemovePrim("/Set")
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Set")
+    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.RemovePrim("/Hero/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
+        read_shot(path)
+    assert len(inspect(path)["stops"]) == 1
+
+
+def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    UsdGeom.BasisCurves.Define(stage, "/Hero/Empty")
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot, facts = read_shot(path), inspect(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] == [groom["path"] for groom in facts["grooms"]]
+    assert any("/Hero/Empty" in note for note in shot.notes) and any("/Hero/Empty" in note for note in facts["spoils"])
+    with pytest.raises(NeuralocksError, match="no points"):
+        read_shot(path, ["/Hero/Empty"])
+
+
+def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_path):
+    for name, frames in (("hero", 9), ("doll", 0)):
+        write_shot(tmp_path, Recipe(frames=frames), name)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("hero", "doll"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{name}.usda", "/Hero")
+    stage.GetRootLayer().Save()
+    shot = read_shot(tmp_path / "shot.usda")
+    assert [item.path for item in shot.grooms] == ["/hero/Hair"]
+    assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
+    with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
+        read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
+
+
+def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    skin = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr().Get())
+    _curves(stage, "/Hero/Fur", np.stack([skin, skin + [0, 0.02, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    notes = read_shot(stage.GetRootLayer().realPath).notes
+    assert sum("will leave the skin" in note for note in notes) == 1
+    assert any(note.startswith("/Hero/Fur: only 50%") and "(head)" in note for note in notes)
+
+
+def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
+    """As exported by tools that bake a head constraint into the groom's transform."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    rig = read_shot(path).rigs[0]
+    stage = Usd.Stage.Open(str(path))
+    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
+    for frame in range(1, 10):
+        op.Set(Gf.Matrix4d(rig.character.carrying(rig.joints_at(frame)).T.tolist()), frame)
+    stage.GetRootLayer().Save()
+    item = read_shot(path).grooms[0]
+    assert item.joint.endswith("head")
+    assert np.abs(item.groom.points.reshape(40, 12, 3) - strand_points(40, 12)).max() < 1e-5
+
+
+def test_a_groom_of_another_unit_than_the_stage_is_told_so(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=0.01))
+    stage = Usd.Stage.Open(str(path))
+    groom = Usd.Stage.CreateNew(str(tmp_path / "groom.usda"))
+    UsdGeom.SetStageMetersPerUnit(groom, 1)
+    UsdGeom.SetStageUpAxis(groom, "Z")
+    _curves(groom, "/Hair", strand_points(40, 2))
+    groom.SetDefaultPrim(groom.GetPrimAtPath("/Hair"))
+    groom.Save()
+    stage.RemovePrim("/Hero/Hair")
+    stage.DefinePrim("/Hero/Groom").GetReferences().AddReference("./groom.usda")
+    stage.Save()
+    with pytest.raises(
+        NeuralocksError, match=r"groom.usda counts in 1 m, the stage in 0.01 m and has Z up, the stage Y"
+    ):
+        read_shot(path)
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_strands_from_tip_to_root_are_told(tmp_path, bound):
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    assert not any("from tip to root" in note for note in read_shot(path).notes)
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    strands = np.array(points.Get()).reshape(40, -1, 3)
+    points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands[:, ::-1].reshape(-1, 3))))
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        assert sum("from tip to root" in note for note in notes) == 1
+
+
+def test_blend_shapes_under_and_on_a_groom_are_told(tmp_path):
+    """Skin that a face moves away below the roots, and shapes of the groom's own, which a bake leaves out."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    mesh = next(prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    hair, count = stage.GetPrimAtPath("/Hero/Hair"), len(UsdGeom.Mesh(mesh).GetPointsAttr().Get())
+    shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild("Lift"))
+    shape.CreateOffsetsAttr([(0, 0.008, 0)] * count)
+    for prim in (mesh, hair):
+        binding = UsdSkel.BindingAPI.Apply(prim)
+        binding.CreateBlendShapesAttr(["lift"])
+        binding.CreateBlendShapeTargetsRel().SetTargets([shape.GetPath()])
+    animation = UsdSkel.Animation(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)))
+    animation.CreateBlendShapesAttr(["lift"])
+    for code, weight in ((1, 0.0), (9, 1.0)):
+        animation.CreateBlendShapeWeightsAttr().Set([weight], code)
+    stage.Save()
+    notes = read_shot(path).notes
+    assert any("'lift' moves the skin below it by up to 8 mm" in note for note in notes), notes
+    assert any("has blend shapes of its own" in note for note in notes), notes
+
+
+@pytest.mark.parametrize(("scale", "words"), [((0, 0, 0), "zero scale"), ((-1, 1, 1), "mirrored")])
+def test_a_joint_without_a_turn_is_named(tmp_path, scale, words):
+    """By a bake, and by `inspect`, which is asked before."""
+    path = write_shot(tmp_path, Recipe())
+    stage = Usd.Stage.Open(str(path))
+    animation = UsdSkel.Animation(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)))
+    scales = [Gf.Vec3h(1)] * len(animation.GetJointsAttr().Get())
+    scales[[str(name).rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()].index("arm_L")] = Gf.Vec3h(*scale)
+    animation.GetScalesAttr().Set(scales, 1)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match=f"joint '.*arm_L' .*{words}.* at time code "):
+        read_shot(path)
+    assert any("arm_L" in line for line in inspect(path)["stops"])

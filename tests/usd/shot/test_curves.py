@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Curves as tools write them, read as grooms."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.formats import cemyuksel
+from neuralocks_core.formats.look import Look
+from neuralocks_core.groom import Groom
+from usd.assets.groom import import_groom
+from usd.shot.curves import left_as_they_are, read_groom
+
+from ..shots import Recipe, write_shot
+
+COUNTS = [2, 3, 2]
+POINTS = np.arange(21, dtype=np.float32).reshape(7, 3)
+ROOTS = np.array([[0, 0], [0.2, 0.4], [0.5, 1]], np.float32)
+EVERY = np.stack([np.arange(7), 2 * np.arange(7)], axis=1).astype(np.float32) / 10
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "kind", "values", "indices", "expected"),
+    [
+        ("uniform", Sdf.ValueTypeNames.TexCoord2fArray, ROOTS, None, ROOTS),
+        ("uniform", Sdf.ValueTypeNames.TexCoord2hArray, ROOTS, [2, 1, 0], ROOTS[::-1]),
+        ("vertex", Sdf.ValueTypeNames.TexCoord2fArray, EVERY, None, ROOTS),
+        ("constant", Sdf.ValueTypeNames.TexCoord2fArray, ROOTS[1:2], None, ROOTS[[1, 1, 1]]),
+        ("vertex", Sdf.ValueTypeNames.TexCoord2fArray, EVERY[:5], None, None),
+        ("vertex", Sdf.ValueTypeNames.TexCoord3fArray, np.ones((7, 3), np.float32), None, None),
+    ],
+)
+def test_texture_coordinates_of_roots(interpolation, kind, values, indices, expected):
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(POINTS))
+    curves.CreateCurveVertexCountsAttr(COUNTS)
+    primvar = UsdGeom.PrimvarsAPI(curves).CreatePrimvar("st", kind, interpolation)
+    primvar.Set([tuple(map(float, row)) for row in values])
+    if indices:
+        primvar.SetIndices(indices)
+    read = read_groom(curves.GetPrim(), np.eye(4), []).root_uv
+    assert (read is None) == (expected is None)
+    assert expected is None or np.allclose(read, expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["widths", "primvars:widths"])
+def test_varying_widths_of_cubic_curves_are_those_of_segments_ends(name):
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    curves.CreateTypeAttr("cubic")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.arange(33, dtype=np.float32).reshape(11, 3)))
+    curves.CreateCurveVertexCountsAttr([4, 7])
+    values, notes = {}, []
+    for basis, wrap in (("bezier", "nonperiodic"), ("bspline", "nonperiodic"), ("catmullRom", "pinned")):
+        curves.CreateBasisAttr(basis)
+        curves.CreateWrapAttr(wrap)
+        size = curves.ComputeVaryingDataSize(Usd.TimeCode.Default())
+        # Of thickness that shrinks evenly along each strand, every point has what lies at its place.
+        ends = {5: [0, 1, 0, 0.5, 1], 7: [0, 1, 0, 0.25, 0.5, 0.75, 1]}[size]
+        attribute = curves.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.FloatArray)
+        attribute.Set((0.001 - 0.0009 * np.array(ends)).tolist())
+        UsdGeom.Primvar(attribute).SetInterpolation("varying") if name != "widths" else None
+        values[basis] = read_groom(curves.GetPrim(), np.eye(4), notes).widths
+    expected = 0.001 - 0.0009 * np.concatenate([np.linspace(0, 1, 4), np.linspace(0, 1, 7)])
+    for widths in values.values():
+        np.testing.assert_allclose(widths, expected, rtol=1e-5)
+    assert not notes
+    curves.GetPrim().GetAttribute(name).Set([0.001] * 8)
+    read_groom(curves.GetPrim(), np.eye(4), notes)
+    assert notes == ["/Hair: 8 widths do not fit 2 strands or are not finite; they are left as they are"]
+
+
+def test_caches_may_repeat_their_counts_but_not_change_them():
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    for code in (1, 2):
+        curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(POINTS), code)
+        curves.CreateCurveVertexCountsAttr().Set(COUNTS, code)
+    assert read_groom(curves.GetPrim(), np.eye(4), []).counts.tolist() == COUNTS
+    curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)
+    with pytest.raises(NeuralocksError, match="/Hair: its curveVertexCounts at time code 3 are not those at rest"):
+        read_groom(curves.GetPrim(), np.eye(4), [])
+
+
+def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
+    """Root UVs and widths also where a file has none; colours, numbers and guides of other tools as they were."""
+    source = write_shot(tmp_path, Recipe(bound="none", strands=5, vertices=4), "source")
+    stage = Usd.Stage.Open(str(source))
+    prim = stage.GetPrimAtPath("/Hero/Hair")
+    api, names = UsdGeom.PrimvarsAPI(prim), Sdf.ValueTypeNames
+    told = {
+        "groom_id": (names.IntArray, "uniform", 1, [70, 71, 72, 73, 74]),
+        "groom_closest_guides": (names.IntArray, "uniform", 3, list(range(15))),
+        "groom_color": (names.Float3Array, "vertex", 1, [(0.1, 0.2, 0.3 + i) for i in range(20)]),
+        "groom_unfit": (names.IntArray, "uniform", 1, [1, 2]),
+    }
+    for name, (kind, scope, size, value) in told.items():
+        api.CreatePrimvar(name, kind, scope, size).Set(value)
+    stage.GetRootLayer().Save()
+    import_groom(source, tmp_path / "groom.usda")
+    groom = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+    written = UsdGeom.PrimvarsAPI(groom.GetPrimAtPath("/Groom/Hair"))
+    told.pop("groom_unfit")
+    for name, (kind, scope, size, value) in told.items():
+        primvar = written.GetPrimvar(name)
+        assert (primvar.GetTypeName(), primvar.GetInterpolation(), primvar.GetElementSize()) == (kind, scope, size)
+        assert np.allclose(np.array(primvar.Get()), value)
+    assert not written.GetPrimvar("groom_unfit")
+    uv = np.array(written.GetPrimvar("groom_root_uv").Get())
+    assert uv.shape == (5, 2) and len(np.unique(uv, axis=0)) == 5 and 0 <= uv.min() and uv.max() <= 1
+    assert written.GetPrimvar("groom_width").Get()[0] == pytest.approx(0.01), "0.1 mm, in centimetres"
+
+
+@pytest.mark.parametrize(("rows", "scope"), [(1, "constant"), (12, "vertex")])
+def test_colors_of_a_hair_file_are_shown(tmp_path, rows, scope):
+    rng = np.random.default_rng(0)
+    look = Look(rng.uniform(0.1, 1, (rows, 3)).astype(np.float32), rng.uniform(0, 0.9, rows).astype(np.float32))
+    hair = Groom("Hair", 0.1 * rng.normal(size=(12, 3)), [4, 8])
+    cemyuksel.write(tmp_path / "hair.hair", hair, look=look)
+    import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
+    import_groom(tmp_path / "groom.usda", tmp_path / "again.usda")
+    for name in ("groom.usda", "again.usda"):
+        stage = Usd.Stage.Open(str(tmp_path / name))
+        curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Groom/hair"))
+        for primvar, values in (
+            (curves.GetDisplayColorPrimvar(), look.color),
+            (curves.GetDisplayOpacityPrimvar(), look.opacity),
+        ):
+            assert primvar.GetInterpolation() == scope
+            np.testing.assert_allclose(np.array(primvar.Get()), values, atol=1e-6)
+
+
+def test_a_hair_file_without_colors_gets_none(tmp_path):
+    cemyuksel.write(tmp_path / "hair.hair", Groom("hair", 0.1 * np.eye(3), [3]))
+    import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+    curves = UsdGeom.Gprim(stage.GetPrimAtPath("/Groom/hair"))
+    assert not curves.GetDisplayColorAttr().HasAuthoredValue() and not curves.GetDisplayOpacityAttr().HasAuthoredValue()
+
+
+def test_normals_are_said_to_stay_behind():
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Ribbons")
+    assert left_as_they_are(curves.GetPrim()) == []
+    curves.CreateNormalsAttr([(0, 0, 1)])
+    assert left_as_they_are(curves.GetPrim())[0].startswith("/Ribbons: has normals")

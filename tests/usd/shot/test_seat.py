@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where curves that nothing binds lie in the bind pose, in scenes of which the bind pose is no frame."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from scipy.spatial import cKDTree
+
+from usd.baking.bake import bake
+from usd.border.placement import Placement
+from usd.review.baked import read_baked
+from usd.shot.seat import NEAR, find_seat
+from usd.shot.stage import read_rigs, read_shot
+from usd.skel import source as rig_source
+from usd.skel import surface
+
+from ..shots import HEAD, Recipe, write_shot
+
+START = 4
+"""Time code at which a character that turns its head from the first frame on is seen first."""
+
+
+def _turned(tmp_path, bound) -> tuple[Usd.Stage, np.ndarray]:
+    """A shot in which the head is turned when the motion begins, and where it is at each frame against its bind pose."""
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    stage = Usd.Stage.Open(str(path))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    for attribute in (motion.GetTranslationsAttr(), motion.GetRotationsAttr()):
+        for code in range(1, START):
+            attribute.ClearAtTime(code)
+    stage.SetStartTimeCode(START)
+    stage.Save()
+    (rig,) = read_rigs(path)
+    bind = np.linalg.inv(rig.character.skeleton.bind[HEAD])
+    return stage, np.stack([rig.joints_at(code)[HEAD] @ bind for code in range(10)])
+
+
+def _rigid(points, matrix) -> Vt.Vec3fArray:
+    return Vt.Vec3fArray.FromNumpy((np.asarray(points) @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32))
+
+
+@pytest.mark.parametrize("bound", ["mesh", "none"])
+def test_a_moving_cache_is_where_it_is_seen(tmp_path, still_model, bound):
+    stage, head = _turned(tmp_path, bound)
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.asarray(points.Get())
+    points.Clear()
+    for code in range(START, 10):
+        points.Set(_rigid(rest, head[code]), code)
+    stage.Save()
+    shot = read_shot(stage.GetRootLayer().realPath)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, rest, atol=1e-6)
+    assert any("no points at the default time; those at time code 4" in note for note in shot.notes)
+    # Whoever reads the bake finds the same shape at rest, and the hair where it was seen.
+    baked = read_baked(bake(shot, tmp_path / "hair.usdc", still_model).path)
+    (item,) = baked.shot.grooms
+    np.testing.assert_allclose(item.groom.points, rest, atol=1e-6)
+    for code in baked.codes:
+        np.testing.assert_allclose(baked.world(item, code), points.Get(code), atol=1e-6)
+
+
+def test_a_bake_of_hair_with_a_single_sample_knows_its_shape_at_rest(tmp_path, model):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = points.Get()
+    points.Clear()
+    points.Set(rest, 5)
+    stage.Save()
+    shot = read_shot(stage.GetRootLayer().realPath)
+    again = read_shot(bake(shot, tmp_path / "hair.usdc", model).path)
+    np.testing.assert_array_equal(again.grooms[0].groom.points, shot.grooms[0].groom.points)
+
+
+@pytest.mark.parametrize("bound", ["mesh", "none"])
+def test_hair_below_a_moving_root_is_at_rest_however_the_head_is_turned_when_it_begins(tmp_path, bound):
+    stage, _ = _turned(tmp_path, bound)
+    before = read_shot(stage.GetRootLayer().realPath).grooms[0].groom.points
+    walk = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp()
+    for code in range(START, 10):
+        walk.Set(Gf.Vec3d(0.1 * code - 0.1 * START, 0, 0), code)
+    stage.Save()
+    np.testing.assert_allclose(read_shot(stage.GetRootLayer().realPath).grooms[0].groom.points, before, atol=1e-6)
+
+
+def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_path):
+    stage, _ = _turned(tmp_path, "mesh")
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).SetResetXformStack(True)
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetTranslationsAttr()
+    for code in range(START, 10):
+        motion.Set(Vt.Vec3fArray([v + Gf.Vec3f(0, 0, 3 * (i == 0)) for i, v in enumerate(motion.Get(code))]), code)
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.asarray(points.Get())
+    stage.Save()
+    path = stage.GetRootLayer().realPath
+    rig = read_rigs(path)[0]
+    head = rig.joints_at(START)[HEAD] @ np.linalg.inv(rig.character.skeleton.bind[HEAD])
+    points.Set(_rigid(rest, head))
+    stage.Save()
+    shot = read_shot(path)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, rest, atol=1e-6)
+    assert not any("from the skin" in note for note in shot.notes)
+    points.Set(Vt.Vec3fArray.FromNumpy((rest + [0, 0.2, 0]).astype(np.float32)))
+    stage.Save()
+    (said,) = (note for note in read_shot(path).notes if "from the skin" in note)
+    assert 0.1 < float(said.split(" m from")[0].split()[-1]) < 0.3
+
+
+@pytest.mark.parametrize("lifted", [0.0, 0.4], ids=["some_roots_far", "most_roots_far"])
+def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
+    """A crowd is searched with a bound: what lies beyond it is not measured, and must not change what is found."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    moved = np.asarray(points.Get()).reshape(40, 12, 3).copy()
+    moved[:15, :, 1] += 0.5
+    moved[15:, :, 1] += lifted
+    points.Set(Vt.Vec3fArray.FromNumpy(moved.reshape(-1, 3)))
+    (rig,), prim = read_rigs(path), stage.GetPrimAtPath("/Hero/Hair")
+    seat, bounded = (find_seat(prim, rig, Placement(prim), *within) for within in ((), (NEAR,)))
+    assert (bounded is None) == (seat.distance > NEAR) == bool(lifted)
+    if bounded is not None:
+        assert bounded.distance == seat.distance
+        np.testing.assert_array_equal(bounded.points, seat.points)
+
+
+def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
+    """Not once for each character or groom: reading 24 of 13,000 points took half a minute."""
+    write_shot(tmp_path, Recipe(bound="mesh"), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for number in range(4):
+        prim = stage.DefinePrim(f"/C{number}")
+        prim.GetReferences().AddReference("./asset.usda")
+        UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(number, 0, 0))
+    stage.Save()
+    sorted_, tree = [], cKDTree
+    monkeypatch.setattr(rig_source, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
+    asked, bound = [], surface.bound_skeleton
+    monkeypatch.setattr(surface, "bound_skeleton", lambda prim: asked.append(prim.GetPath()) or bound(prim))
+    assert len(read_shot(stage.GetRootLayer().realPath).grooms) == 4
+    assert len(sorted_) == len(asked) == 4

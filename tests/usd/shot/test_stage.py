@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading stages: poses as UsdSkel evaluates them, skin as UsdSkel deforms it, times and joints as they are meant."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands.arclength import resample
+from usd.border.units import Border
+from usd.review.inspect import groom_facts, inspect
+from usd.shot.notes import groom_notes
+from usd.shot.stage import read_rigs, read_shot
+
+from ..shots import HEAD, POSITIONS, Recipe, write_shot
+
+BODY = Path(__file__).parents[3] / "examples" / "shot" / "shot.usda"
+
+
+@pytest.mark.parametrize("recipe", [Recipe(), Recipe(unit=0.01, up="Z")], ids=["m", "cm_z_up"])
+def test_poses_are_those_of_usd_skel(tmp_path, recipe):
+    shot = read_shot(write_shot(tmp_path, recipe))
+    rig, cache = shot.rigs[0], UsdSkel.Cache()
+    cache.Populate(UsdSkel.Root(shot.stage.GetPrimAtPath("/Hero")), Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(UsdSkel.Skeleton(shot.stage.GetPrimAtPath("/Hero/Rig")))
+    for code in (1.0, 3.5, 9.0, 20.0):
+        theirs = np.array(query.ComputeJointSkelTransforms(code)).swapaxes(-1, -2)
+        assert np.abs(rig.source.posed([code])[0] - theirs).max() < 1e-5
+    at_frame = rig.clip.at([shot.border.seconds(4.0)])[0]
+    assert np.abs(rig.joints_at(4.0) - at_frame).max() < 1e-9
+
+
+def test_bind_pose_comes_in_metres_y_up_whatever_the_stage(tmp_path):
+    for i, recipe in enumerate([Recipe(), Recipe(unit=0.01), Recipe(unit=0.0254, up="Z", nesting="/A/B/C")]):
+        rig = read_shot(write_shot(tmp_path, recipe, f"s{i}")).rigs[0]
+        assert np.abs(rig.character.skeleton.bind[:, :3, 3] - POSITIONS).max() < 1e-6
+        assert rig.character.head == HEAD
+        assert np.allclose(rig.character.facing, np.eye(3))
+        width = np.ptp(rig.character.body.points[rig.character.head_mask()][:, 0])
+        assert abs(width - 0.2) < 1e-3
+        inward = np.cross(
+            *np.diff(rig.character.body.points[rig.character.body.triangles[:150]], axis=1).swapaxes(0, 1)
+        )
+        centre = rig.character.body.points[rig.character.body.triangles[:150]].mean(1) - [0, 1.68, 0.02]
+        assert ((inward * centre).sum(1) > -1e-12).all()
+
+
+@pytest.mark.skipif(not BODY.exists(), reason="examples/shot is not in this checkout")
+def test_the_shipped_body_is_posed_as_usd_skel_deforms_it():
+    shot = read_shot(BODY)
+    rig = shot.rigs[0]
+    root = UsdSkel.Root(shot.stage.GetPrimAtPath("/Body"))
+    cache = UsdSkel.Cache()
+    cache.Populate(root, Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(UsdSkel.Skeleton(shot.stage.GetPrimAtPath(rig.path)))
+    mesh = shot.stage.GetPrimAtPath("/Body/Skin")
+    code = 60.0
+    points = Vt.Vec3fArray(UsdGeom.Mesh(mesh).GetPointsAttr().Get())
+    if not rig.clip.shape.any():
+        assert cache.GetSkinningQuery(mesh).ComputeSkinnedPoints(query.ComputeSkinningTransforms(code), points, code)
+        posed = rig.character.posed_body(rig.joints_at(code))
+        assert np.abs(posed - np.asarray(points)).max() < 1e-4
+
+
+def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
+    shot = read_shot(write_shot(tmp_path, Recipe(rate=30, frames=31)))
+    assert np.isclose(shot.rigs[0].clip.end - shot.rigs[0].clip.start, 1.0)
+
+
+def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_path):
+    """A layer of 24 frames a second in a shot of 60, its first frame between two of the shot's."""
+    motion = write_shot(tmp_path, Recipe(frames=9), "motion")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.SetTimeCodesPerSecond(60)
+    stage.GetRootLayer().subLayerPaths.append("./motion.usda")
+    stage.GetRootLayer().subLayerOffsets[0] = Sdf.LayerOffset(0.3)
+    stage.GetRootLayer().Save()
+    own, seen = (read_rigs(path)[0].clip for path in (motion, tmp_path / "shot.usda"))
+    assert np.allclose(seen.times - seen.start, own.times - own.start)
+    # Far keys are joined by straight lines, as renderers do.
+    for attribute in stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttributes():
+        stage.SetEditTarget(stage.GetRootLayer())
+        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()[::4]}
+        for code, value in values.items():
+            attribute.Set(value, code)
+    stage.GetRootLayer().Save()
+    assert len(read_rigs(tmp_path / "shot.usda")[0].clip.times) == 3 + 20
+
+
+def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before_it(tmp_path):
+    """Animation with a run-up, whose exporter left out the samples after the character stopped."""
+    path = write_shot(tmp_path, Recipe(frames=9))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(4)
+    stage.SetEndTimeCode(30)
+    stage.GetRootLayer().Save()
+    rig = read_shot(path).rigs[0]
+    assert (rig.time_codes[0], rig.time_codes[-1]) == (1, 30)
+    np.testing.assert_array_equal(rig.clip.joints[-1], rig.joints_at(9))
+
+
+def test_rigs_are_read_without_grooms_or_animation(tmp_path):
+    path = write_shot(tmp_path, Recipe(frames=0))
+    assert len(read_rigs(path)[0].clip.times) == 1
+    with pytest.raises(NeuralocksError, match="no animation"):
+        read_shot(path)
+
+
+def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
+    """And not with a mesh, of which something is said later."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttribute("scales").Clear()
+    mesh = UsdSkel.BindingAPI.Apply(UsdGeom.Mesh.Define(stage, "/Hero/Empty").GetPrim())
+    mesh.CreateSkeletonRel().SetTargets(["/Hero/Rig"])
+    mesh.CreateJointIndicesPrimvar(True, 1).Set([3])
+    mesh.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    stage.GetRootLayer().Save()
+    with pytest.raises(
+        NeuralocksError, match=r"no animation \(no scales, so UsdSkel ignores the animation\)"
+    ) as raised:
+        read_shot(path)
+    assert str(raised.value) in inspect(path)["stops"]
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_values_at_a_single_time_are_values_at_rest(tmp_path, bound):
+    """Exporters of single frames write all that may vary as one sample, transforms and weights too."""
+    place = np.eye(4)
+    place[:3, 3] = 3, 0, 1
+    path = write_shot(tmp_path, Recipe(bound=bound, place=place, unit=0.01))
+    right = read_shot(path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+
+    def sampled(path):
+        spec = layer.GetAttributeAtPath(path) if path.IsPropertyPath() else None
+        if spec and spec.HasDefaultValue() and spec.variability != Sdf.VariabilityUniform:
+            value = spec.default
+            spec.ClearDefaultValue()
+            layer.SetTimeSample(path, 1.0, value)
+
+    layer.Traverse("/", sampled)
+    other = tmp_path / "sampled.usda"
+    layer.Export(str(other))
+    read = read_shot(other)
+    assert read.grooms[0].joint == right.grooms[0].joint
+    np.testing.assert_array_equal(read.grooms[0].groom.points, right.grooms[0].groom.points)
+    np.testing.assert_array_equal(read.grooms[0].placement.at(5), right.grooms[0].placement.at(5))
+    np.testing.assert_array_equal(read.rigs[0].character.body.points, right.rigs[0].character.body.points)
+    np.testing.assert_array_equal(read.rigs[0].character.body.joint_indices, right.rigs[0].character.body.joint_indices)
+
+
+def test_a_loop_that_does_not_close_is_said(tmp_path):
+    rig = read_shot(write_shot(tmp_path)).rigs[0]
+    closed = replace(rig, clip=Clip(rig.clip.times[:3], rig.clip.joints[[0, 1, 0]]))
+    assert not closed.loop_notes()
+    (note,) = rig.loop_notes()
+    assert "/Hero/Rig" in note and "time codes 1 and 9" in note
+
+
+@given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
+@settings(max_examples=30, deadline=None)
+def test_crossing_the_border_and_back_changes_nothing(unit, up, rate):
+    border = Border(unit, up, rate)
+    points = np.array([[1.0, 2, 3], [-4, 5, 0.5]])
+    there = points @ border.to_core[:3, :3].T
+    assert np.allclose(there @ border.from_core[:3, :3].T, points)
+    assert np.allclose(np.linalg.norm(there, axis=1), unit * np.linalg.norm(points, axis=1))
+    assert np.allclose(border.to_core[:3, :3] @ ([0, 1, 0] if up == "Y" else [0, 0, 1]), [0, unit, 0])
+
+
+def test_joints_named_by_hand_serve_and_missing_ones_are_said(tmp_path):
+    path = write_shot(tmp_path)
+    plain = read_shot(path)
+    assert any("left_shoulder" in note and "--joint" in note for note in plain.notes)
+    told = read_shot(path, joints={"left_shoulder": "arm_L", "right_shoulder": "hips/spine/arm_R"})
+    assert told.rigs[0].character.humanoid["left_shoulder"] == 4
+    for joints, fact in (({"left_shoulder": "nose"}, "nose"), ({"tail": "hips"}, "tail")):
+        with pytest.raises(NeuralocksError, match=fact):
+            read_shot(path, joints=joints)
+
+
+def test_layers_of_another_axis_below_a_bare_first_layer_are_said(tmp_path):
+    write_shot(tmp_path, Recipe(unit=0.01, up="Z"))
+    first = Sdf.Layer.CreateNew(str(tmp_path / "first.usda"))
+    first.subLayerPaths.append("./shot.usda")
+    first.Save()
+    expected = "first.usda: its layer shot.usda has Z up, the stage Y: the first layer's count; author them there"
+    assert expected in read_shot(tmp_path / "first.usda").notes
+    assert expected in inspect(tmp_path / "first.usda")["spoils"]
+
+
+def test_curves_of_another_kind_are_told_to_become_basis_curves(tmp_path):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    stage.RemovePrim("/Hero/Hair")
+    UsdGeom.NurbsCurves.Define(stage, "/Hero/Locks")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="no groom .* convert the NurbsCurves /Hero/Locks"):
+        read_shot(path)
+    assert any("/Hero/Locks" in line for line in inspect(path)["stops"])
+
+
+def test_a_groom_in_a_variant_that_is_not_chosen_is_named(tmp_path):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    style = stage.GetPrimAtPath("/Hero").GetVariantSets().AddVariantSet("hair")
+    for name in ("long", "none"):
+        style.AddVariant(name)
+        style.SetVariantSelection(name)
+        with style.GetVariantEditContext():
+            stage.OverridePrim("/Hero/Hair").SetActive(name == "long")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="choose variant 'long' of 'hair' on /Hero, which has /Hero/Hair"):
+        read_shot(path)
+    assert any("variant 'long'" in line for line in inspect(path)["stops"])
+
+
+def test_strands_too_short_to_move_are_counted_alike_everywhere():
+    step = np.array([0.05, 0.05, 5e-6, 0.0])[:, None] * [0, -1, 0]
+    points = np.array([0, 1.7, 0.1]) + np.arange(3)[None, :, None] * step[:, None]
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(4, 3, np.int32))
+    assert (~resample(groom, 24)[1]).sum() == groom_facts(groom)["without two distinct points"] == 2
+    stage = Usd.Stage.CreateInMemory()
+    (said,) = groom_notes(UsdGeom.BasisCurves.Define(stage, "/Hair").GetPrim(), groom, Border.of(stage))
+    assert said == "/Hair: 2 of 4 strands have no two distinct points; they follow the head rigidly"
+
+
+def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
+    ts = pytest.importorskip("pxr.Ts")
+    rigs = []
+    for curved in (False, True):
+        path = write_shot(tmp_path, Recipe(frames=0), f"curved_{curved}")
+        stage = Usd.Stage.Open(str(path))
+        turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddRotateYOp().GetAttr()
+        spline = ts.Spline("float")
+        for code, angle in ((1, 0.0), (5, 80.0), (9, 20.0)):
+            knot = ts.Knot("float")
+            knot.SetTime(code)
+            knot.SetValue(angle)
+            knot.SetNextInterpolation(ts.InterpLinear)
+            spline.SetKnot(knot)
+            turn.Set(angle, code)
+        if curved:
+            turn.Clear()
+            turn.SetSpline(spline)
+        stage.GetRootLayer().Save()
+        rigs.append(read_rigs(path)[0])
+    assert rigs[1].source.animated
+    np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
+    assert len(rigs[1].time_codes) == 9
+
+
+def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
+    path = write_shot(tmp_path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    Sdf.CopySpec(layer, "/Hero", layer, "/Coat")  # the binding is copied with its targets
+    stage = Usd.Stage.Open(layer)
+    stage.RemovePrim("/Coat/Hair")
+    layer.Save()
+    told = "/Hero/Rig: /Coat/Rig is the same character, whose meshes hair is not kept out of; bind them"
+    assert any(note.startswith(told) for note in read_shot(path).notes)
+    assert any(note.startswith(told) for note in inspect(path)["spoils"])
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))
+    layer.Save()  # now it is somebody else
+    assert not any("same character" in note for note in read_shot(path).notes)

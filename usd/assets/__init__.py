@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prims from arrays: grooms, bodies, animation, whole scenes."""

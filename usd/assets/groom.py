@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write grooms as USD BasisCurves with the attributes that other tools read, and import them from any file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.formats.look import Look
+from neuralocks_core.formats.units import metres_per_unit, upward_axis
+from neuralocks_core.groom import Groom
+from neuralocks_core.strands.strand_set import root_uv
+
+from ..border.arrays import floats, integers
+from ..border.damage import names_damage
+from ..border.placement import Placement
+from ..border.units import LAYERS, Border, check_not_input, open_stage, write_stage
+from ..shot.curves import find_curves, read_groom
+from ..skel.surface import rest_primvar
+from .prims import POLYLINES, Spline, author_curves
+
+USD = (*LAYERS, ".usdz")
+KEPT = ("st", "displayColor", "displayOpacity")
+"""Primvars of imported curves that go on with them, besides all that begin with `groom_`."""
+BELOW = 0.02
+"""How far below the lowest root the middle of a head lies, at least [m]."""
+OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
+"""Those that say what wrote the file."""
+
+
+@dataclass(frozen=True)
+class Authored:
+    """A groom with what the curves that it was read from say besides.
+
+    Attributes:
+        groom: the strands.
+        spline: how a renderer interpolates them.
+        primvars: what other tools put on them.
+    """
+
+    groom: Groom
+    spline: Spline = POLYLINES
+    primvars: tuple["Primvar", ...] = ()
+
+
+class Primvar(NamedTuple):
+    """The arguments of `UsdGeomPrimvarsAPI.CreatePrimvar`, and the value."""
+
+    name: str
+    kind: Sdf.ValueTypeName
+    interpolation: str
+    size: int
+    value: object
+
+
+def import_groom(source, out, unit: str | float | None = None, up: str | None = None) -> tuple[list[Groom], list[str]]:
+    """Read a hair file (TressFX, .hair, .data, .bin, USD curves) and write it as a USD groom in metres, Y up.
+
+    Args:
+        source: the hair file.
+        out: USD file to write.
+        unit: "mm", "cm", "m" or metres per unit of the source; what the file says, or suits a head, if left out.
+        up: "Y" or "Z", the source's upward axis.
+
+    Returns:
+        The grooms, and what a user should know.
+
+    Raises:
+        NeuralocksError: the source cannot be read or the target not be written.
+    """
+    source, out = as_path(source, "source"), as_path(out, "out")
+    if source.suffix.lower() in USD:
+        found, notes = _read_usd(source, out, unit, up)
+    else:
+        from neuralocks_core import formats
+
+        groom, look, notes = formats.read_with_look(source, unit, up)
+        found = [Authored(groom, primvars=_primvars(look))]
+    write_grooms(out, found)
+    return [each.groom for each in found], notes
+
+
+def write_groom(path, groom: Groom) -> Path:
+    """Write one groom; see `write_grooms`."""
+    return write_grooms(path, [Authored(groom)])
+
+
+def write_grooms(path, grooms: list[Authored]) -> Path:
+    """Write grooms below one root prim `/Groom`: metres, Y up, at once under the final name.
+
+    Raises:
+        NeuralocksError: the path has another ending or cannot be written.
+    """
+
+    def author(stage: Usd.Stage) -> None:
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        root = UsdGeom.Xform.Define(stage, "/Groom")
+        Usd.ModelAPI(root).SetKind("component")
+        stage.SetDefaultPrim(root.GetPrim())
+        for each in grooms:
+            curves = author_groom(stage, _free_path(stage, each.groom.name), each.groom, each.spline)
+            for *arguments, value in each.primvars:
+                UsdGeom.PrimvarsAPI(curves).CreatePrimvar(*arguments).Set(value)
+
+    return write_stage(as_path(path, "path"), author)
+
+
+def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINES) -> UsdGeom.BasisCurves:
+    """Define a BasisCurves prim for a groom in a stage of metres, Y up.
+
+    The `groom_*` primvars are those that Unreal and other groom readers know. Root UVs that a groom has not are guessed, by
+    the direction of the roots from the middle of the head, rather than by each of these readers in its own way.
+    """
+    curves = author_curves(stage, path, groom.points, groom.counts, groom.widths, spline)
+    api = UsdGeom.PrimvarsAPI(curves)
+    names, uniform = Sdf.ValueTypeNames, UsdGeom.Tokens.uniform
+
+    def per_strand(name: str, kind, values) -> None:
+        api.CreatePrimvar(name, kind, uniform).Set(values)
+
+    per_strand("groom_id", names.IntArray, integers(np.arange(groom.strand_count)))
+    if groom.guides is not None:
+        per_strand("groom_guide", names.IntArray, integers(groom.guides))
+    if groom.group is not None:
+        per_strand("groom_group_id", names.IntArray, integers(groom.group))
+    uv = _guessed_uv(groom) if groom.root_uv is None else groom.root_uv
+    uv = Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(uv))
+    per_strand("groom_root_uv", names.Float2Array, uv)
+    per_strand("st", names.TexCoord2fArray, uv)
+    centimetres = floats(np.float32(100) * groom.widths)
+    api.CreatePrimvar("groom_width", names.FloatArray, curves.GetWidthsInterpolation()).Set(centimetres)
+    for name, kind, value in (
+        ("groom_version_major", names.Int, 1),
+        ("groom_version_minor", names.Int, 4),
+        ("groom_tool", names.String, "neuralocks"),
+    ):
+        api.CreatePrimvar(name, kind, UsdGeom.Tokens.constant).Set(value)
+    return curves
+
+
+def _guessed_uv(groom: Groom) -> np.ndarray:
+    """Root UVs (S, 2) as the network reads them, about the middle of a head that is no further known."""
+    roots = np.zeros((groom.strand_count, 3), np.float32)
+    filled = groom.counts > 0
+    roots[filled] = groom.points[groom.starts[filled]]
+    low, high = roots[filled].min(axis=0), roots[filled].max(axis=0)
+    centre = (low + high) / 2
+    centre[1] = low[1] - BELOW  # hair grows on the upper half
+    return root_uv(roots, centre)
+
+
+def _primvars(look: Look) -> tuple[Primvar, ...]:
+    """Colours as renderers and viewports know them."""
+    names, found = Sdf.ValueTypeNames, []
+    for name, kind, values, array in (
+        ("displayColor", names.Color3fArray, look.color, Vt.Vec3fArray),
+        ("displayOpacity", names.FloatArray, look.opacity, Vt.FloatArray),
+    ):
+        if values is not None:
+            scope = UsdGeom.Tokens.constant if len(values) == 1 else UsdGeom.Tokens.vertex
+            found.append(Primvar(name, kind, scope, 1, array.FromNumpy(np.ascontiguousarray(values))))
+    return tuple(found)
+
+
+@names_damage
+def _read_primvars(prim: Usd.Prim, groom: Groom) -> tuple["Primvar", ...]:
+    """Those that go on with the curves, as far as they fit them."""
+    found = []
+    for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
+        name, scope, each = primvar.GetPrimvarName(), str(primvar.GetInterpolation()), primvar.GetElementSize()
+        if name in OWN or not (str(name).startswith("groom_") or name in KEPT):
+            continue
+        value = rest_primvar(primvar)
+        many = {"uniform": groom.strand_count, "vertex": len(groom.points)}.get(scope)
+        if value is not None and (scope == "constant" or many and len(value) == many * each):
+            found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
+    return tuple(found)
+
+
+@names_damage
+def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
+    stage = open_stage(source)
+    check_not_input(out, stage)
+    border = Border.of(stage)
+    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
+    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
+    found, notes = [], []
+    for prim in find_curves(stage):
+        curves = UsdGeom.BasisCurves(prim)
+        groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
+        tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
+        found.append(Authored(groom, Spline(*tokens), _read_primvars(prim, groom)))
+    if not found:
+        raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
+    return found, notes
+
+
+def _free_path(stage: Usd.Stage, name: str) -> str:
+    """A prim path below /Groom for a groom's name, which may be a file or a prim path."""
+    base = Tf.MakeValidIdentifier(Path(name.rsplit("/", 1)[-1]).stem or "Hair")
+    path, number = f"/Groom/{base}", 1
+    while stage.GetPrimAtPath(path):
+        number += 1
+        path = f"/Groom/{base}_{number}"
+    return path

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks grow`: hairstyles of the procedural library on any character."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
+from neuralocks_core.hairstyles import grow as grow_style
+
+from ..border.units import check_not_input
+from ..shot.notes import first_of, unlikely_head
+from ..shot.stage import read_rigs
+from .groom import write_groom
+
+
+def grow(
+    style: str,
+    character: str | Path,
+    out: str | Path,
+    count: int = 10_000,
+    seed: int = 0,
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    tell: Callable[[list[str]], None] | None = None,
+) -> Path:
+    """Grow a hairstyle on the head of a USD character and write it as a USD groom, in metres and Y up.
+
+    Args:
+        style: one of `neuralocks_core.hairstyles.STYLES`.
+        character: USD file with a skeleton and skinned meshes.
+        out: USD file to write.
+        count: strands, 1 to 150,000.
+        seed: the same one gives the same groom.
+        skeleton, head: as for `bake`.
+        tell: called with notes for the user.
+
+    Raises:
+        NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
+    """
+    out = as_path(out, "out")
+    rigs = read_rigs(character, skeleton, head)
+    rig = rigs[0]
+    check_not_input(out, rig.source.prim.GetStage())
+    if tell:
+        tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
+    return write_groom(out, Barber(rig.character).grow(style, count, seed))
+
+
+class Barber:
+    """Grows styles on one character; the head is looked at once."""
+
+    def __init__(self, character: Character):
+        if character.body is None:
+            raise NeuralocksError("character: hair needs a head to grow on; give a character with skin, or a groom")
+        self.character = character
+
+    def grow(self, style: str, count: int, seed: int) -> Groom:
+        """A groom in bind-world metres."""
+        groom = grow_style(style, self._scalp, count, seed, self._obstacle)
+        return replace(groom, points=(groom.points @ self.character.facing).astype(np.float32))
+
+    @cached_property
+    def _scalp(self) -> Scalp:
+        # Styles are grown facing +Z, around the head's own place.
+        centre = self.character.facing @ self.character.canonical_to_bind[:3, 3] + self.character.head_centre
+        points = self.character.body.points @ self.character.facing.T
+        return from_head(points, self.character.body.triangles, centre)
+
+    @cached_property
+    def _obstacle(self) -> Obstacle:
+        return Obstacle(self._scalp, (self._scalp.points, self.character.body.triangles))

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which USD files were written here, and may be written over."""
+
+from pxr import Sdf, Tf
+
+from ..rig.stage import BAKED
+from ..shot.recorded import KEY
+
+
+def is_own(path) -> bool:
+    """Whether a file is a bake, of strands or bones, or a shot that `scene_writer` wrote."""
+    try:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    except Tf.ErrorException:  # no USD file, or a damaged one
+        return False
+    if layer is None:
+        return False
+    found: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, found.append)
+    prims = (layer.GetPrimAtPath(path) for path in found if path.IsPrimPath())
+    return any(KEY in prim.customData or prim.name == BAKED for prim in prims)

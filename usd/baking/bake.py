@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bake: a shot with a groom in, an override layer with moving hair out."""
+
+import hashlib
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from neuralocks_core import model as model_file
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.materials import Material
+from neuralocks_core.progress import Progress
+from neuralocks_core.runtime import StrandModel, cores
+
+from ..border.amounts import check_number
+from ..border.time_codes import given_cuts, time_codes
+from ..border.units import check_layer_name
+from ..shot.notes import written_notes
+from ..shot.recorded import cut_facts
+from ..shot.stage import Shot, StageGroom, read_shot
+from .posing import GroomPoser
+from .samples import write_samples
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What a bake did.
+
+    Attributes:
+        path: the override layer.
+        frames: its time codes.
+        grooms: per groom: path, strands, points, joint, how the joint was found.
+        notes: what a user should know.
+        seconds: wall time.
+        resumed: frames taken over from an interrupted bake, counted for each groom.
+    """
+
+    path: Path
+    frames: list[float]
+    grooms: list[dict]
+    notes: list[str]
+    seconds: float
+    resumed: int
+
+
+def bake(
+    shot,
+    out,
+    model=None,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    frames=None,
+    *,
+    joints: dict[str, str] | None = None,
+    subframes: int = 1,
+    material=None,
+    strength: float = 1.0,
+    resolve: bool = True,
+    loop: bool = False,
+    cuts=None,
+    velocities: bool = True,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> BakeResult:
+    """Bake moving hair.
+
+    Args:
+        shot: path of a USD stage, or a `Shot` already read, with its grooms, skeletons, joints and cuts.
+        out: `.usdc`, `.usd` or `.usda` to write.
+        model: path of a strand model, or a StrandModel; the shipped one if left out.
+        grooms: prim paths; all grooms if left out.
+        skeleton: prim path of the skeleton; found if left out.
+        head: joint that carries grooms for which no binding says so.
+        frames: `A:B[:STEP]`, or time codes in any order; the shot's range if left out.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        subframes: samples per frame, for motion blur.
+        material: a Material, or words NAME=VALUE.
+        strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
+        resolve: push hair out of the body after the network.
+        loop: the clip repeats, its last sample shows the pose of its first: hair there remembers the end of the clip.
+        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
+        velocities: write velocities.
+        jobs: threads; a core each, eight at most, if left out.
+        progress: called with (done, total, message); raising from it stops the bake.
+
+    Raises:
+        NeuralocksError: what cannot be baked, in one line. Nothing is left under the output's name.
+    """
+    began = time.monotonic()
+    out = as_path(out, "out")
+    check_layer_name(out)
+    jobs = _jobs(jobs)
+    strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
+    look = as_material(material)
+    check_number("--strength", strength, 0, 4)
+    cuts = given_cuts(cuts, loop)
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
+    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+    options = {"strength": strength, "resolve": resolve, "loop": loop}
+    inputs = {"model": _digest(strand_model), "material": look.log_ratios().tolist()}
+
+    def poser(item: StageGroom) -> GroomPoser:
+        return GroomPoser(item, strand_model, look, **options)
+
+    facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
+    facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
+    resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
+    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()]
+    if cuts is None and strand_model.spec.bins:
+        notes += [text for rig in shot.rigs for text in rig.cut_notes()]
+    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
+
+
+def as_material(material) -> Material:
+    """A Material from one, from words NAME=VALUE, or from a dict of them."""
+    if isinstance(material, Material):
+        return material
+    if isinstance(material, dict):
+        material = [f"{name}={value}" for name, value in material.items()]
+    words = [material] if isinstance(material, str) else material or ()
+    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
+        raise NeuralocksError(
+            f"material: {material!r} is none; give a Material, words such as 'bend=2x', or a dict of them"
+        )
+    return Material.parse(words)
+
+
+def described(shot: Shot) -> list[dict]:
+    """Per groom, what a user is told."""
+    return [
+        {
+            "path": item.path,
+            "strands": item.groom.strand_count,
+            "points": len(item.groom.points),
+            "joint": item.joint,
+            "how": item.attachment.how,
+        }
+        for item in shot.grooms
+    ]
+
+
+def _jobs(jobs: int | None) -> int:
+    if jobs is None:
+        return cores()
+    check_number("--jobs", jobs, 1, 1024, whole=True)
+    return jobs
+
+
+def _digest(model: StrandModel) -> str:
+    digest = hashlib.sha256(repr(sorted(model.file.meta.items(), key=str)).encode())
+    for name in model_file.KINDS["strands"]:
+        digest.update(model.file.graphs[name])
+    return digest.hexdigest()

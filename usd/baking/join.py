@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Join: the bakes of parts of a range, as the machines of a farm make them, become the one bake of the whole range."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Tf, Usd
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.progress import Progress, silent
+
+from ..border.damage import first_line, named
+from ..border.units import Border, check_layer_name, check_not_input, one_file, open_stage
+from ..shot.notes import composition_notes, out_of_place
+from ..shot.recorded import KEY
+from .override import deliver, relative, repeat_metadata
+from .sample_layer import Lagging, SampleLayer
+from .spool import Spool, fingerprint
+
+
+@dataclass(frozen=True)
+class JoinResult:
+    """What a join did.
+
+    Attributes:
+        path: the layer written.
+        grooms: prim paths.
+        frames: its time codes.
+        notes: what a user should know.
+    """
+
+    path: Path
+    grooms: list[str]
+    frames: list[float]
+    notes: list[str]
+
+
+def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
+    """Write one bake out of several of the same shot, byte for byte what a bake of all their frames is.
+
+    Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
+
+    Args:
+        parts: files that `bake` or `simulate` wrote, in any order. Of frames that several have the first file's count.
+        out: `.usdc`, `.usd` or `.usda` to write.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: a part is no bake, or of another shot or with other options than the first. Nothing is left
+            under the output's name.
+    """
+    out = as_path(out, "out")
+    check_layer_name(out)
+    every = [_Part(as_path(part, "parts")) for part in parts]
+    if not every:
+        raise NeuralocksError("no parts: name the files that neuralocks bake wrote")
+    first, say = every[0], progress or silent
+    stage = open_stage(first.path)
+    for part in every:
+        part.check_alike(first)
+        if one_file(out, part.path):
+            raise NeuralocksError(f"{out}: is one of the parts; choose another name")
+    check_not_input(out, stage)
+    frame = Border.of(stage).frame
+    plan = {groom: _sources(groom, every) for groom in first.grooms}
+    total, done = sum(map(len, plan.values())), 0
+    spool = Spool(out, fingerprint([part.path for part in every], {}))
+    try:
+        file = SampleLayer(spool.layer_path, out)
+        with named(out):
+            _copy_header(first.layer, file.layer, out, every)
+        # In the order in which a bake writes.
+        for prim in _below(first.layer.pseudoRoot):
+            with named(out):
+                _copy_prim(prim, file.layer)
+            if prim.path in plan:
+                for _ in _copy_samples(prim.path, plan[prim.path], file, Lagging(frame)):
+                    done += 1
+                    say(done, total, str(prim.path))
+        file.close()
+        deliver(spool)
+    except BaseException:
+        spool.discard()
+        raise
+    codes = sorted({code for sources in plan.values() for code in sources})
+    notes = composition_notes(stage, first.path) + _gaps(codes, frame, stage) + out_of_place(stage, out)
+    return JoinResult(out, [str(groom) for groom in plan], codes, notes)
+
+
+class _Part:
+    """One part: its layer, and which grooms it has samples of."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        with self._named():
+            self.layer = Sdf.Layer.FindOrOpen(str(path))
+        if self.layer is None:
+            raise NeuralocksError(f"{path}: no such file, or no USD file; check the path")
+        self.grooms = [prim.path for prim in _below(self.layer.pseudoRoot) if self._is_baked(prim)]
+        if not self.grooms:
+            raise NeuralocksError(f"{path}: is no bake; give files that neuralocks bake wrote")
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except Tf.ErrorException as error:
+            raise NeuralocksError(f"{self.path}: cannot be read ({first_line(error)}); bake that part again") from None
+
+    def _is_baked(self, prim: Sdf.PrimSpec) -> bool:
+        # On what is no groom, the key tells in a word what else was written here.
+        return isinstance(prim.customData.get(KEY), dict) and bool(self.codes(prim.path))
+
+    def codes(self, groom: Sdf.Path) -> list[float]:
+        """Time codes of a groom's samples, ascending."""
+        return list(self.layer.ListTimeSamplesForPath(groom.AppendProperty("points")))
+
+    def value(self, groom: Sdf.Path, code: float, name: str):
+        """The array of an attribute's sample.
+
+        Raises:
+            NeuralocksError: it is missing, or damaged.
+        """
+        path = groom.AppendProperty(name)
+        with self._named():
+            found = self.layer.QueryTimeSample(path, code)
+        if found is None:
+            raise NeuralocksError(f"{self.path}: {path} has no sample at {code:g}; bake that part again")
+        return found
+
+    def samples_of(self, groom: Sdf.Path, name: str) -> bool:
+        """Whether there are samples of an attribute."""
+        return self.layer.GetNumTimeSamplesForPath(groom.AppendProperty(name)) > 0
+
+    def made(self, groom: Sdf.Path) -> dict:
+        """With what a groom was baked."""
+        codes = self.codes(groom)
+        count = len(self.value(groom, codes[0], "points"))
+        options = {"velocities": self.samples_of(groom, "velocities"), "number of points": count}
+        return self.layer.GetPrimAtPath(groom).customData[KEY] | options
+
+    def check_alike(self, other: "_Part") -> None:
+        """Refuse what is not of the same shot, grooms and options as another part."""
+        shots = [
+            [os.path.realpath(part.layer.ComputeAbsolutePath(shot)) for shot in part.layer.subLayerPaths]
+            for part in (self, other)
+        ]
+        if shots[0] != shots[1]:
+            raise NeuralocksError(f"{self.path}: is a bake of another shot than {other.path} is; join the parts of one")
+        if self.grooms != other.grooms:
+            raise NeuralocksError(
+                f"{self.path}: its grooms are {', '.join(map(str, self.grooms))}, those of {other.path} "
+                f"{', '.join(map(str, other.grooms))}; bake the same ones"
+            )
+        for groom in self.grooms:
+            mine, theirs = self.made(groom), other.made(groom)
+            unlike = sorted(name for name in {*mine, *theirs} if mine.get(name) != theirs.get(name))
+            if unlike:
+                raise NeuralocksError(
+                    f"{self.path}: {groom} was baked with other {', '.join(unlike)} than in {other.path}; "
+                    "bake both with the same options"
+                )
+
+
+def _sources(groom: Sdf.Path, parts: list[_Part]) -> dict[float, _Part]:
+    """Which part gives a groom's sample at each time code, ascending."""
+    found: dict[float, _Part] = {}
+    for part in parts:
+        for code in part.codes(groom):
+            found.setdefault(code, part)
+    return dict(sorted(found.items()))
+
+
+def _copy_header(source: Sdf.Layer, target: Sdf.Layer, out: Path, parts: list[_Part]) -> None:
+    """What a part says of the stage, and the range of all parts, where the shot has none of its own."""
+    begin, end = min(part.layer.startTimeCode for part in parts), max(part.layer.endTimeCode for part in parts)
+    repeat_metadata(source, target, out, {"startTimeCode": begin, "endTimeCode": end})
+    for shot in source.subLayerPaths:
+        target.subLayerPaths.append(relative(source.ComputeAbsolutePath(shot), out.parent))
+
+
+def _copy_prim(prim: Sdf.PrimSpec, target: Sdf.Layer) -> None:
+    """All that a part says of a prim but samples."""
+    over = Sdf.CreatePrimInLayer(target, prim.path)
+    _copy_info(prim, over)
+    for relation in prim.relationships:
+        Sdf.RelationshipSpec(over, relation.name, relation.custom).targetPathList.ClearEditsAndMakeExplicit()
+    for spec in prim.attributes:
+        copied = Sdf.AttributeSpec(over, spec.name, spec.typeName, spec.variability, spec.custom)
+        _copy_info(spec, copied, ("typeName", "variability", "custom", "timeSamples"))
+
+
+def _copy_info(source: Sdf.Spec, target: Sdf.Spec, without=()) -> None:
+    for name in sorted(source.ListInfoKeys()):  # USD gives another order in each process
+        if name not in without:
+            target.SetInfo(name, source.GetInfo(name))
+
+
+def _copy_samples(groom: Sdf.Path, sources: dict[float, _Part], file: SampleLayer, order: Lagging) -> Iterator[float]:
+    """Samples of a groom, which yield their time codes as they are copied."""
+
+    def put(code: float, *names: str) -> None:
+        part = sources[code]
+        file.put(groom, code, {name: part.value(groom, code, name) for name in names if part.samples_of(groom, name)})
+
+    for code in sources:
+        put(code, "extent", "points")
+        for late in order.after(code):
+            put(late, "velocities")
+        yield code
+    for late in order.rest():
+        put(late, "velocities")
+
+
+def _below(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
+    """All prims under one, as a stage has them."""
+    for child in prim.nameChildren:
+        yield child
+        yield from _below(child)
+
+
+def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
+    """The notes on frames of the shot that no part has."""
+    frames = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6)) * frame + codes[0]
+    steps = np.diff(frames)
+    usual = np.median(steps) if len(steps) > 1 else frame
+    gaps = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
+    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    missed = usual * (1 - 1e-6)  # a shot need not begin and end with a frame, but less than a step of it is none
+    gaps = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + gaps
+    gaps += [f"after {codes[-1]:g}"] if last - frames[-1] >= missed else []
+    return [f"no part has samples {', '.join(gaps[:4])}{', ...' if len(gaps) > 4 else ''}"] if gaps else []

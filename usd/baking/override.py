@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
+
+import os
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import sizes, transformed
+
+from ..border.arrays import vectors
+from ..border.damage import named
+from ..border.stopping import check
+from ..border.units import Border
+from ..shot.curves import rest_points, widest_sample
+from ..shot.recorded import record
+from ..shot.stage import Shot, StageGroom
+from .sample_layer import SampleLayer
+from .spool import Spool
+
+
+class OverrideWriter:
+    """Writes samples, in the order they come, to a new crate file.
+
+    What the file holds depends on nothing but the shot and the samples: no date, no machine, no timing.
+
+    Args:
+        part: file to write now.
+        out: its final name, to which the shot's path is relative.
+        shot: what is overridden.
+        codes: all time codes of the bake.
+    """
+
+    def __init__(self, part: Path, out: Path, shot: Shot, codes: list[float]):
+        self._file = SampleLayer(part, out)
+        self._reach: dict[Sdf.Path, np.float32] = {}  # how far hair reaches beyond its points, in the prim's own units
+        with named(out):
+            write_header(self._file.layer, shot.stage, shot.border, shot.path, out, codes)
+
+    def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
+        """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
+        layer, path = self._file.layer, item.prim.GetPath()
+        self._reach[path] = max(
+            np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
+        )
+        over = over_prim(layer, item.prim)
+        record(over, {**facts, "joint": item.joint})
+        if item.attachment.skinned:
+            # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
+            apply_binding(over, item.prim)
+            relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
+            relation.targetPathList.ClearEditsAndMakeExplicit()
+        names = Sdf.ValueTypeNames
+        Sdf.AttributeSpec(over, "extent", names.Float3Array)
+        points = Sdf.AttributeSpec(over, "points", names.Point3fArray)
+        if UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(Usd.TimeCode.Default()) is None:
+            # Else the first baked sample would be the shape at rest to whoever reads the bake.
+            points.default = vectors(_at_default(item))
+        # What the shot says of motion is not that of these points: a renderer would blur by it.
+        authored = {name for name in ("velocities", "accelerations") if item.prim.GetAttribute(name).HasAuthoredValue()}
+        if velocities:
+            Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
+            authored.discard("velocities")
+        for name in sorted(authored):
+            Sdf.AttributeSpec(over, name, names.Vector3fArray).default = Sdf.ValueBlock()
+
+    def sample(self, item: StageGroom, time_code: float, name: str, blocks: Iterable[np.ndarray]) -> None:
+        """Add one time sample of `points` (and of the extent with it) or `velocities`.
+
+        Args:
+            item: the groom.
+            time_code: when.
+            name: "points" or "velocities".
+            blocks: consecutive parts (n, 3) float32 of all P values: a large groom's are never all there twice.
+        """
+        array, first, corners = Vt.Vec3fArray(len(item.groom.points)), 0, []
+        inside = np.asarray(_Writable(array))
+        for block in blocks:
+            inside[first : first + len(block)] = block
+            first += len(block)
+            if name == "points":
+                corners += _corners(block)
+        values = {name: array}
+        if name == "points":
+            pad = self._reach[item.prim.GetPath()]
+            low, high = _corners(np.array(corners))
+            values = {"extent": vectors([low - pad, high + pad]), **values}
+        self._file.put(item.prim.GetPath(), time_code, values)
+
+    def close(self) -> None:
+        """Write what is held."""
+        self._file.close()
+
+
+def over_prim(layer: Sdf.Layer, prim: Usd.Prim) -> Sdf.PrimSpec:
+    """The over of a shot's prim; instances that it lies in are so no longer, for what is inside of them cannot be overridden."""
+    for above in prim.GetPath().GetPrefixes():
+        if prim.GetStage().GetPrimAtPath(above).IsInstance():
+            _over(layer, above).instanceable = False
+    return _over(layer, prim.GetPath())
+
+
+def apply_binding(over: Sdf.PrimSpec, prim: Usd.Prim) -> None:
+    """Apply SkelBindingAPI to an over, where its prim has it not."""
+    if not prim.HasAPI("SkelBindingAPI"):
+        over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
+
+
+def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
+    """Sublayer the shot by a path relative to `out`, and repeat what USD reads of a stage's first layer only."""
+    ranged = stage.HasAuthoredTimeCodeRange()
+    facts = {
+        "metersPerUnit": border.metres_per_unit,
+        "upAxis": border.up_axis,
+        "timeCodesPerSecond": border.rate,
+        "framesPerSecond": stage.GetFramesPerSecond(),
+        "startTimeCode": stage.GetStartTimeCode() if ranged else codes[0],
+        "endTimeCode": stage.GetEndTimeCode() if ranged else codes[-1],
+    }
+    if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
+        facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
+    repeat_metadata(stage.GetRootLayer(), layer, out, facts)
+    layer.subLayerPaths.append(relative(shot, out.parent))
+
+
+LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
+"""Metadata that is said of one layer, or that USD reads of sublayers, too."""
+
+
+def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict) -> None:
+    """Units, rates, range, default prim, render settings, and the variables without which references find nothing; with
+    `facts` in place of what is said otherwise.
+    """
+    root = source.pseudoRoot
+    said = {name: root.GetInfo(name) for name in root.ListInfoKeys() if name not in LAYERS_OWN}
+    for name, value in sorted((said | facts).items()):  # USD gives another order in each process
+        layer.pseudoRoot.SetInfo(name, value)
+
+    def placed(asset: str) -> str:
+        return relative(source.ComputeAbsolutePath(asset), out.parent) if asset.startswith(("./", "../")) else asset
+
+    UsdUtils.ModifyAssetPaths(layer, placed)
+
+
+def relative(file, folder: Path) -> str:
+    """Path of a file relative to a folder, by the names it was given.
+
+    What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
+    folder's own path has a link, `..` must lead to the file both from there and from behind the link.
+    """
+    if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
+        raise NeuralocksError(f"{file}: its path holds a line break or the like, and no layer can name it; rename it")
+    behind = os.path.realpath(folder)
+    try:
+        ways = [
+            os.path.relpath(os.path.abspath(file), os.path.abspath(folder)),
+            os.path.relpath(os.path.realpath(file), behind),
+        ]
+    except ValueError:  # another drive
+        return os.path.realpath(file).replace(os.sep, "/")
+    leading = (way for way in ways if all(_same(f"{start}/{way}", file) for start in (os.path.abspath(folder), behind)))
+    relative = next(leading, ways[0]).replace(os.sep, "/")
+    return relative if relative.startswith("../") else f"./{relative}"
+
+
+def _same(path: str, file) -> bool:
+    """Whether a path, read as USD does, without a look at links before `..`, is the file."""
+    try:
+        return os.path.samefile(os.path.normpath(path), file)
+    except OSError:
+        return False
+
+
+def deliver(spool: Spool) -> None:
+    """Put an assembled layer under its final name, as text where that asks for it; stages that this process has open see it."""
+    check()
+    if spool.out.suffix.lower() == ".usda":
+        text = spool.layer_path.with_suffix(".usda")
+        with named(spool.out):
+            Sdf.Layer.FindOrOpen(str(spool.layer_path)).Export(str(text))
+        os.replace(text, spool.layer_path)
+    spool.finish()
+    layer = Sdf.Layer.Find(os.path.realpath(spool.out)) or Sdf.Layer.Find(str(spool.out))
+    if layer:
+        layer.Reload(force=True)
+
+
+class _Writable:
+    """A new USD array as numpy may fill it. USD itself lets its arrays be read only, and to convert and copy what goes into
+    them costs more than to write them.
+    """
+
+    def __init__(self, array: Vt.Vec3fArray):
+        self._array = array  # lives as long as what numpy makes of this
+        facts = np.asarray(array).__array_interface__
+        self.__array_interface__ = {**facts, "data": (facts["data"][0], False)}
+
+
+def _corners(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest coordinates (3,) of points (P, 3)."""
+    # Long rows are compared ten times as fast as triples.
+    even = len(points) // 64 * 64
+    rows = points[:even].reshape(-1, 192)
+    parts = [points[even:]]
+    if even:
+        parts += [rows.min(axis=0).reshape(-1, 3), rows.max(axis=0).reshape(-1, 3)]
+    few = np.concatenate(parts)
+    return few.min(axis=0), few.max(axis=0)
+
+
+def _at_default(item: StageGroom) -> np.ndarray:
+    """Points at rest (P, 3) float32 of a groom that has none at the default time."""
+    points, attachment = rest_points(item.prim), item.attachment
+    if attachment.at_default is None:
+        return points
+    return transformed(points, np.linalg.inv(attachment.at_default) @ attachment.to_bind).astype(np.float32)
+
+
+def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
+    return layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
+
+
+def _unit(item: StageGroom) -> float:
+    """Length of a unit of the prim's own space [m]."""
+    return float(abs(sizes(item.attachment.to_bind)))

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writing all samples of a bake: computed in ascending order, kept frame by frame, assembled meanwhile.
+
+Each sample is a pure function of the shot and its time code. So order, chunks, jobs and interruptions leave no trace in
+the file.
+"""
+
+import math
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress, silent
+
+from ..border.damage import names_damage
+from ..border.stopping import stopped
+from ..border.units import check_not_input, used_files
+from ..shot.stage import Shot, StageGroom
+from .override import OverrideWriter, deliver
+from .sample_layer import Lagging
+from .spool import Spool, fingerprint, program_files
+from .stencils import Stencils
+from .write_behind import WriteBehind
+
+BLOCK = 1 << 16
+"""Points that are read back and written at a time."""
+
+
+class Poser(Protocol):
+    """What gives a groom's points."""
+
+    def points(self, time_code: float) -> np.ndarray:
+        """(P, 3) float32, in the prim's own space and units."""
+
+
+@names_damage
+def write_samples(
+    shot: Shot,
+    out: Path,
+    codes: list[float],
+    poser: Callable[[StageGroom], Poser],
+    inputs: dict,
+    facts: dict,
+    *,
+    velocities: bool = True,
+    progress: Progress | None = None,
+) -> int:
+    """Write an override layer.
+
+    Args:
+        shot: what is overridden.
+        out: `.usdc`, `.usd` or `.usda`.
+        codes: ascending time codes.
+        poser: makes the poser of a groom; called only if something is left to compute.
+        inputs: plain values that, with the shot, its files and this program's, determine every sample.
+        facts: what the file tells of how it was made, see `recorded`.
+        velocities: write velocities.
+        progress: called with (done, total, message).
+
+    Returns:
+        Frames taken over from an interrupted bake of the same inputs, counted for each groom.
+
+    Raises:
+        NeuralocksError: the file cannot be written. Nothing is left then, neither under its name nor beside it; only a
+            stop by the user leaves the finished frames, to go on from.
+    """
+    check_not_input(out, shot.stage)
+    _check_space(out, shot, len(codes), velocities)
+    inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
+    spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
+    try:
+        return _write(shot, codes, poser, spool, facts, velocities, progress or silent)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) or stopped():
+            spool.close()
+        else:
+            spool.discard()
+        raise
+
+
+def _carried(item: StageGroom) -> list:
+    """What its samples depend on of how a groom was read: by which joints of what, from where, and with which cuts."""
+    found, character = item.attachment, item.attachment.character
+    joints = {name: int(joint) for name, joint in character.humanoid.items()}
+    return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
+
+
+def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
+    writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
+    plans = [Stencils(item, codes, shot.first, velocities) for item in shot.grooms]
+    total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
+    say(0, total, "reading")
+    with WriteBehind() as behind:
+        for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
+            behind.put(writer.groom, item, velocities, facts)
+            store, made = _Store(spool, writer, item, number, plan), None
+            for code in plan.codes:
+                if spool.holds(number, code, len(item.groom.points)):
+                    resumed += code in plan.wanted
+                else:
+                    made = made or poser(item)
+                    # At once: points that waited for it would lie in memory beside those of the next frame.
+                    spool.write(number, code, made.points(code))
+                behind.put(store.frame, code)
+                done += 1
+                say(done, total, item.path)
+            behind.put(store.finish)
+        behind.put(writer.close)
+    deliver(spool)
+    return resumed
+
+
+class _Store:
+    """Writes one groom's points frame by frame, and velocities once both sides are there."""
+
+    def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, number: int, plan: Stencils):
+        self._spool, self._writer, self._item, self._number, self._plan = spool, writer, item, number, plan
+        self._order = Lagging(item.attachment.rig.border.frame)
+
+    def frame(self, code: float) -> None:
+        """The next time code in the list, whose points are in the spool."""
+        if code in self._plan.wanted:
+            self._writer.sample(self._item, code, "points", self._points(code))
+            self._differences(self._order.after(code))
+
+    def finish(self) -> None:
+        """Write what waits for frames that are not among those wanted."""
+        self._differences(self._order.rest())
+
+    def _differences(self, codes: list[float]) -> None:
+        for code in codes if self._plan.velocities else ():
+            self._writer.sample(self._item, code, "velocities", self._velocities(code))
+
+    def _rows(self) -> Iterator[slice]:
+        count = len(self._item.groom.points)
+        return (slice(low, min(low + BLOCK, count)) for low in range(0, count, BLOCK))
+
+    def _points(self, code: float) -> Iterator[np.ndarray]:
+        """Blocks (n, 3) float32, in units of the prim."""
+        return (self._spool.read(self._number, code, rows) for rows in self._rows())
+
+    def _velocities(self, code: float) -> Iterator[np.ndarray]:
+        """Blocks (n, 3) float32, in units of the prim per second."""
+        terms = self._plan.terms(code)
+        for rows in self._rows():
+            result = np.zeros((rows.stop - rows.start, 3), np.float32)
+            base = None
+            for other, weight in terms:
+                part = self._spool.read(self._number, other, rows)
+                if base is None:
+                    base = part
+                    continue
+                # The weights add up to nothing: of differences, hair that stands still has no velocity by rounding.
+                part -= base
+                part *= np.float32(weight)
+                result += part
+            yield result
+
+
+def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:
+    # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
+    size = 1.03 * sum(len(item.groom.points) for item in shot.grooms) * 12 * (2 + velocities) * count
+    folder = next((p for p in [out.parent, *out.parent.parents] if p.is_dir()), None)
+    if folder is not None and size > (free := shutil.disk_usage(folder).free):
+        raise NeuralocksError(
+            f"{out}: needs {math.ceil(size / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "
+            "free some, bake fewer frames or choose another folder"
+        )

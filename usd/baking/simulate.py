@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
+
+import time
+from dataclasses import asdict
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.evaluation.comparison import simulated, whole_locks
+from neuralocks_core.files import as_path
+from neuralocks_core.progress import Progress
+
+from ..border.amounts import check_number
+from ..border.time_codes import given_cuts, time_codes
+from ..border.units import check_layer_name
+from ..shot.notes import written_notes
+from ..shot.recorded import cut_facts
+from ..shot.stage import Shot, StageGroom, read_shot
+from .bake import BakeResult, as_material, described
+from .placing import GroomPlacer
+from .samples import write_samples
+from .stencils import Stencils
+
+STRANDS = 2000
+"""Strands simulated where no number is given."""
+STIFFEST_VOLUME = 100.0
+"""Stiffer is not what anybody means, and takes the solver ever longer."""
+
+
+def simulate(
+    shot,
+    out,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    frames=None,
+    *,
+    joints: dict[str, str] | None = None,
+    subframes: int = 1,
+    material=None,
+    strands: int | None = None,
+    volume: float = 0.0,
+    cuts=None,
+    progress: Progress | None = None,
+) -> BakeResult:
+    """Simulate a shot's hair and write it as a bake.
+
+    Args:
+        shot, out, grooms, skeleton, head, frames, joints, subframes, material, cuts, progress: as for `bake`.
+        strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these.
+        volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
+
+    Raises:
+        NeuralocksError: as `bake`, or the solver is not installed.
+    """
+    began = time.monotonic()
+    out = as_path(out, "out")
+    check_layer_name(out)
+    look = as_material(material)
+    count = STRANDS if strands is None else strands
+    check_number("--strands", count, 1, whole=True)
+    check_number("--volume", volume, 0, STIFFEST_VOLUME)
+    cuts = given_cuts(cuts)
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
+    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
+
+    def poser(item: StageGroom) -> _SimulatedPoser:
+        return _SimulatedPoser(item, codes, shot.first, look, count, volume, progress)
+
+    facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
+    facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
+    resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
+    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
+    notes += [text for rig in shot.rigs if cuts is None for text in rig.cut_notes()]
+    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
+
+
+class _SimulatedPoser:
+    """Points of one groom out of a simulation of some of its strands."""
+
+    def __init__(
+        self, item: StageGroom, codes: list[float], first: float, material, count: int, volume: float, progress
+    ):
+        self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
+        every = self._placer.strands
+        chosen = whole_locks(every, count)
+        if not len(chosen):
+            raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
+        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest.
+        start = float(self._rig.time_codes[0])
+        wanted = {code: max(code, start) for code in Stencils(item, codes, first).codes}
+        times = sorted({start, *wanted.values()})
+        rows = {time: row for row, time in enumerate(times)}
+        self._row = {code: rows[time] for code, time in wanted.items()}
+        seconds = self._rig.border.seconds(times)
+        clip, character = self._rig.clip, item.attachment.character
+        self._moved = simulated(
+            character, every.subset(chosen), clip, seconds, material, volume=volume, progress=progress
+        )
+        mean = every.rest.mean(axis=1)
+        self._nearest = cKDTree(mean[chosen]).query(mean)[1]
+        self._nearest[chosen] = np.arange(len(chosen))
+
+    def points(self, time_code: float) -> np.ndarray:
+        """(P, 3) float32, in the prim's own space and units."""
+        moved = self._moved[self._row[time_code]]
+        joints = self._rig.joints_at(time_code)
+        return self._placer.points(time_code, joints, lambda strands: moved[self._nearest[strands]])

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Finished frames on disk beside the output, so that a killed bake goes on where it stopped."""
+
+import hashlib
+import json
+import os
+import uuid
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import cannot_write, make_way, remove_empty
+from neuralocks_core.lock_file import FolderLock
+
+
+class Spool:
+    """A folder `.NAME.baking` next to the output, valid for one set of inputs.
+
+    Attributes:
+        layer_path: where the output is assembled.
+
+    Args:
+        out: the output file.
+        fingerprint: digest of everything the samples depend on; a spool of another one is thrown away.
+
+    Raises:
+        NeuralocksError: the folder cannot be written, or another bake is writing this output.
+    """
+
+    def __init__(self, out: Path, fingerprint: str):
+        self.out = out
+        self.folder = out.parent / f".{out.name}.baking"
+        try:
+            self._made = make_way(out)
+        except OSError as error:
+            raise cannot_write(out, error) from None
+        self._lock = FolderLock(
+            self.folder, out, "another bake is writing it; wait for that one or choose another name"
+        )
+        try:
+            self._forget_others(fingerprint.encode())
+        except OSError as error:
+            self.close()
+            raise cannot_write(out, error) from None
+        # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
+        self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
+
+    def _forget_others(self, fingerprint: bytes) -> None:
+        mark = self.folder / "inputs"
+        if not mark.is_file() or mark.read_bytes() != fingerprint:
+            for old in self.folder.glob("*.frame"):
+                old.unlink()
+            mark.write_bytes(fingerprint)
+        for stray in self.folder.glob("*.part*"):
+            stray.unlink()
+
+    def holds(self, groom: int, time_code: float, points: int) -> bool:
+        """Whether the points (points, 3) of a frame are there, all of them."""
+        try:
+            return self._path(groom, time_code).stat().st_size == points * 12
+        except OSError:
+            return False
+
+    def read(self, groom: int, time_code: float, rows: slice) -> np.ndarray:
+        """Rows (n, 3) float32 of the points of a frame that is there.
+
+        Raises:
+            NeuralocksError: they cannot be read.
+        """
+        path, first = self._path(groom, time_code), rows.start or 0
+        count = -1 if rows.stop is None else 3 * (rows.stop - first)
+        try:
+            return np.fromfile(path, np.float32, count, offset=12 * first).reshape(-1, 3)
+        except (OSError, ValueError) as error:
+            raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
+
+    def write(self, groom: int, time_code: float, array: np.ndarray) -> None:
+        """Keep the points (P, 3) of a finished frame."""
+        path = self._path(groom, time_code)
+        part = path.with_suffix(".part")
+        try:
+            with open(part, "wb") as file:
+                file.write(np.ascontiguousarray(array, np.float32).data)
+            os.replace(part, path)
+        except OSError as error:
+            raise cannot_write(self.out, error) from None
+
+    def finish(self) -> None:
+        """Put the assembled layer under its final name and remove the rest."""
+        try:
+            os.replace(self.layer_path, self.out)
+        except OSError as error:
+            raise cannot_write(self.out, error) from None
+        self.discard()
+
+    def close(self) -> None:
+        """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
+        if any(self.folder.glob("*.frame")):
+            self._lock.release(remove=False)
+        else:
+            self.discard()
+
+    def discard(self) -> None:
+        """Remove the folder, and what was made on the way to an output that did not come."""
+        self._lock.release(remove=True)
+        remove_empty(self._made)
+
+    def _path(self, groom: int, time_code: float) -> Path:
+        return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+
+
+def fingerprint(files, values: dict) -> str:
+    """Digest of files (by name, size and time of change) and plain values."""
+    facts = []
+    for file in sorted(map(str, files)):
+        try:
+            stat = os.stat(file)
+            facts.append([file, stat.st_size, stat.st_mtime_ns])
+        except OSError:
+            facts.append([file, -1, -1])
+    return hashlib.sha256(json.dumps([facts, values], sort_keys=True).encode()).hexdigest()
+
+
+def program_files() -> list[Path]:
+    """The program's own files: frames of another version of it are not gone on from."""
+    import neuralocks_core
+
+    folders = Path(__file__).parents[1], Path(neuralocks_core.__file__).parent
+    return [file for folder in folders for file in folder.rglob("*.py")]

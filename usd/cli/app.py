@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line `neuralocks`. Each command imports what it needs when it runs, so that `--help` comes at once."""
+
+import logging
+import sys
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+from .bake import bake_command, join_command, simulate_command
+from .command import command_of, note, print_json
+from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs
+from .rig import app as rig_app
+from .train import one_by_one, train_command
+
+app = typer.Typer(
+    name="neuralocks",
+    help="Neural hair: moving hair for an animated character, baked to USD without simulating it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+command = command_of(app)
+command("bake")(bake_command)
+command("join")(join_command)
+command("simulate")(simulate_command)
+command("train")(train_command)
+app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line, on these words or those of the process."""
+    # Redirected output may be in a code page that lacks a character of a file's name: better shown as its number.
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    words = sys.argv[1:] if arguments is None else arguments
+    app(one_by_one(words) if words[:1] == ["train"] else words)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            number = version("neuralocks")
+        except PackageNotFoundError:
+            number = "of a source tree that is not installed"
+        typer.echo(f"neuralocks {number}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@command("import")
+def import_command(
+    file: Annotated[Path, typer.Argument(help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves.")],
+    out: Out,
+    unit: Annotated[str | None, typer.Option(help="mm, cm, m, in, or metres per unit of the file.")] = None,
+    up: Annotated[str | None, typer.Option(help="Upward axis of the file: Y or Z.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a hair file as a USD groom."""
+    from ..assets.groom import import_groom
+    from ..review.inspect import groom_facts
+
+    grooms, notes = import_groom(file, out, unit, up)
+    note(notes)
+    if as_json:
+        print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
+    else:
+        for groom in grooms:
+            typer.echo(f"{out}: {groom.strand_count} strands, {len(groom.points)} vertices of {groom.name}")
+
+
+@command("inspect")
+def inspect_command(
+    file: Annotated[Path, typer.Argument(help="A USD stage, a hair file, a model or a BVH file.")],
+    head: Head = None,
+    joint: Joints = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what a file holds, and what would stop or spoil a bake of it."""
+    from ..review.inspect import as_text, inspect
+
+    facts = inspect(file, head, pairs(joint, "--joint"))
+    if as_json:
+        print_json(facts)
+    else:
+        typer.echo(as_text(facts))
+
+
+@command("evaluate")
+def evaluate_command(
+    baked: Annotated[Path, typer.Argument(help="A bake.")],
+    reference: Annotated[bool, typer.Option(help="Compare with the reference solver (minutes).")] = False,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    joint: Joints = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="With --reference: whose answer to each pose as if held is shown, too."),
+    ] = None,
+    material: Materials = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Also draw how the tips move, as curves (.png, .svg, .pdf).")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print a bake's report card. Its material and head are known from the bake; give --groom, --skeleton and --joint again."""
+    from neuralocks_core.evaluation.report import check_plot
+
+    from ..baking.bake import as_material
+    from ..review.evaluate import evaluate
+    from .progress import progress_bar
+
+    if model is not None and not reference:
+        raise NeuralocksError("--model: its held-pose answer is shown beside the reference; add --reference")
+    if plot is not None:
+        check_plot(plot)
+    with progress_bar("evaluating") as progress:
+        card = evaluate(
+            baked, reference, grooms=groom or None, skeleton=skeleton, head=head, joints=pairs(joint, "--joint"),
+            model=model, material=as_material(material) if material else None, progress=progress,
+        )  # fmt: skip
+    if as_json:
+        typer.echo(card.to_json())
+    else:
+        typer.echo(card.text(encoding=sys.stdout.encoding))
+    if plot is not None:
+        card.plot(plot)
+
+
+@command("preview")
+def preview_command(
+    baked: Annotated[Path, typer.Argument(help="A bake.")],
+    out: Out,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+) -> None:
+    """Draw a bake: a strip of pictures (.png) or a clip (.mp4, .gif).
+
+    Of several characters the first with hair is drawn, or the one that --groom or --skeleton names.
+    """
+    from ..review.picture import preview
+    from .progress import progress_bar
+
+    with progress_bar("drawing") as progress:
+        preview(baked, out, grooms=groom or None, skeleton=skeleton, head=head, progress=progress)
+    typer.echo(str(out))
+
+
+@command("export")
+def export_command(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.")],
+    model: Annotated[
+        Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
+    ] = None,
+    shot: Annotated[
+        Path | None, typer.Option(help="USD stage: also write what no frame changes of each of its grooms.")
+    ] = None,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    joint: Joints = None,
+) -> None:
+    """Unpack a model into plain ONNX files and a description of their inputs."""
+    from neuralocks_core.model import shipped
+
+    from ..models.export import export_model
+
+    model = model or shipped("strands")
+    for path in export_model(
+        model, out, shot, grooms=groom, skeleton=skeleton, head=head, joints=pairs(joint, "--joint")
+    ):
+        typer.echo(str(path))
+
+
+@command("body")
+def body_command(
+    out: Out,
+    phenotype: Annotated[list[str] | None, typer.Option(help="NAME=VALUE of anny's parameters, 0 to 1.")] = None,
+) -> None:
+    """Write the statistical body anny as a USD character (extra 'body')."""
+    from ..assets.body import write_body
+
+    typer.echo(str(write_body(out, phenotype=numbers(phenotype, "--phenotype") or None)))
+
+
+@command("grow")
+def grow_command(
+    style: Annotated[str, typer.Argument(help="A style of the procedural library; a wrong one lists them.")],
+    character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
+    out: Out,
+    count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
+    seed: Seed = 0,
+    skeleton: Skeleton = None,
+    head: Head = None,
+) -> None:
+    """Grow a hairstyle on a character and write it as a USD groom."""
+    from ..assets.grow import grow
+
+    typer.echo(str(grow(style, character, out, count, seed, skeleton=skeleton, head=head, tell=note)))
+
+
+@command("demo")
+def demo_command(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.")] = Path("neuralocks_demo"),
+    model: Model = None,
+    as_json: AsJson = False,
+) -> None:
+    """Bake the shipped shot with the shipped model; picture, clip and report card."""
+    from ..review.demo import demo
+    from .progress import progress_bar
+
+    with progress_bar("demo") as progress:
+        done = demo(out, model, progress=progress)
+    notes = [*done.bake.notes, *done.notes]
+    note(notes)
+    outputs = {name: str(path) for name, path in done.outputs.items()}
+    if as_json:
+        seconds = {name: round(value, 2) for name, value in done.seconds.items()}
+        print_json({"shot": str(done.shot), "outputs": outputs, "seconds": seconds, "notes": notes})
+        return
+    typer.echo(done.card.text(encoding=sys.stdout.encoding))
+    for name, path in {"shot": str(done.shot), **outputs}.items():
+        took = f" ({done.seconds[name]:.1f} s)" if name in done.seconds else ""
+        typer.echo(f"{name}: {path}{took}")
+
+
+_IN_ORDER = "demo inspect bake join preview evaluate simulate import grow body train export".split()
+app.registered_commands.sort(key=lambda each: _IN_ORDER.index(each.name))  # of first need, as help lists them

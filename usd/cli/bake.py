@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks bake`, `neuralocks join` and `neuralocks simulate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .command import note, print_json
+from .options import (
+    AsJson,
+    Cuts,
+    Frames,
+    Grooms,
+    Head,
+    Jobs,
+    Joints,
+    Materials,
+    Model,
+    Out,
+    Skeleton,
+    Subframes,
+    cut_codes,
+    pairs,
+)
+
+
+def bake_command(
+    shot: Annotated[Path, typer.Argument(help="USD stage with an animated skeleton and at least one groom.")],
+    out: Out,
+    model: Model = None,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    joint: Joints = None,
+    frames: Frames = None,
+    subframes: Subframes = 1,
+    material: Materials = None,
+    strength: Annotated[
+        float, typer.Option(help="Motion strength from 0 (each pose as if held) to 4; 1 is as trained.")
+    ] = 1.0,
+    resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
+    ] = False,
+    cuts: Cuts = None,
+    velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+) -> None:
+    """Bake moving hair into a layer that goes over the shot.
+
+    The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back. A bake
+    that was stopped goes on where it was when the same command is given again. Machines of a farm bake parts of the
+    range with --frames; neuralocks join makes one bake of them.
+    """
+    from ..baking.bake import bake
+    from .progress import progress_bar
+
+    with progress_bar("baking") as progress:
+        result = bake(
+            shot, out, model, groom or None, skeleton, head, frames,
+            joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
+            resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
+            jobs=jobs, progress=progress,
+        )  # fmt: skip
+    _bake_report(result, as_json)
+
+
+def join_command(
+    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of a shot's range, in any order.")],
+    out: Out,
+    as_json: AsJson = False,
+) -> None:
+    """Make one bake out of those of parts of a shot's range, as the machines of a farm write them.
+
+    The file is the same, byte for byte, as if all frames had been baked at once.
+    """
+    from ..baking.join import join
+    from .progress import progress_bar
+
+    with progress_bar("joining") as progress:
+        result = join(parts, out, progress=progress)
+    note(result.notes)
+    if as_json:
+        print_json(vars(result) | {"path": str(result.path)})
+    else:
+        first, last = result.frames[0], result.frames[-1]
+        typer.echo(f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} of {len(parts)} parts")
+
+
+def simulate_command(
+    shot: Annotated[Path, typer.Argument(help="USD stage with an animated skeleton and at least one groom.")],
+    out: Out,
+    groom: Grooms = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    joint: Joints = None,
+    frames: Frames = None,
+    subframes: Subframes = 1,
+    material: Materials = None,
+    strands: Annotated[
+        int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
+    ] = None,
+    cuts: Cuts = None,
+    volume: Annotated[
+        float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
+    ] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Bake with the slow reference solver instead of the network, to compare with (extra 'compare')."""
+    from ..baking.simulate import simulate
+    from .progress import progress_bar
+
+    with progress_bar("simulating") as progress:
+        result = simulate(
+            shot, out, groom or None, skeleton, head, frames,
+            joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,
+            cuts=cut_codes(cuts), progress=progress,
+        )  # fmt: skip
+    _bake_report(result, as_json)
+
+
+def _bake_report(result, as_json: bool) -> None:
+    note(result.notes)
+    if as_json:
+        print_json(
+            {
+                "path": str(result.path),
+                "frames": result.frames,
+                "grooms": result.grooms,
+                "notes": result.notes,
+                "seconds": round(result.seconds, 3),
+                "resumed": result.resumed,
+            }
+        )
+        return
+    for groom in result.grooms:
+        typer.echo(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}")
+    taken = f", {result.resumed} taken over from an interrupted bake" if result.resumed else ""
+    first, last = result.frames[0], result.frames[-1]
+    typer.echo(
+        f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} in {result.seconds:.1f} s{taken}"
+    )

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all commands share: expected errors become one line on stderr and an exit status."""
+
+import functools
+import importlib
+import inspect
+import json
+import sys
+from pathlib import Path
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..border.stopping import deferred, stoppable
+
+
+def command_of(app: typer.Typer):
+    """A decorator like `app.command(name)` for functions that raise NeuralocksError; `usd` says whether they need USD."""
+
+    def command(name: str, usd: bool = True):
+        def wrap(function):
+            @app.command(name, help=_paragraphs(function.__doc__))
+            @functools.wraps(function)
+            def run(*args, **kwargs):
+                try:
+                    with stoppable():
+                        _check_words(kwargs)
+                        if usd:
+                            _load_usd()
+                        return function(*args, **kwargs)
+                except NeuralocksError as error:
+                    one_line(f"error: {error}")
+                    raise typer.Exit(1) from None
+                except BrokenPipeError:
+                    raise  # the reader has seen enough: typer ends without a word
+                except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
+                    one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
+                    raise typer.Exit(1) from None
+                except MemoryError:
+                    one_line("error: not enough memory; work on fewer strands at a time, or on a larger machine")
+                    raise typer.Exit(1) from None
+
+            return run
+
+        return wrap
+
+    return command
+
+
+def _load_usd() -> None:
+    """Load all of USD that anything here asks for: Ctrl-C in the middle of it would be lost, and its modules half made."""
+    with deferred():
+        for name in ("Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdSkel", "UsdUtils", "Vt"):
+            importlib.import_module(f"pxr.{name}")
+
+
+def _paragraphs(text: str) -> str:
+    """A docstring whose lines are broken where the terminal ends, not where the source does."""
+    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+
+
+def _check_words(given: dict) -> None:
+    """Refuse empty words, such as a script's variable that was never set leaves behind, and files whose names are no
+    text: USD takes UTF-8 alone, whatever the disk allows.
+    """
+    for name, value in given.items():
+        for word in value if isinstance(value, list) else [value]:
+            if isinstance(word, str) and not word.strip():
+                raise NeuralocksError(f"{name.replace('_', '-')}: is empty; give a value, or leave it out")
+            try:
+                str(word if isinstance(word, Path) else "").encode()
+            except UnicodeEncodeError:
+                name = str(word).encode("utf-8", "backslashreplace").decode()
+                raise NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it") from None
+
+
+def one_line(text) -> None:
+    """Print to stderr, without line breaks."""
+    print(" ".join(str(text).split()), file=sys.stderr)
+
+
+def note(notes) -> None:
+    """Print what a user should know."""
+    for text in notes:
+        one_line(f"note: {text}")
+
+
+def counted(number: int, thing: str) -> str:
+    """How many there are of a thing, in words."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def print_json(value) -> None:
+    """Print a plain value for a machine to read."""
+    typer.echo(json.dumps(value, indent=1, default=str))

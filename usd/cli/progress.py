@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A progress bar with the time left, for what takes more than two seconds; in a log, a line now and then."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ..border.stopping import check
+
+QUIET_FOR = 2.0
+"""[s] Work that is done by then shows no bar."""
+LOG_EVERY = 20.0
+"""[s] Between two lines where stderr is no terminal."""
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[..., None]]:
+    """A callback (done, total, message) that draws on stderr, or writes lines where that is no terminal.
+
+    It raises KeyboardInterrupt where work went on after one.
+    """
+    shown = _Bar(title) if sys.stderr.isatty() else _Log(title)
+
+    def say(done: int, total: int, message: str = "") -> None:
+        check()
+        shown(done, total, message)
+
+    try:
+        yield say
+    finally:
+        shown.close()
+
+
+class _Log:
+    """A line now and then, with the time left at the speed so far."""
+
+    def __init__(self, title: str):
+        self._title = title
+        self._written = self._since = time.monotonic()
+        # A resumed job begins in the middle, one step follows another, and some prepare long before they begin: only
+        # what is done of this step, since it got going, tells the speed.
+        self._first, self._last = 0, (0, -1)
+
+    def __call__(self, done: int, total: int, message: str = "") -> None:
+        now = time.monotonic()
+        if total != self._last[1] or done < self._last[0] or done == self._first:
+            self._since, self._first = now, done
+        self._last = done, total
+        if now - self._written <= LOG_EVERY:
+            return
+        self._written, gone = now, done - self._first
+        # The first frame of a bake takes as long as a hundred others: of one alone, hours were foretold.
+        left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if 100 * gone > total else ""
+        print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Nothing to put away."""
+
+
+class _Bar:
+    """A bar of the terminal, from QUIET_FOR on; begun anew when another step follows."""
+
+    def __init__(self, title: str):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[message]}"),
+        )
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._title, self._began = title, time.monotonic()
+        self._task, self._last = None, (0, -1)
+
+    def __call__(self, done: int, total: int, message: str = "") -> None:
+        another = total != self._last[1] or done < self._last[0]
+        self._last = done, total
+        if self._task is None:
+            if time.monotonic() - self._began < QUIET_FOR:
+                return
+            self._bar.start()
+            self._task = self._bar.add_task(self._title, total=total, message="")
+        elif another:
+            self._bar.reset(self._task, total=total)
+        self._bar.update(self._task, completed=done, total=total, message=message)
+
+    def close(self) -> None:
+        """Take the bar off the terminal."""
+        if self._task is not None:
+            self._bar.stop()

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks rig`: train, bake, inspect and export rigged mesh hair."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+from .command import command_of, counted, note, print_json
+from .options import AsJson, Cuts, Head, Joints, Seed, Skeleton, cut_codes, pairs
+from .progress import progress_bar
+
+app = typer.Typer(no_args_is_help=True, add_completion=False)
+command = command_of(app)
+
+Chains = Annotated[list[str] | None, typer.Option(help="Name pattern of hair chains' first joints, such as 'Hair*_1'.")]
+Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
+
+
+@command("train")
+def train(
+    character: Annotated[Path, typer.Argument(help="USD file with a skinned character and hair joints.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write, *.neuralocks.")],
+    dynamic: Annotated[
+        bool, typer.Option("--dynamic/--quasi-static", help="Learn lag, swing and settling, or held poses only.")
+    ] = True,
+    seconds: Annotated[float | None, typer.Option(help="Seconds to descend; 120, and 75 quasi-static.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
+    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
+    clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
+    bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
+    weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
+    damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]. Dynamic only.")] = None,
+    seed: Seed = 0,
+    chains: Chains = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    joint: Joints = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train a tiny network for the hair joints of one rig. No data is needed."""
+    from neuralocks_core import model as model_file
+
+    model_file.named(out)
+    changed = {"bend": bend, "weight": weight, "damping": damping}
+    _check_amounts(dynamic, seconds, steps, hidden, clips, changed)
+    from ..rig.train import train_rig
+
+    with progress_bar("training") as progress:
+        model = train_rig(
+            character,
+            out,
+            dynamic=dynamic,
+            seconds=seconds,
+            steps=steps,
+            hidden=hidden,
+            clips=clips,
+            material={name: value for name, value in changed.items() if value is not None},
+            seed=seed,
+            chains=chains,
+            head=head,
+            skeleton=skeleton,
+            joints=pairs(joint, "--joint"),
+            command=shlex.join(["neuralocks", *sys.argv[1:]]),
+            tell=note,
+            progress=progress,
+        )
+    if as_json:
+        print_json({"model": str(out), "training": model.training, "report": model.report})
+    else:
+        typer.echo(
+            f"{out}: {counted(len(model.chains), 'hair joint')} in {counted(len(model.chains.roots), 'chain')}, "
+            f"{model.training['steps']} steps"
+        )
+        for line in report_lines(model.report):
+            typer.echo(line)
+
+
+def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
+    """Refuse numbers that no training can use, before anything is read; None stands for a default."""
+    if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
+        raise NeuralocksError(
+            "--seconds must lie between 1 and 86400, --steps between 1 and 10 million; leave them out for the defaults"
+        )
+    if hidden is not None and not 1 <= hidden <= 256:
+        raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
+    if clips is not None and not 2 <= clips <= 10000:
+        raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
+    if not dynamic and (clips is not None or material["damping"] is not None):
+        raise NeuralocksError("--clips, --damping: nothing for them to do in held poses; leave out --quasi-static")
+    for name, value in material.items():
+        if value is not None and not 1e-6 < value < 1e4:
+            raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
+
+
+@command("bake")
+def bake(
+    shot: Annotated[Path, typer.Argument(help="USD file with the animated character.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Override layer to write.")],
+    model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
+    frames: Annotated[
+        str | None, typer.Option(help="A:B[:STEP] of samples beside the animation's own; the shot's range if left out.")
+    ] = None,
+    subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
+    ] = False,
+    strength: Annotated[
+        float, typer.Option(help="Motion strength of a dynamic model, from 0 to 2; 1 is as trained.")
+    ] = 1.0,
+    cuts: Cuts = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    joint: Joints = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write the hair joints' animation as an override layer of the shot."""
+    from ..rig.bake import bake_rig
+
+    with progress_bar("baking") as progress:
+        result = bake_rig(
+            shot,
+            out,
+            model,
+            skeleton=skeleton,
+            head=head,
+            frames=frames,
+            subframes=subframes,
+            loop=loop,
+            strength=strength,
+            cuts=cut_codes(cuts),
+            joints=pairs(joint, "--joint"),
+            progress=progress,
+        )
+    note(result.notes)
+    if as_json:
+        print_json(vars(result))
+    else:
+        typer.echo(
+            f"{result.path}: {counted(result.joints, 'hair joint')}, {counted(result.samples, 'sample')}, in {result.animation}"
+        )
+
+
+@command("export-c", usd=False)
+def export_c(
+    model: Model = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Header to write.")] = Path("hair.h"),
+    prefix: Annotated[str, typer.Option(help="Prefix of all names in it.")] = "nl_hair",
+) -> None:
+    """Write one self-contained C99 header, usable from C++, and a worked example beside it."""
+    from neuralocks_core.rig.export_c import example_beside
+    from neuralocks_core.rig.export_c import export_c as write
+    from neuralocks_core.rig.network import RigModel
+
+    path = write(RigModel.load(model), out, prefix)
+    typer.echo(f"{path} and {example_beside(path)}")
+
+
+@command("export-onnx", usd=False)
+def export_onnx(
+    model: Model = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="ONNX file to write.")] = Path("hair.onnx"),
+) -> None:
+    """Write the network as ONNX with a batch axis, for crowds."""
+    from neuralocks_core import model as model_file
+    from neuralocks_core.files import atomic_write
+    from neuralocks_core.rig import RigModel
+    from neuralocks_core.runtime import graph_session
+
+    if out.suffix.lower() != ".onnx":
+        raise NeuralocksError(f"{out}: a graph ends in .onnx; choose such a name")
+    RigModel.load(model)  # says what is wrong with the file
+    file = model_file.read(model or model_file.shipped("rig"), "rig")
+    graph_session(file, "rig.onnx")
+    with atomic_write(out) as part:
+        part.write_bytes(file.graphs["rig.onnx"])
+    typer.echo(
+        f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz; neuralocks export writes a description "
+        "of both and the joints' names beside it, neuralocks rig export-c the code that makes the features"
+    )
+
+
+@command("inspect")
+def inspect(
+    character: Annotated[Path, typer.Argument(help="USD file.")],
+    chains: Chains = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    joint: Joints = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the hair chains of a rig with their lengths and joint counts."""
+    from ..rig.stage import check_patterns, describe_chains, read_rigged_hair, rigged_notes
+
+    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"))
+    check_patterns(hair, chains)
+    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.source)
+    if as_json:
+        print_json({"skeleton": hair.source.path, "chains": rows, "notes": notes})
+        return
+    typer.echo(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
+    for row in rows:
+        typer.echo(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length']:.1f} cm")
+    note(notes)
+
+
+def report_lines(report: dict) -> list[str]:
+    """A model's report in words."""
+    lines = []
+    if "energy" in report:
+        e = report["energy"]
+        lines.append(
+            f"held poses: energy {e['network']:.3f} m^2/s^2, direct optimisation {e['optimised']:.3f}, carried rigidly "
+            f"{e['rigid']:.3f}"
+        )
+    if "tip_error_mm" in report:
+        off = report["tip_error_mm"]
+        lines.append(
+            f"held poses: tips {off['network']:.0f} mm from where direct optimisation has them (carried rigidly "
+            f"{off['rigid']:.0f} mm)"
+        )
+    if "most_turned" in report:
+        turned = report["most_turned"]
+        line = f"held poses: no joint is turned more than '{turned['joint']}', by {turned['degrees']:.0f} degrees in the mean"
+        lines.append(
+            line + ("; look at it, and train with another --seed if it stands out" if turned["degrees"] > 60 else "")
+        )
+    for name, words in (("network", "network"), ("optimised", "direct optimisation"), ("rigid", "carried rigidly")):
+        if f"penetration_{name}" in report:
+            p = report[f"penetration_{name}"]
+            lines.append(
+                f"inside the body, {words}: {p['percent']:.2f} % of vertices, at most {p['worst_mm']:.1f} mm "
+                f"in {p['poses']} poses"
+            )
+    for name, error in report.get("motion_error", {}).items():
+        line = f"in motion, {name}: error against the simulation {error:.3f} (carried rigidly 1)"
+        if name in report.get("motion_depth", {}):
+            depth = report["motion_depth"][name]
+            line += f"; {depth['percent']:.2f} % of vertices in the body, at most {depth['worst_mm']:.1f} mm"
+        if name in report.get("rates", {}):
+            rates = ", ".join(f"{gap} mm off at {rate}" for rate, gap in report["rates"][name].items())
+            jump, cost = report["teleport"][name], report["cost"][name]
+            line += f"; {rates} from 60 fps; a teleport flings it {jump['flung_mm']} mm for {jump['seconds']} s"
+            line += f"; {cost['multiply_adds']} multiply-adds and {cost['bytes_carried_on']} bytes an avatar"
+        lines.append(line)
+    return lines

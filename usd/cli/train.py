@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks train`."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..border.stopping import stopped
+from .command import note
+from .options import Head, Joints, Out, Seed, Skeleton, pairs
+
+SEVERAL = ("--groom", "--motion")
+"""Options that take as many words as follow: a shell's `--motion clips/*.bvh`."""
+
+
+def one_by_one(words: list[str]) -> list[str]:
+    """`--groom A B` as `--groom A --groom B`."""
+    option, result = None, []
+    for word in words:
+        if word.startswith("-"):
+            option = word if word in SEVERAL else None
+        elif option and result[-1] != option:
+            result.append(option)
+        result.append(word)
+    return result
+
+
+def train_command(
+    character: Annotated[Path, typer.Option(help="USD character: skeleton, skinned mesh, blend shapes.")],
+    out: Out,
+    groom: Annotated[list[str] | None, typer.Option(help="USD grooms, or 'library' for the procedural styles.")] = None,
+    motion: Annotated[
+        list[str] | None, typer.Option(help="BVH or USD motions; made-up motion is always added.")
+    ] = None,
+    minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
+    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Begin with what this model has learned, with the 'shipped' one or with 'nothing'.  [default: shipped, where it fits]",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")
+    ] = False,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    joint: Joints = None,
+    static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
+    rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
+    processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
+    method: Annotated[
+        str,
+        typer.Option(
+            help="rollouts: learn from simulations made meanwhile; selfsupervised: the paper's own, from the physics alone."
+        ),
+    ] = "rollouts",
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="With selfsupervised, the paper's network, bending, adhesion and damping."),
+    ] = False,
+    setting: Annotated[
+        list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; a wrong name lists them.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    seed: Seed = 0,
+    credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
+    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
+) -> None:
+    """Train a strand model for a character (extra 'train')."""
+    from ..models.train import train
+    from .progress import progress_bar
+
+    settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
+    with _telling_how_to_go_on(out), progress_bar("training") as progress:
+        path = train(
+            character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
+            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, rollouts=rollouts, processes=processes,
+            credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
+        )  # fmt: skip
+    typer.echo(str(path))
+
+
+@contextmanager
+def _telling_how_to_go_on(out: Path) -> Iterator[None]:
+    """After Ctrl-C: what a training has kept is thrown away by one that begins anew."""
+    try:
+        yield
+    except BaseException:
+        if stopped():
+            from neuralocks_core.training.work import work_folder
+
+            with suppress(NeuralocksError):  # nothing kept yet
+                work_folder(out, resume=True)
+                note(["the same command with --resume goes on from here, without it it begins anew"])
+        raise

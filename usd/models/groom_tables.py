@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an engine needs of a shot's grooms beside the graphs: everything about each strand that no frame changes.
+
+Locks, scalp frames, resampling and body measures are worked out once, here, so that a runtime elsewhere makes the boundary
+vector, runs two graphs a frame, and gets the very hair that a bake has.
+"""
+
+import re
+
+import numpy as np
+
+from neuralocks_core import model as model_file
+from neuralocks_core.deformation.clumping import Locks
+from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
+from neuralocks_core.rotation import rotation_part
+from neuralocks_core.runtime import StrandModel
+
+from ..baking.placing import GroomPlacer
+from ..shot.stage import StageGroom, read_shot
+
+ARRAYS = {
+    "rest": "(S, 24, 3) float32, the strands at rest in canonical space [m]: even in arc length of the author's, and where "
+    "these wind finer, the line that they wind around. A bake's points are these strands where a groom is already so; any "
+    "other groom's own points follow them",
+    "valid": "(S,) bool, false where a strand is one point: its displacement is 0",
+    "strand_part": "(S, 256) float32, input of tail.onnx",
+    "anchor": "(S, 72) float32, input of tail.onnx, for the default material and the body shape of the first frame: "
+    "`offsets` of tail.onnx with `anchor` zero and the frame `held`",
+    "edges": "(S, 72) float32, input of tail.onnx",
+    "held": "(F,) float32, boundary vector of the bind pose, held",
+    "facing": "(3, 3) float64, rotation from bind-world to canonical axes",
+    "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint: its world transform times this "
+    "takes strands to the world",
+    "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints named, in their order",
+    "stance": "(p, 3, 3) float64, of the pose joints in their order",
+    "length": "(S,) float32, of each strand [m], for `clumping`",
+    "lock": "(S,) int32, each strand's lock, a row of the three that follow",
+    "lock_strand_part": "(L, 256) float32, input of tail.onnx for the mean strand of each lock",
+    "lock_anchor": "(L, 72) float32, as `anchor`",
+    "lock_edges": "(L, 72) float32, as `edges`",
+}
+"""Arrays of a groom's file -> what they are."""
+
+
+def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, joints=None) -> dict[str, dict]:
+    """Write `NAME.npz` with ARRAYS of each groom of a shot.
+
+    Args:
+        shot: the USD file.
+        model: path of the strand model.
+        put: file name -> path to write it to.
+        grooms, skeleton, head, joints: as for `bake`.
+
+    Returns:
+        File name -> {"prim", "strands", "joints": joint paths of head, upper chest and the pose joints}.
+
+    Raises:
+        NeuralocksError: what stops a bake of the shot.
+    """
+    runner = StrandModel(model_file.read(model, "strands"))
+    read, written = read_shot(shot, grooms, skeleton, head, joints), {}
+    names = file_names([item.path for item in read.grooms])
+    for name, item in zip(names, read.grooms, strict=True):
+        arrays, joints = tables(item, runner)
+        np.savez(put(name), **arrays)
+        written[name] = {"prim": item.path, "strands": len(arrays["rest"]), "joints": joints}
+    return written
+
+
+def file_names(paths: list[str]) -> list[str]:
+    """A file name for each prim path; they differ in more than case, which some disks do not tell apart."""
+    names: list[str] = []
+    for path in paths:
+        stem = name = re.sub(r"\W+", "_", path.strip("/"))
+        number = 1
+        while name.casefold() in {other.casefold() for other in names}:
+            number += 1
+            name = f"{stem}_{number}"
+        names.append(name)
+    return [f"{name}.npz" for name in names]
+
+
+def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], list[str]]:
+    """ARRAYS of one groom, and the joints whose motion its boundary vector is made of."""
+    character = item.attachment.character
+    sampler = model.sampler(character, item.attachment.rig.clip)
+    strands, held = GroomPlacer(item).strands, sampler.held_bind()
+    locks = Locks.of(strands)
+    session, led = StrandSession(model, strands), StrandSession(model, locks.strands)
+    session.anchor(held)
+    led.anchor(held)
+    skeleton = character.skeleton
+    arrays = {
+        "rest": strands.rest,
+        "valid": strands.valid,
+        "strand_part": session.strand_part,
+        "anchor": session.anchor_offsets,
+        "edges": rest_edges(strands.rest),
+        "held": held,
+        "facing": character.facing,
+        "canonical_to_head": character.inverse_bind[character.head] @ character.canonical_to_bind,
+        "bind": rotation_part(skeleton.bind[sampler.joints], "bind pose"),
+        "stance": sampler.stance,
+        "length": strands.length.astype(np.float32),
+        "lock": locks.lock.astype(np.int32),
+        "lock_strand_part": led.strand_part,
+        "lock_anchor": led.anchor_offsets,
+        "lock_edges": rest_edges(locks.strands.rest),
+    }
+    return arrays, [skeleton.names[joint] for joint in sampler.joints]

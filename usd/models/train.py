@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks train`: from files to a model file."""
+
+import dataclasses
+import enum
+import math
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core import model
+from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.progress import Progress
+
+METHODS = ("rollouts", "selfsupervised")
+SHIPPED, NOTHING = "shipped", "nothing"
+"""Words for what a training begins with."""
+MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
+"""Beyond these it is a slip of the finger: a hundred thousand processes take a machine down."""
+
+
+def train(
+    character,
+    grooms,
+    motion,
+    out,
+    settings: dict,
+    *,
+    method: str = "rollouts",
+    paper: bool = False,
+    skeleton: str | None = None,
+    head: str | None = None,
+    joints: dict[str, str] | None = None,
+    begin: str | Path | None = None,
+    resume: bool = False,
+    rollouts: int = 1200,
+    processes: int = 1,
+    credits=(),
+    keep_work: bool = False,
+    tell: Callable[[list[str]], None] | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Train a strand model.
+
+    Args:
+        character: USD file.
+        grooms: USD files, or "library".
+        motion: BVH or USD files.
+        out: `.neuralocks` file to write.
+        settings: fields of `training.regression.RegressionOptions`, or of
+            `training.selfsupervised.SelfSupervisedOptions`; values may be words.
+        method: "rollouts" of the solver, or "selfsupervised" as in the paper.
+        paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
+        skeleton, head, joints: as for `bake`.
+        begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
+            it reads are the shipped model's.
+        resume: go on with an interrupted training.
+        rollouts, processes: how many simulations, made by how many processes.
+        credits: lines for the model card.
+        keep_work: leave the simulations and the checkpoint beside the model.
+        tell: called with notes for the user before the training, whose minutes some of them would save.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: a file cannot be used, a setting is unknown, or the extra `train` is missing.
+    """
+    if method not in METHODS:
+        raise NeuralocksError(f"--method {method}: is unknown; choose one of {', '.join(METHODS)}")
+    if paper and method != "selfsupervised":
+        raise NeuralocksError("--paper: goes with --method selfsupervised only; add it, or leave --paper out")
+    try:
+        import onnx  # noqa: F401  (reads and writes models)
+        import torch
+        import warp  # noqa: F401  (the solver's)
+    except ImportError as error:
+        raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+    from neuralocks_core.training.moment_options import SelfSupervisedOptions
+    from neuralocks_core.training.networks import MOTIONS, OUTPUTS
+    from neuralocks_core.training.regression import RegressionOptions
+    from neuralocks_core.training.selfsupervised import paper_boundary
+    from neuralocks_core.training.train import train_strands
+    from neuralocks_core.training.work import BEGINNING, work_folder
+
+    from .training_scene import training_scene
+
+    kind = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
+    values = parsed(kind, settings)
+    _check_amounts({**values, "rollouts": rollouts, "processes": processes})
+    options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
+    _check_choices(options, {"output": OUTPUTS, "motion": MOTIONS, "optimiser": ("muon", "adamw")})
+    try:
+        torch.empty(0, device=options.device)
+    except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
+        raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
+    out = as_path(out, "out")
+    history = {"spec": paper_boundary()} if paper else {}
+    work = work_folder(out, resume)
+    if begin == NOTHING and resume and (work / BEGINNING).exists():
+        raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
+    begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
+    scene = training_scene(
+        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, tell=tell, **history
+    )
+    command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
+    return train_strands(
+        scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
+        credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
+    )  # fmt: skip
+
+
+def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:
+    """The model that a training begins with, checked before anything large is read.
+
+    Raises:
+        NeuralocksError: the one named is none, or differs from what is trained.
+    """
+    from neuralocks_core.training.beginning import Beginning
+    from neuralocks_core.training.regression import RegressionOptions
+
+    if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
+        return None
+    beginning = Beginning(model.shipped() if begin in (None, SHIPPED) else begin)
+    if begin is None and beginning.differences(spec, options):
+        return None
+    beginning.check(spec, options)
+    return beginning.path
+
+
+def _check_amounts(given: dict) -> None:
+    for name, most in MOST.items():
+        value = given.get(name)
+        if isinstance(value, (int, float)) and not 0 < value <= most:
+            raise NeuralocksError(f"--{name} {value:g}: must be above 0, and at most {most:,}")
+
+
+def _check_choices(options, known: dict[str, tuple[str, ...]]) -> None:
+    """Known before the simulations begin: words that are among the known ones, counts from 1, weights not below 0."""
+    for name, default in ((field.name, field.default) for field in dataclasses.fields(options)):
+        value = getattr(options, name)
+        if name in known and value not in known[name]:
+            raise NeuralocksError(f"--set {name}={value}: is unknown; give {'|'.join(known[name])}")
+        if name == "seed" and not 0 <= value < 2**32:
+            raise NeuralocksError(f"--seed {value}: must be a whole number from 0, below 2^32")
+        if type(default) is int and name != "seed" and value < 1:
+            raise NeuralocksError(f"--set {name}={value}: must be at least 1")
+        if isinstance(default, float | tuple) and not all(v >= 0 for v in np.atleast_1d(value)):
+            raise NeuralocksError(f"--set {name}={value}: must not be below 0")
+
+
+def parsed(kind: type, settings: dict) -> dict:
+    """Settings with words turned into what the fields of a dataclass hold.
+
+    Raises:
+        NeuralocksError: a name is no field, or a word is no such value.
+    """
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    result = {}
+    for name, value in settings.items():
+        if name not in fields:
+            raise NeuralocksError(f"--set {name}: is no option of this method; it has {', '.join(sorted(fields))}")
+        result[name] = _value(name, value, fields[name].default) if isinstance(value, str) else value
+    return result
+
+
+def _value(name: str, word: str, default):
+    """A word as a value of the default's kind."""
+    try:
+        if isinstance(default, bool):
+            return {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}[word.lower()]
+        if isinstance(default, enum.Enum):
+            return {member.name.lower(): member for member in type(default)}[word.lower()]
+        if isinstance(default, tuple):
+            return tuple(float(part) for part in word.split(","))
+        if default is None or isinstance(default, int):
+            return int(word)
+        if isinstance(default, float):
+            number = float(word)
+            if not math.isfinite(number):
+                raise ValueError
+            return number
+    except (KeyError, ValueError):
+        wanted = (
+            "|".join(m.name.lower() for m in type(default)) if isinstance(default, enum.Enum) else f"like {default}"
+        )
+        raise NeuralocksError(f"--set {name}={word}: is not a value for it; give {wanted}") from None
+    return word

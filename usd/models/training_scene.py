@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `neuralocks train` learns from: a character, grooms and motion, out of files."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.evaluation.comparison import whole_locks
+from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles import STYLES
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands.strand_set import StrandSet, strands_on
+from neuralocks_core.training.rollouts import TrainingScene
+
+from ..assets.grow import Barber
+from ..border.damage import names_damage
+from ..border.placement import Placement
+from ..border.units import open_stage
+from ..shot.attach import attach
+from ..shot.curves import find_curves, read_groom
+from ..shot.notes import first_of, unfound, unlikely_head
+from ..shot.stage import StageRig, read_rigs
+
+LIBRARY = "library"
+"""A groom of this name stands for every style of the procedural library, grown on the character."""
+MOST_STRANDS = 3000
+"""Strands of a groom that are learned from, as in the paper; the network deforms all of them afterwards."""
+
+
+def training_scene(
+    character: str | Path,
+    grooms: list[str] | tuple[str, ...] = (),
+    motion: list[str] | tuple[str, ...] = (),
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    joints: dict[str, str] | None = None,
+    seed: int = 0,
+    tell: Callable[[list[str]], None] | None = None,
+    **settings,
+) -> TrainingScene:
+    """Read a character, its grooms and motion for training.
+
+    Args:
+        character: a USD file with a skeleton and skinned meshes.
+        grooms: USD files with BasisCurves that lie on the character's bind pose, or "library"; the character's own if
+            none.
+        motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
+        skeleton: prim path of the skeleton wanted, where there are several.
+        head: joint that is the head, where its name does not tell.
+        joints: semantic joint -> joint, where names do not tell.
+        seed: of everything random.
+        tell: called with notes for the user.
+        **settings: further fields of TrainingScene.
+
+    Raises:
+        NeuralocksError: a file cannot be used, or there is no hair.
+    """
+    rigs = read_rigs(character, skeleton, head, joints)
+    rig = rigs[0]
+    if "head" not in rig.character.humanoid:
+        raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
+    notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
+    found: list[StrandSet] = []
+    for source in grooms or [str(character)]:
+        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, notes)
+    clips = tuple(read_clip(path, rig.character) for path in motion)
+    if tell:
+        tell(list(dict.fromkeys(notes)))
+    return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
+
+
+@names_damage
+def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> list[StrandSet]:
+    stage = open_stage(source)
+    prims = find_curves(stage)
+    if not prims:
+        raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
+    found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
+    # Beside hair, the grass of a set is none.
+    near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
+    found = [_strands(read_groom(prim, a.to_bind, notes), a.character) for prim, a in near]
+    if not any(strands.valid.any() for strands in found):
+        raise NeuralocksError(f"{source}: no strand has two distinct points; there is nothing to learn from")
+    return [strands for strands in found if strands.valid.any()]
+
+
+def _library(character: Character, seed: int) -> list[StrandSet]:
+    barber = Barber(character)
+    return [_strands(barber.grow(style, MOST_STRANDS, seed + i), character) for i, style in enumerate(STYLES)]
+
+
+def _strands(groom: Groom, character: Character) -> StrandSet:
+    strands = strands_on(character, groom)
+    if len(strands.rest) <= MOST_STRANDS:
+        return strands
+    return strands.subset(whole_locks(strands, MOST_STRANDS))  # neighbours stay neighbours
+
+
+def read_clip(path: str, character: Character) -> Clip:
+    """Motion of a file on a character: BVH is retargeted, a skeleton of USD must have the same joints.
+
+    Raises:
+        NeuralocksError: it holds no such motion.
+    """
+    if Path(path).suffix.lower() == ".bvh":
+        from neuralocks_core.animation.retarget import retarget
+        from neuralocks_core.formats.bvh import read_bvh
+
+        return retarget(read_bvh(path), character)
+    clips = [rig.clip for rig in read_rigs(path) if rig.character.skeleton.names == character.skeleton.names]
+    if not clips:
+        raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
+    moving = [clip for clip in clips if len(clip.times) > 1]
+    if not moving:
+        raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
+    return moving[0]

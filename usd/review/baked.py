@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bake read back: what a renderer would see of it, in metres."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from pxr import UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview.film import Scene
+from neuralocks_core.rotation import transformed
+
+from ..shot.recorded import recorded_cuts, recorded_joint
+from ..shot.stage import Shot, StageGroom, read_shot
+
+MOST_BODY_POINTS = 400_000
+"""Largest number of body points drawn in a preview."""
+
+
+@dataclass(frozen=True)
+class Baked:
+    """A stage whose grooms have point samples.
+
+    Attributes:
+        shot: the stage.
+        codes: time codes of the samples (T,), ascending.
+    """
+
+    shot: Shot
+    codes: np.ndarray = field(repr=False)
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """(T,) [s]."""
+        return self.shot.border.seconds(self.codes)
+
+    def world(self, item: StageGroom, code: float) -> np.ndarray:
+        """Points (P, 3) of a groom at a time code, world metres.
+
+        Raises:
+            NeuralocksError: they are missing, not as many as at rest, or not finite.
+        """
+        points = UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(code)
+        points = np.zeros((0, 3)) if points is None else np.asarray(points, float)
+        if len(points) != len(item.groom.points):
+            raise NeuralocksError(
+                f"{item.path}: {len(points)} points at time code {code:g}, {len(item.groom.points)} at rest; bake again"
+            )
+        if not np.isfinite(points).all():
+            raise NeuralocksError(f"{item.path}: points at time code {code:g} are not finite; bake again")
+        return transformed(points, self.shot.border.to_core @ item.placement.at(code))
+
+    def canonical(self, item: StageGroom, code: float) -> np.ndarray:
+        """The same in canonical space, where the rigidly carried groom stands still."""
+        joints = item.attachment.rig.joints_at(code)
+        return transformed(self.world(item, code), np.linalg.inv(item.attachment.character.canonical_to_world(joints)))
+
+    def scene(self) -> Scene:
+        """All grooms of the first groom's skeleton and its body, for a preview."""
+        first = self.shot.grooms[0].attachment
+        items = [item for item in self.shot.grooms if item.attachment.rig is first.rig]
+        character, rig = first.character, first.rig
+        body = character.body if character.body is not None and len(character.body.points) <= MOST_BODY_POINTS else None
+        head = np.stack([character.carrying(rig.joints_at(code)) for code in self.codes])
+        to_bind = character.canonical_to_bind
+
+        def pose(frame: int) -> np.ndarray:
+            code = self.codes[frame]
+            shape = rig.clip.shape_at(self.times[frame : frame + 1])[0]
+            return character.posed_body(rig.joints_at(code), shape)
+
+        return Scene(
+            times=self.times,
+            head=head,
+            facing=character.facing,
+            centre=transformed(character.head_centre, to_bind),
+            counts=np.concatenate([item.groom.counts for item in items]),
+            rest=np.concatenate([item.groom.points for item in items]).astype(float),
+            hair=lambda frame: np.concatenate([self.world(item, self.codes[frame]) for item in items]),
+            triangles=None if body is None else body.triangles,
+            body=None if body is None else pose,
+            body_rest=None if body is None else body.points,
+        )
+
+
+def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
+    """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
+
+    Arguments are as for `bake`; a joint that its user named as the head is told by the bake. Grooms that have no samples
+    beside some that do are left out, with a note.
+
+    Raises:
+        NeuralocksError: it cannot be read, or no groom has samples.
+    """
+    shot = read_shot(path, grooms, skeleton, head, joints)
+    if head is None and (head := _named_head(shot)):
+        shot = read_shot(path, grooms, skeleton, head, joints)
+    told = [(item.attachment.rig.path, recorded_cuts(item.prim)) for item in shot.grooms]
+    told = {path: cuts for path, cuts in told if cuts is not None}
+    if told:
+        shot = read_shot(path, grooms, skeleton, head, joints, told)
+    sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
+    if not any(sampled.values()):
+        raise NeuralocksError(
+            f"{path}: its grooms have no animated points; bake it first: neuralocks bake {path} -o OUT.usdc"
+        )
+    # Exporters key what stands still once: beside moving hair that is no bake.
+    least = min(2, max(len(codes) for codes in sampled.values()))
+    items = tuple(item for item in shot.grooms if len(sampled[item.path]) >= least)
+    left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
+    codes = sorted({code for item in items for code in sampled[item.path]})
+    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left)), np.array(codes))
+
+
+def _named_head(shot: Shot) -> str | None:
+    """The joint that hair was baked with where names find another one; None where they agree, or no single one is told."""
+    told = {recorded_joint(item.prim) for item in shot.grooms if recorded_joint(item.prim) not in (None, item.joint)}
+    known = {name for rig in shot.rigs for name in rig.source.names}
+    return told.pop() if len(told) == 1 and told <= known else None

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks evaluate`: the report card of a bake."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import numpy as np
+
+from neuralocks_core import metrics
+from neuralocks_core.deformation.resolve import CLAMPED, Resolver
+from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.evaluation import comparison
+from neuralocks_core.evaluation.pose_energies import energies, stretch_energy
+from neuralocks_core.evaluation.report import Card
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import GRAVITY, G
+from neuralocks_core.progress import Progress, silent
+from neuralocks_core.runtime import StrandModel, cores
+from neuralocks_core.strands.arclength import arc_lengths
+from neuralocks_core.strands.strand_set import K, StrandSet, strands_on
+
+from ..border.damage import names_damage
+from ..shot.recorded import recorded_material
+from ..shot.stage import StageGroom
+from .baked import Baked, read_baked
+
+STRANDS = 600
+"""Strands measured of each groom, in whole locks; lengths are measured on all."""
+REFERENCE_STRANDS = 200
+COLLISION_FRAMES = 32
+"""Frames in which distances to the body are measured, evenly over the bake."""
+COLLISION_VERTICES = 200_000
+"""Most own vertices whose distances are measured, evenly along the strands."""
+SETTLED = 2.0
+"""A pose held for so long [s] should have still hair."""
+BEFORE = 10.0
+"""Most time [s] that the reference is simulated before the bake's first frame: what was earlier has died away."""
+
+
+@names_damage
+def evaluate(
+    baked,
+    reference: bool = False,
+    *,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    joints: dict[str, str] | None = None,
+    model=None,
+    material: Material | None = None,
+    progress: Progress | None = None,
+) -> Card:
+    """Measure a bake, whatever made it.
+
+    Args:
+        baked: path of the bake, or a `Baked` already read.
+        reference: simulate the same strands and compare.
+        grooms, skeleton, head, joints: as for `bake`.
+        model: with `reference`, the model whose held-pose answer is shown beside; the shipped one if left out.
+        material: what the hair is made of, for energies and reference; what each groom's bake tells if left out.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the file is no bake, or the reference is not installed.
+    """
+    if not isinstance(baked, Baked):
+        baked = read_baked(baked, grooms, skeleton, head, joints)
+    say = progress or silent
+    measured, compared, curves = {}, {}, {}
+    notes = list(baked.shot.notes)
+    if len(baked.codes) < 3:
+        notes.append("fewer than three frames: nothing is said about motion, and nothing is compared")
+    for item in baked.shot.grooms:
+        subject = _Subject(baked, item, say)
+        look = material or recorded_material(item.prim) or Material()
+        measured[item.path] = subject.measures(look)
+        if not len(subject.chosen):
+            notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
+            continue
+        curves[item.path] = {"times": baked.times, "bake": metrics.tip_curves(subject.moved)}
+        curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
+        if reference and len(baked.codes) >= 3:
+            rows, tips = subject.compared(look, model)
+            compared[item.path] = rows
+            curves[item.path] |= tips
+    return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
+
+
+class _Subject:
+    """One groom of a bake, read once: lengths of all strands, displacements of some."""
+
+    def __init__(self, baked: Baked, item: StageGroom, say):
+        self.baked, self.item, self.say = baked, item, say
+        self.character, groom = item.attachment.character, item.groom
+        every = strands_on(self.character, groom)
+        self.chosen = comparison.whole_locks(every, STRANDS)
+        self.strands: StrandSet = every.subset(self.chosen)
+        self.valid = int(every.valid.sum())
+        self._within(groom)
+        rest = self.character.canonical(groom.points.astype(float))
+        rest_lengths = metrics.strand_lengths(rest, groom.counts)
+        count, total = len(self.chosen), len(baked.codes)
+        self.moved = np.zeros((total, count, K, 3), np.float32)
+        self.collision_frames = np.unique(np.linspace(0, total - 1, min(total, COLLISION_FRAMES)).round().astype(int))
+        self.own_rest = rest[self._own]
+        self.own = np.zeros((len(self.collision_frames), len(self._own), 3), np.float32)
+        sums, taut = [], []
+        edges_at_rest = self._edge_lengths(rest)
+        for frame, code in enumerate(baked.codes):
+            points = baked.canonical(item, code)
+            sums.append(metrics.stretch(metrics.strand_lengths(points, groom.counts)[None], rest_lengths))
+            taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
+            offset = points - rest
+            self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
+            where = np.flatnonzero(self.collision_frames == frame)
+            if len(where):
+                self.own[where[0]] = points[self._own]
+            say(frame + 1, total, f"reading {item.path}")
+        self.stretch = {
+            key: float(max(s[key] for s in sums) if key.endswith("max") else np.mean([s[key] for s in sums]))
+            for key in sums[0]
+        }
+        self.stretch_energy = float(np.mean(taut))
+
+    def _within(self, groom) -> None:
+        """Where the chosen strands' network vertices lie between own vertices, and which own vertices that can move are measured."""
+        arc, length = arc_lengths(groom)
+        self._low = np.zeros((len(self.chosen), K), int)
+        self._part = np.zeros((len(self.chosen), K, 1))
+        own, edges = [], []
+        for row, strand in enumerate(self.chosen):
+            start, count = int(groom.starts[strand]), int(groom.counts[strand])
+            mine = arc[start : start + count]
+            wanted = np.linspace(0, length[strand], K)
+            low = np.clip(np.searchsorted(mine, wanted, side="right") - 1, 0, count - 2)
+            span = np.maximum(mine[low + 1] - mine[low], 1e-12)
+            self._low[row] = start + low
+            self._part[row, :, 0] = np.clip((wanted - mine[low]) / span, 0, 1)
+            free = mine > length[strand] * (CLAMPED - 1) / (K - 1) * 1.001
+            own.append(start + np.flatnonzero(free))
+            edges.append(np.arange(start, start + count - 1))
+        movable = np.concatenate(own) if own else np.zeros(0, int)
+        self._own = movable[np.linspace(0, len(movable) - 1, min(len(movable), COLLISION_VERTICES)).round().astype(int)]
+        self._edges = np.concatenate(edges) if edges else np.zeros(0, int)
+
+    def _edge_lengths(self, points: np.ndarray) -> np.ndarray:
+        """Lengths (E,) of the chosen strands' own edges [m]; points (P, 3) of the whole groom."""
+        return np.linalg.norm(points[self._edges + 1] - points[self._edges], axis=1)
+
+    def measures(self, material: Material) -> dict:
+        """Everything that needs no reference; of a groom without hair only that."""
+        baked, times = self.baked, self.baked.times
+        result = {"strands": self.item.groom.strand_count, "measured": len(self.chosen), "frames": len(baked.codes)}
+        if not len(self.chosen):
+            return result
+        strands, length = self.strands, np.maximum(self.strands.length, 1e-6)
+        rig = self.item.attachment.rig
+        joints = np.stack([rig.joints_at(code) for code in baked.codes])
+        turn = self.character.canonical_to_world(joints)[:, :3, :3]
+        down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / G)
+        result |= {**self.stretch, **self._penetration(), "droop_cm": metrics.droop(self.moved, down)}
+        if len(times) >= 3:
+            tips = self.moved[:, :, -1] - self.moved[:, :, -1].mean(axis=0)
+            swing = np.sqrt(np.square(tips).sum(axis=2).mean(axis=0)) / length
+            result["speed_cm_s"] = 100 * float(metrics.speed(self.moved, times).mean())
+            result["swing_percent"] = 100 * float(swing.mean())
+            result |= self._stops(joints)
+        sums = energies(strands.rest + self.moved, strands.rest, down, material)
+        result |= {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
+        return result | {"energy_stretch": self.stretch_energy}
+
+    def _penetration(self) -> dict:
+        resolver = self._resolver
+        if resolver.at_rest is None or not len(self._own):
+            return {}
+        rig, baked = self.item.attachment.rig, self.baked
+        frames, distance = self.collision_frames, []
+        joints = [rig.joints_at(baked.codes[frame]) for frame in frames]
+        shapes = rig.clip.shape_at(baked.times[frames])
+
+        def measured(points, joints, shape) -> np.ndarray:
+            return resolver.collider(joints, shape).distance(points, limit=0.005)[0]
+
+        with ThreadPoolExecutor(cores()) as pool:
+            for each in pool.map(measured, self.own, joints, shapes):
+                distance.append(each)
+                self.say(len(distance), len(frames), "measuring distances to the body")
+        at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
+        return metrics.penetration(np.stack(distance), at_rest)
+
+    def _stops(self, joints) -> dict:
+        """Settling after the longest stop, and what still moves once it should be over."""
+        times = self.baked.times
+        still = metrics.held(joints)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+        runs = [(a - 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        runs = [(a, b) for a, b in runs if times[b] - times[a] >= 0.5]
+        if not runs:
+            return {"settling_s": float("nan"), "jitter_mm": float("nan")}
+        moved_before = [(a, b) for a, b in runs if a > 0] or runs
+        a, b = max(moved_before, key=lambda run: times[run[1]] - times[run[0]])
+        quiet = [np.flatnonzero((times >= times[a] + SETTLED) & (times <= times[b])) for a, b in runs]
+        quiet = [frames for frames in quiet if len(frames) > 1]
+        return {
+            "settling_s": metrics.settling_time(self.moved[a : b + 1], times[a : b + 1], times[a]),
+            "jitter_mm": max(metrics.jitter(self.moved[frames]) for frames in quiet) if quiet else float("nan"),
+        }
+
+    def compared(self, material: Material, model) -> tuple[dict, dict]:
+        """Rows and tip curves beside the reference."""
+        strands, times = self.strands, self.baked.times
+        few = comparison.whole_locks(strands, REFERENCE_STRANDS)
+        some = strands.subset(few)
+        rig = self.item.attachment.rig
+        # The network knows what came before the first frame baked, so the reference must, too.
+        begun = max(min(times[0], rig.clip.start), times[0] - BEFORE)
+        known = np.concatenate([[begun], times])
+        true = comparison.simulated(self.character, some, rig.clip, known, material, progress=self.say)[1:]
+        answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
+        answers["rigid"] = np.zeros_like(true)
+        rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
+        tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}
+        return rows, tips | {"reference": metrics.tip_curves(true)}
+
+    def _held(self, material: Material, model, few) -> np.ndarray | None:
+        """The model's answer for each pose as if it were held, if there is a model."""
+        rig = self.item.attachment.rig
+        try:
+            model = model if isinstance(model, StrandModel) else StrandModel.load(model)
+        except NeuralocksError:
+            if model is not None:
+                raise
+            return None
+        session = StrandSession(model, self.strands)
+        sampler = model.sampler(self.character, rig.clip)
+        ratios = material.log_ratios()
+        session.anchor(sampler.held_bind(ratios))
+        vectors = sampler.vectors(self.baked.times, ratios, 0.0)
+        return np.stack([session.displacement(vector)[few] for vector in vectors])
+
+    @cached_property
+    def _resolver(self) -> Resolver:
+        return Resolver(self.character, self.strands, self.item.attachment.rig.clip)

@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a file holds, and what would stop or spoil a bake of it."""
+
+from pathlib import Path
+
+import numpy as np
+from pxr import UsdGeom
+
+from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.groom import Groom
+from neuralocks_core.rig.finding import NoHairChains
+from neuralocks_core.rig.rigging import assemble_rig
+from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
+
+from ..assets.groom import USD
+from ..border.damage import names_damage
+from ..border.placement import Placement
+from ..border.units import Border, open_stage
+from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
+from ..shot.attach import rig_joint
+from ..shot.curves import find_curves, read_groom
+from ..shot.hair_search import HairSearch
+from ..shot.lacking import no_groom
+from ..shot.notes import (
+    another_head,
+    composition_notes,
+    few,
+    groom_notes,
+    layer_notes,
+    left_out,
+    not_animated,
+    out_of_range,
+    partial_body,
+    rig_notes,
+    without_turn,
+)
+from ..shot.recorded import recorded, recorded_cuts
+from ..shot.stage import frame_range
+from ..shot.unnamed_head import read_each_rig
+from ..skel.source import StageRig, find_skeletons
+
+
+def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:
+    """Facts about a USD stage, a hair file, a model or a motion file, as plain values.
+
+    Args:
+        path: the file.
+        head: the joint that would be given with `--head`.
+        joints: the joints that would be given with `--joint`.
+
+    Returns:
+        `file`, `kind`, facts by kind, `stops` (what would stop a bake) and `spoils` (what a user should know).
+
+    Raises:
+        NeuralocksError: the file cannot be read at all.
+    """
+    path = as_path(path, "path")
+    kind = path.suffix.lower()
+    if kind in USD:
+        return {"file": str(path), "kind": "stage", **_stage(path, head, joints)}
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; name the file in it")
+    if not path.is_file():
+        fact = "is not a file" if path.exists() else "no such file"
+        raise NeuralocksError(f"{path}: {fact}; check the path")
+    if kind == ".neuralocks":
+        return {"file": str(path), "kind": "model", **_model(path)}
+    if kind == ".bvh":
+        return {"file": str(path), "kind": "motion", **_motion(path)}
+    from neuralocks_core import formats
+
+    groom, notes = formats.read_with_notes(path)
+    return {"file": str(path), "kind": "hair", "grooms": [groom_facts(groom)], "stops": [], "spoils": notes}
+
+
+@names_damage
+def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
+    stage = open_stage(path)
+    stops: list[str] = []
+    border = Border.of(stage)
+    spoils = composition_notes(stage, path) + layer_notes(stage, path)
+    facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
+    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+        spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
+    rigs, errors = read_each_rig(stage, find_skeletons(stage), border, head, all_shapes=True, joints=joints)
+    if rigs:
+        spoils += [left_out(error) for error in errors]
+    else:
+        stops += [str(error) for error in errors] or [
+            f"{path.name}: holds no UsdSkel skeleton; export the character with its armature"
+        ]
+    curves = find_curves(stage)
+    told = any(recorded_cuts(prim) is not None for prim in curves)
+    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
+    read = POSE_JOINTS if curves else RIG_JOINTS
+    for rig in rigs:
+        stops += without_turn(rig)
+        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + partial_body(rig, rigs)
+        spoils += [] if told else rig.cut_notes()
+    moving = [rig for rig in rigs if rig.source.animated]
+    if moving:
+        facts["frames"] = list(frame_range(stage, moving))
+        spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
+    elif rigs:
+        stops.append(not_animated(rigs[0]))
+    grooms = _grooms(curves, rigs, border, head, spoils, stops)
+    if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
+        spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
+    elif not curves:
+        stops.append(str(no_groom(stage, Path(path.name))))
+    return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
+
+
+def _rig(rig: StageRig) -> dict:
+    humanoid = rig.character.humanoid
+    found = {name: rig.source.names[joint] for name, joint in humanoid.items()}
+    body = rig.character.body
+    width = rig.character.head_width
+    return {
+        "path": rig.path,
+        "joints": len(rig.source.names),
+        "animated": rig.source.animated,
+        "samples": len(rig.source.samples),
+        "head": found.get("head"),
+        "head found by": humanoid.reasons.get("head"),
+        "head width [m]": None if width is None else round(width, 3),
+        "head height over ground [m]": _height(rig),
+        "meshes": [str(m.prim.GetPath()) for m in rig.meshes],
+        "body vertices": 0 if body is None else len(body.points),
+        "blend shapes": [] if body is None else list(body.shapes),
+        "mapping": found,
+    }
+
+
+def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
+    """Hair joints of rigged mesh hair; none is nothing to report."""
+    try:
+        chains = assemble_rig(rig.character, core_meshes(rig)).chains
+        check_orients(rig, chains)
+    except NoHairChains:
+        return []
+    except NeuralocksError as error:
+        reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
+        spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
+        return []
+    spoils += weight_notes(rig)
+    return [
+        {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
+    ]
+
+
+def _height(rig: StageRig) -> float | None:
+    if "head" not in rig.character.humanoid:
+        return None
+    return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
+
+
+def _grooms(curves, rigs, border: Border, head: str | None, spoils: list[str], stops: list[str]) -> list[dict]:
+    """Facts about the curves that are hair; what stops one of them does not keep the others from being told."""
+    search, grooms = HairSearch(rigs, head, spoils), []
+    for prim in search.filled(curves):
+        try:
+            groom = _groom(prim, search if rigs else None, border, spoils, stops)
+            grooms += [groom] if groom else []
+        except NeuralocksError as error:
+            stops.append(str(error))
+    (spoils if grooms else stops).extend(few(search.far))
+    return grooms
+
+
+def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], stops: list[str]) -> dict | None:
+    """Facts about one groom, without a search also where no skeleton is; None where the curves are no hair."""
+    placement = Placement(prim)
+    curves = UsdGeom.BasisCurves(prim)
+    facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
+    to_bind, joint = border.to_core @ placement.reference, {}
+    if search is not None:
+        try:
+            found = search.attachment(prim, placement)
+            if found is None:
+                return None
+            to_bind = found.to_bind
+            joint = {"joint": rig_joint(found), "carried by": found.how}
+        except NeuralocksError as error:
+            stops.append(str(error))
+    groom = read_groom(prim, to_bind, spoils)
+    if joint:
+        spoils += groom_notes(prim, groom, border)
+    made = recorded(prim)
+    return facts | joint | groom_facts(groom) | ({"baked with": made} if made else {})
+
+
+def groom_facts(groom: Groom) -> dict:
+    """Counts and lengths of a groom's strands [m], as plain values."""
+    _, lengths = arc_lengths(groom)
+    return {
+        "name": groom.name,
+        "strands": groom.strand_count,
+        "vertices": len(groom.points),
+        "vertices per strand": sorted({int(groom.counts.min()), int(groom.counts.max())}),
+        "strand length [m]": {
+            "shortest": round(float(lengths.min()), 4),
+            "median": round(float(np.median(lengths)), 4),
+            "longest": round(float(lengths.max()), 4),
+        },
+        "without two distinct points": count_pointlike(groom),
+    }
+
+
+def _model(path: Path) -> dict:
+    from neuralocks_core import model
+
+    file = model.read(path)
+    keep = ("format", "kind", "output", "anchored", "static", "training", "report", "credits")
+    facts = {"model": {key: file.meta.get(key) for key in keep if key in file.meta}}
+    if file.kind == "strands":
+        from neuralocks_core.runtime import StrandModel
+
+        facts["inputs of the body"] = StrandModel(file, threads=1).spec.size
+    return facts | {"stops": [], "spoils": []}
+
+
+def _motion(path: Path) -> dict:
+    from neuralocks_core.formats.bvh import read_bvh
+
+    motion = read_bvh(path)
+    clip = motion.clip
+    facts = {
+        "joints": len(motion.skeleton.names),
+        "frames": len(clip.times),
+        "seconds": round(clip.end - clip.start, 3),
+        "unit [m]": motion.unit,
+    }
+    return facts | {"stops": [], "spoils": []}
+
+
+def as_text(facts: dict, indent: int = 0) -> str:
+    """The facts for a person to read."""
+    lines = []
+    pad = "  " * indent
+    for name, value in facts.items():
+        if name in ("stops", "spoils"):
+            continue
+        if isinstance(value, dict):
+            lines += [f"{pad}{name}:", as_text(value, indent + 1)]
+        elif name == "curve":  # of a long training: thousands of lines
+            lines.append(f"{pad}curve: {len(value)} points, in --json")
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            if len(value[0]) <= 3:
+                lines.append(f"{pad}{name}:")
+            for entry in value:
+                if len(entry) <= 3:  # a line each
+                    first, *others = entry.items()
+                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
+                    continue
+                lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
+        elif isinstance(value, list):
+            lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
+        else:
+            lines.append(
+                f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
+            )
+    if indent == 0:
+        lines += [f"would stop a bake: {line}" for line in facts.get("stops", [])]
+        lines += [f"note: {line}" for line in facts.get("spoils", [])]
+    return "\n".join(line for line in lines if line)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair."""
+
+from pathlib import Path
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview import pictures as drawing
+from neuralocks_core.progress import Progress
+
+from ..border.damage import names_damage
+from ..border.stopping import deferred
+from ..border.units import Border, open_stage
+from ..rig.picture import rigged_scene
+from ..rig.stage import read_rigged_hair
+from ..shot.curves import find_curves
+from .baked import Baked, read_baked
+
+
+@names_damage
+def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress: Progress | None = None) -> Path:
+    """Draw a bake without a display; mesh hair on joints where the stage has no strands.
+
+    Args:
+        baked: path of the bake, or a `Baked` already read.
+        path: .png for a strip of pictures, .mp4 or .gif for a clip.
+        grooms, skeleton, head: as for `bake`.
+        size: width and height of one picture in pixels.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: the file is no bake, or the picture cannot be made.
+    """
+    if isinstance(baked, Baked):
+        scene, border = baked.scene(), baked.shot.border
+    else:
+        scene, border = _scene(baked, grooms, skeleton, head)
+    with deferred():  # what draws loads its modules at any time; the progress checks after each picture
+        return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
+
+
+def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:
+    """Strands where any move, else mesh hair: a character with mesh hair may have brows, or stand on grass."""
+    try:
+        baked = read_baked(path, grooms, skeleton, head)
+        return baked.scene(), baked.shot.border
+    except NeuralocksError as error:
+        no_strands = error
+    try:
+        rigged = read_rigged_hair(path, skeleton=skeleton, head=head, baked_first=True)
+    except NeuralocksError as error:
+        raise (no_strands if find_curves(open_stage(path), grooms) else error) from None
+    return rigged_scene(rigged), rigged.border

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bake rigged mesh hair: one SkelAnimation in an override layer, the body's joints as they were, the hair's from
+the network.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pxr import UsdSkel
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.progress import Progress
+from neuralocks_core.rig.finding import NoHairChains
+from neuralocks_core.rig.network import RigModel, RigSampler
+
+from ..border.amounts import check_number
+from ..border.damage import names_damage
+from ..border.time_codes import given_cuts, time_codes
+from ..border.units import check_layer_name, check_not_input
+from ..shot.notes import written_notes
+from ..shot.stage import check_cuts, frame_range
+from .layer import write_rig_layer
+from .stage import RiggedHair, read_rigged_hair, rigged_notes
+
+STILL = 1e-4
+"""A rotation that differs by less from none is none."""
+
+
+@dataclass(frozen=True)
+class RigBakeResult:
+    """What a rig bake wrote.
+
+    Attributes:
+        path: the override layer.
+        skeleton: the Skeleton prim.
+        animation: the new SkelAnimation prim.
+        joints: how many hair joints move.
+        samples: how many time codes the rotations are written at.
+        notes: what a user should know.
+    """
+
+    path: Path
+    skeleton: str
+    animation: str
+    joints: int
+    samples: int
+    notes: list[str]
+
+
+@names_damage
+def bake_rig(
+    shot,
+    out,
+    model=None,
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    frames=None,
+    subframes: int = 1,
+    loop: bool = False,
+    strength: float = 1.0,
+    cuts=None,
+    joints: dict[str, str] | None = None,
+    progress: Progress | None = None,
+) -> RigBakeResult:
+    """Bake the hair joints of a shot.
+
+    Every sample is a function of the motion around it alone, so that order, ranges and rates cannot change it.
+
+    Args:
+        shot: USD file with a skinned character, hair chains and an animation.
+        out: override layer to write, .usd, .usda or .usdc; muting it gives the shot back.
+        model: model file or RigModel; the shipped one if left out.
+        skeleton: Skeleton prim, where several have hair.
+        head: joint that carries the hair.
+        frames: as `time_codes.time_codes` takes them; the animation's own samples are always among those written.
+        subframes: samples a frame.
+        loop: the clip repeats, its last sample shows the pose of its first.
+        strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
+        cuts: time codes from which the character is elsewhere and its hair starts anew; found by itself if None.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: shot, model or output cannot be used.
+    """
+    out, shot = as_path(out, "out"), as_path(shot, "shot")
+    check_layer_name(out)
+    check_number("--strength", strength, 0, 2)
+    model = model if isinstance(model, RigModel) else RigModel.load(model)
+    cuts = given_cuts(cuts, loop)
+    hair, moved = _read(shot, skeleton, head, model, cuts, joints)
+    source = hair.source.source
+    check_not_input(out, hair.stage)
+    wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
+    codes = _with_samples(hair, wanted)
+    clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
+    sampler = RigSampler(model.spec, hair.source.character, clip)
+    turns = _turns(hair, model, clip, sampler, codes, strength, progress)
+    notes = [*rigged_notes(hair.source, model.spec.pose_joints), *_name_notes(source), *_held(hair, turns)]
+    animation = write_rig_layer(hair, moved, shot, out, codes, turns)
+    notes += hair.source.loop_notes(moved) if loop else []
+    if cuts is None and model.dynamic:
+        notes += hair.source.cut_notes()
+    notes += written_notes(hair.stage, [hair.source], out, wanted)
+    return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
+
+
+def _read(shot, skeleton, head, model, cuts, joints) -> tuple[RiggedHair, np.ndarray]:
+    """The shot, and where the model's joints are in its skeleton (N,)."""
+    # The model knows its joints: no guess is made about which ones are hair.
+    tops = [model.chains.names[i] for i in model.chains.roots]
+    try:
+        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops, joints=joints, cuts=cuts)
+    except NoHairChains:
+        raise NeuralocksError(
+            f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
+            "give a model trained for this rig (neuralocks rig train)"
+        ) from None
+    character = hair.source.character
+    moved = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
+    model.chains.check_same(hair.rig.chains)
+    check_cuts(cuts, [hair.source])
+    return hair, moved
+
+
+def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
+    """The note on a head that is held still.
+
+    Raises:
+        NeuralocksError: it is held as it was bound, so that no hair would move; or USD ignores its animation.
+    """
+    source, character, joints = hair.source.source, hair.source.character, hair.source.clip.joints
+    if np.ptp(joints[:, character.head], axis=0).max() >= 1e-7:
+        return []
+    if source.ignored:
+        raise NeuralocksError(source.ignored)
+    name = leaf(character.skeleton.names[character.head])
+    turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
+    if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
+        raise NeuralocksError(
+            f"{hair.source.path}: its head joint '{name}' is not animated, so the hair would not move; "
+            "animate the skeleton, or name the joint that carries the hair with --head JOINT"
+        )
+    return [f"{hair.source.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
+
+
+def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
+    """What was asked for and the animation's own samples: the body must come out sample for sample."""
+    own = _rotation_samples(hair)
+    # A frame and a sample at the same time, up to rounding, are one.
+    apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
+    return sorted({*apart, *own})
+
+
+def _rotation_samples(hair: RiggedHair) -> list[float]:
+    animation = hair.source.source.animation
+    return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
+
+
+def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
+    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes, those of the shot's rig."""
+    turns = np.empty((len(codes), len(model.chains), 4))
+    for row, code in enumerate(codes):
+        # One at a time: a matrix product may round otherwise for other batches.
+        second = hair.border.seconds([code])
+        wrapped = clip.loop and not clip.start <= second[0] <= clip.end
+        shown = clip.at(second) if wrapped else hair.source.joints_at(code)[None]
+        turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
+        if progress:
+            progress(row + 1, len(codes), "hair joints")
+    return model.chains.turns_on(hair.rig.chains, turns)
+
+
+def _name_notes(source) -> list[str]:
+    """Blender names a bone after the last part of its joint's path, and cuts that at 63 characters."""
+    leaves = [leaf(name) for name in source.names]
+    long = next((n for n in leaves if len(n) > 63), None)
+    if long:
+        return [f"{source.path}: joint '{long}' has more than 63 characters; Blender cuts its name"]
+    double = next((n for n in leaves if leaves.count(n) > 1), None)
+    if double:
+        return [f"{source.path}: several joints are named '{double}'; Blender renames all but one"]
+    return []

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The override layer of a rig bake: one SkelAnimation, the shot's own channels with new rotations of the hair joints."""
+
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdSkel, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import atomic_write
+from neuralocks_core.rotation import quaternion_product, relative_to_parents, rotation_part, to_quaternion
+
+from ..baking.override import apply_binding, over_prim, write_header
+from ..border.damage import named
+from ..skel.joints import JointSource
+from .stage import BAKED, RiggedHair
+
+
+def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path, codes: list[float], turns) -> str:
+    """Write the layer; nothing under `out` but a complete file.
+
+    Args:
+        hair: the shot as read.
+        joints: indices of the hair joints in its skeleton, (N,).
+        shot: file that the layer goes over.
+        out: file to write.
+        codes: ascending time codes of the rotations, (T,).
+        turns: of the hair joints in their own bind axes, (T, N, 4) wxyz.
+
+    Returns:
+        path of the new SkelAnimation.
+
+    Raises:
+        NeuralocksError: the file cannot be written.
+    """
+    layer = Sdf.Layer.CreateAnonymous(out.suffix)
+    write_header(layer, hair.stage, hair.border, shot, out, codes)
+    prim = _animation_spec(layer, hair)
+    source = hair.source.source
+    own = _usable_animation(source)
+    order = [str(name) for name in own.GetJointsAttr().Get()] if own else []
+    order += [source.names[j] for j in joints if source.names[j] not in order]
+    names = Sdf.ValueTypeNames
+    Sdf.AttributeSpec(prim, "joints", names.TokenArray, Sdf.VariabilityUniform).default = Vt.TokenArray(order)
+    rest = _rest_channels(source, order)
+    for name, kind, array in (
+        ("translations", names.Float3Array, Vt.Vec3fArray),
+        ("scales", names.Half3Array, Vt.Vec3hArray),
+    ):
+        spec = Sdf.AttributeSpec(prim, name, kind)
+        attribute = own.GetPrim().GetAttribute(name) if own else None
+        samples = attribute.GetTimeSamples() if attribute else []
+        if not samples:
+            spec.default = array(_joined(attribute, Usd.TimeCode.Default(), rest[name]))
+        for code in samples:
+            layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
+    spec = Sdf.AttributeSpec(prim, "rotations", names.QuatfArray)
+    places = [order.index(source.names[j]) for j in joints]
+    bind = to_quaternion(rotation_part(relative_to_parents(source.bind, source.parents)[joints]))
+    attribute = own.GetRotationsAttr() if own else None
+    for code, turn in zip(codes, turns):
+        values = _joined(attribute, code, rest["rotations"])
+        # The second factors keep w > 0, so no sign flips between samples.
+        for place, q in zip(places, quaternion_product(bind, turn)):
+            values[place] = Gf.Quatf(*map(float, q))
+        layer.SetTimeSample(spec.path, float(code), Vt.QuatfArray(values))
+    if source.animation is not None:
+        _blend_shapes(layer, prim, UsdSkel.Animation(source.animation))
+    _save(layer, out)
+    return str(prim.path)
+
+
+def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:
+    """A new SkelAnimation below the skeleton, and the skeleton bound to it."""
+    source = hair.source.source
+    over = over_prim(layer, source.prim)
+    apply_binding(over, source.prim)
+    relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)
+    relation.targetPathList.explicitItems = [over.path.AppendChild(BAKED)]
+    return Sdf.PrimSpec(over, BAKED, Sdf.SpecifierDef, "SkelAnimation")
+
+
+def _usable_animation(source: JointSource) -> UsdSkel.Animation | None:
+    """The shot's own animation, unless UsdSkel ignores it and shows the rest pose."""
+    return UsdSkel.Animation(source.animation) if source.moves_joints else None
+
+
+def _rest_channels(source: JointSource, order: list[str]) -> dict:
+    """Local rest transforms in this joint order, as lists of Gf values: what UsdSkel shows of joints that an animation
+    leaves out.
+    """
+    place = {name: i for i, name in enumerate(source.names)}
+    size = np.linalg.norm(source.rest[:, :3, :3], axis=1)
+    size[np.linalg.det(source.rest[:, :3, :3]) < 0, 0] *= -1
+    turn = to_quaternion(source.rest[:, :3, :3] / size[:, None, :])
+    still = (Gf.Vec3f(0), Gf.Quatf(1), Gf.Vec3h(1))
+    rows = [still] * len(order)
+    for row, name in enumerate(order):
+        if name in place:  # an animation may name joints that the skeleton has not
+            j = place[name]
+            shift, scale = (map(float, values) for values in (source.rest[j, :3, 3], size[j]))
+            rows[row] = (Gf.Vec3f(*shift), Gf.Quatf(*map(float, turn[j])), Gf.Vec3h(*scale))
+    return {name: [row[i] for row in rows] for i, name in enumerate(("translations", "rotations", "scales"))}
+
+
+def _joined(attribute, code, rest: list) -> list:
+    """The animation's own values, bit for bit, and those at rest for what was appended."""
+    values = attribute.Get(code) if attribute and attribute.HasValue() else None
+    if values is None and attribute and attribute.HasValue():
+        values = attribute.Get(Usd.TimeCode.EarliestTime())
+    values = list(values) if values is not None else []
+    return values + rest[len(values) :]
+
+
+def _blend_shapes(layer, prim, animation) -> None:
+    names, weights = animation.GetBlendShapesAttr(), animation.GetBlendShapeWeightsAttr()
+    if not names.HasAuthoredValue():
+        return
+    spec = Sdf.AttributeSpec(prim, "blendShapes", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+    spec.default = names.Get()
+    if weights.HasAuthoredValue():
+        spec = Sdf.AttributeSpec(prim, "blendShapeWeights", Sdf.ValueTypeNames.FloatArray)
+        if weights.Get(Usd.TimeCode.Default()) is not None:
+            spec.default = weights.Get(Usd.TimeCode.Default())
+        for code in weights.GetTimeSamples():
+            layer.SetTimeSample(spec.path, code, weights.Get(code))
+
+
+def _save(layer: Sdf.Layer, out: Path) -> None:
+    with named(out), atomic_write(out) as part:
+        if not layer.Export(str(part), args={"format": "usda" if out.suffix.lower() == ".usda" else "usdc"}):
+            raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")

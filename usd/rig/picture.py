@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigged mesh hair as a preview draws it: the skinned meshes of its character, hair told from skin."""
+
+import numpy as np
+
+from neuralocks_core.body.mesh import connected_pieces
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview.film import Scene
+from neuralocks_core.rotation import transformed
+
+from .stage import RiggedHair
+
+MOST = 0.3
+"""Share of its vertices that are hair from which all of a connected piece of mesh is."""
+
+
+def rigged_scene(rigged: RiggedHair) -> Scene:
+    """The character with its hair, posed as the stage has it at the samples of its animation.
+
+    Raises:
+        NeuralocksError: the skeleton skins no mesh.
+    """
+    source = rigged.source
+    character, clip, body = source.character, source.clip, source.character.body
+    if body is None:
+        raise NeuralocksError(f"{source.path}: it skins no mesh, so there is nothing to draw; bind the hair to it")
+    skin = rigged.rig.character.body
+    hair = np.ones(len(body.points), bool)
+    if skin is not None:
+        hair[skin.triangles] = False
+    # In a mesh that is skin and hair, roots of locks ride on the head.
+    piece = connected_pieces(body.triangles, len(body.points))
+    hair |= (np.bincount(piece, hair) / np.bincount(piece) > MOST)[piece]
+    return Scene(
+        times=clip.times,
+        head=np.stack([character.carrying(joints) for joints in clip.joints]),
+        facing=character.facing,
+        centre=transformed(character.head_centre, character.canonical_to_bind),
+        counts=np.zeros(0, int),
+        rest=body.points[hair],
+        hair=lambda frame: np.zeros((0, 3)),
+        triangles=body.triangles,
+        body=lambda frame: character.posed_body(clip.joints[frame], clip.shape[frame]),
+        body_rest=body.points,
+        mesh_hair=hair,
+    )

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd, UsdSkel
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.finding import fits
+from neuralocks_core.rig.network import rig_spec
+from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+
+from ..border.damage import names_damage
+from ..border.prim_paths import prim_path
+from ..border.units import Border, open_stage
+from ..shot.lacking import has_hair_joints, nothing_found
+from ..shot.notes import another_head, unfound, unlikely_head
+from ..skel.source import StageRig, find_skeletons, read_rig
+from ..skel.surface import find_skins, rest_primvar
+
+BAKED = "NeuralocksHair"
+"""Name of the SkelAnimation that a bake writes."""
+RIG_JOINTS = rig_spec().pose_joints
+"""Semantic joints that rig models read beside the head."""
+
+
+@dataclass(frozen=True)
+class RiggedHair:
+    """One skeleton of a stage with hair chains.
+
+    Attributes:
+        stage: the shot.
+        border: its units.
+        source: skeleton, body and clip as read.
+        rig: hair and body apart.
+    """
+
+    stage: Usd.Stage = field(repr=False)
+    border: Border
+    source: StageRig = field(repr=False)
+    rig: HairRig = field(repr=False)
+
+
+@names_damage
+def read_rigged_hair(
+    path: str | Path,
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    chains: list[str] | None = None,
+    joints: dict[str, str] | None = None,
+    all_shapes: bool = False,
+    cuts: list[float] | None = None,
+    baked_first: bool = False,
+) -> RiggedHair:
+    """Read the rigged mesh hair of a stage.
+
+    Args:
+        path: USD file.
+        skeleton: path of the Skeleton prim; needed where several have hair chains.
+        head: joint that carries the hair, if it is not named like a head.
+        chains: name patterns of the chains' first joints, instead of finding them.
+        joints: semantic joint -> joint path or its last part, where names do not tell.
+        all_shapes: keep blend shapes that the animation does not use (training draws random ones).
+        cuts: as for `stage.read_shot`.
+        baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
+
+    Raises:
+        NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
+    """
+    stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
+    border = Border.of(stage)
+    prims = find_skeletons(stage)
+    if skeleton:
+        prims = [p for p in prims if str(p.GetPath()) == skeleton or p.GetName() == skeleton]
+        if len(prims) != 1:
+            raise NeuralocksError(
+                f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims"
+            )
+    if not prims:
+        raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
+    found, errors, skins = [], [], find_skins(stage)
+    for prim in prims:
+        try:
+            _check_authored(prim)
+            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, joints=joints, cuts=cuts, skins=skins)
+            rig = assemble_rig(source.character, core_meshes(source), chains)
+        except NeuralocksError as error:
+            errors.append(type(error)(_with_path(prim, error)))
+            continue
+        found.append(RiggedHair(stage, border, source, rig))
+    if not found:
+        # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
+        hairy = [has_hair_joints(prim) for prim in prims]
+        raise errors[hairy.index(True) if any(hairy) else 0]
+    if baked_first:
+        found = [min(found, key=lambda hair: not _is_baked(hair.source))]
+    if len(found) > 1:
+        paths = ", ".join(f.source.path for f in found)
+        raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
+    check_orients(found[0].source, found[0].rig.chains)
+    return found[0]
+
+
+def _is_baked(source: StageRig) -> bool:
+    """Whether the animation of a skeleton is one that `rig bake` wrote."""
+    animation = source.source.animation
+    return animation is not None and animation.GetName() == BAKED
+
+
+def core_meshes(source: StageRig) -> list[SkinnedMesh]:
+    """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
+    return [
+        SkinnedMesh(str(mesh.prim.GetPath()), *mesh.in_bind(source.to_bind), mesh.indices, mesh.weights)
+        for mesh in source.meshes
+    ]
+
+
+def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
+    """What a user should know about a character with hair on joints.
+
+    Args:
+        source: the character.
+        pose_joints: semantic joints that the network reads beside the head.
+    """
+    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source)]
+    return [*source.notes, *weight_notes(source), *found]
+
+
+def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
+    """Refuse a pattern of `--chains` that stands for none of the chains found.
+
+    Raises:
+        NeuralocksError: names it.
+    """
+    joints = [hair.source.source.names[j] for j in hair.rig.chains.joints]
+    for pattern in patterns or ():
+        if not any(fits(name, pattern) for name in joints):
+            raise NeuralocksError(
+                f"--chains {pattern}: no joint of the hair has such a name; see neuralocks inspect for their names"
+            )
+
+
+def weight_notes(source: StageRig) -> list[str]:
+    """What is wrong with authored weights: reading makes them sum to one, as renderers do."""
+    notes = []
+    for mesh in source.meshes:
+        primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
+        values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
+        size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
+        if len(values) % size or not len(values):
+            continue
+        path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
+        free, off = total < 1e-9, np.abs(total - 1) > 0.01
+        if free.any():
+            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
+            notes.append(
+                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights; read as if they were bound to the "
+                f"first joint that they name, such as '{first}', bind them in the rig"
+            )
+        if (off & ~free).any():
+            notes.append(
+                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one; "
+                "read as if they did, normalise them in the rig"
+            )
+    return notes
+
+
+def _check_authored(prim: Usd.Prim) -> None:
+    skeleton = UsdSkel.Skeleton(prim)
+    joints, bind = skeleton.GetJointsAttr().Get(), skeleton.GetBindTransformsAttr().Get()
+    if joints and not bind:
+        raise NeuralocksError(f"{prim.GetPath()}: it has no bindTransforms; export the skeleton with its bind pose")
+
+
+def check_orients(source: StageRig, chains: HairChains) -> None:
+    """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written
+    without the latter.
+
+    Raises:
+        NeuralocksError: names the joint.
+    """
+    bind, names = source.source.bind, source.source.names
+    for joint in np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)])):
+        linear = bind[joint, :3, :3]
+        name = leaf(names[joint])
+        if np.linalg.det(linear) * np.linalg.det(bind[source.character.head, :3, :3]) < 0:
+            raise NeuralocksError(
+                f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
+            )
+        scale = np.linalg.norm(linear, axis=0)
+        if scale.max() > 1.01 * scale.min():
+            raise NeuralocksError(
+                f"{source.path}: hair joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
+            )
+
+
+def _with_path(prim: Usd.Prim, error: Exception) -> str:
+    text, path = str(error), str(prim.GetPath())
+    return text if text.startswith((path, "--", "model")) else f"{path}: {text.removeprefix('skeleton: ')}"
+
+
+def describe_chains(chains: HairChains) -> list[dict]:
+    """Name, number of moving joints and length [m] of every chain."""
+    return [
+        {
+            "name": chains.chain_name(i),
+            "joints": int((chains.chain == i).sum()),
+            "length": round(chains.chain_length(i), 5),
+        }
+        for i in range(len(chains.roots))
+    ]

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks rig train`: from a USD rig to a model file."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
+from neuralocks_core.progress import Progress
+
+from .stage import check_patterns, read_rigged_hair, rigged_notes
+
+
+def train_rig(
+    character,
+    out,
+    *,
+    dynamic: bool = True,
+    seconds: float | None = None,
+    steps: int | None = None,
+    hidden: int | None = None,
+    clips: int | None = None,
+    material: dict | None = None,
+    seed: int = 0,
+    chains: list[str] | None = None,
+    head: str | None = None,
+    skeleton: str | None = None,
+    joints: dict[str, str] | None = None,
+    command: str = "",
+    tell: Callable[[list[str]], None] | None = None,
+    progress: Progress | None = None,
+):
+    """Train a model for the hair joints of a rig and write it.
+
+    Args:
+        character: USD file.
+        out: `.neuralocks` file to write.
+        dynamic: learn lag, swing and settling from a simulation of the chains; else held poses, from the energy alone.
+        seconds, steps, hidden, seed: see `training.rig.train.train_static` and `training.rig.dynamic.train_dynamic`, whose
+            defaults hold for what is None.
+        clips: see the latter.
+        material: fields of `training.rig.energy.RigMaterial`.
+        chains, head, skeleton, joints: see `read_rigged_hair`.
+        command: for the model card.
+        tell: called with notes for the user before the training, whose minutes some of them would save.
+        progress: called with (done, total, message).
+
+    Returns:
+        the RigModel.
+
+    Raises:
+        NeuralocksError: the rig cannot be used, or the extra `train` is missing.
+    """
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+    from neuralocks_core.training.rig.energy import RigMaterial
+
+    character, out = as_path(character, "character"), as_path(out, "out")
+    _check_writable(out)
+    hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
+    check_patterns(hair, chains)
+    notes = rigged_notes(hair.source)
+    if hair.rig.character.body is None:
+        notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
+    if tell:
+        tell(notes)
+    values = RigMaterial(**(material or {}))
+    options = {"seconds": seconds, "steps": steps, "hidden": hidden}
+    if dynamic:
+        from neuralocks_core.training.rig.dynamic import train_dynamic as train
+
+        options["clips"] = clips
+    else:
+        from neuralocks_core.training.rig.train import train_static as train
+    chosen = {name: value for name, value in options.items() if value is not None}
+    model = train(hair.rig, values, seed=seed, progress=progress, **chosen)
+    if command:
+        model.training["command"] = command
+    model.training["character"] = character.name
+    who = hair.source.character
+    read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
+    model.training["reads"] = {name: leaf(path) for name, path in read.items()}
+    model.save(out)
+    return model
+
+
+def _check_writable(out: Path) -> None:
+    """Before minutes of training, not after them."""
+    if out.is_dir():
+        raise NeuralocksError(f"{out}: is a folder; give a file name")
+    try:
+        made = make_way(out)
+        with tempfile.TemporaryFile(dir=out.parent):
+            pass
+    except OSError as error:
+        raise cannot_write(out, error) from None
+    remove_empty(made)

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which skeleton and joint carries a groom, and where the groom lies in that rig's bind pose.
+
+In this order: the groom's own skel binding, the binding of the mesh it sits on, the joint named by the user, a joint
+named like a head.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import Usd
+
+from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from ..skel.surface import bound_skeleton, geom_bind, joint_influences
+from .curves import moment, rest_points
+from .seat import NEAR, Seat, find_seat, kinship, some_ends, ways
+from .seat_notes import floats, moved_away, upside_down
+
+REACH = 1.0
+"""Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
+ALIKE = 2e-3
+"""Bodies are alike if hair sits on them equally well up to this [m]."""
+MOST = 0.75
+"""Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """How one groom follows one rig.
+
+    Attributes:
+        rig: the skeleton that carries it.
+        character: the rig's character with the carrying joint as its head.
+        to_bind: the prim's own space to bind world [m], (4, 4).
+        how: the carrying joint and how it was found, in words.
+        skinned: whether UsdSkel would deform the prim itself.
+        at_default: the same way of points that would be authored at the default time, (4, 4), where the shot has none
+            but those of a moving cache; else None.
+        far: distance of the roots from the joint [m] where neither a binding nor a skin below says that it
+            carries them and they lie out of its reach; else 0.
+    """
+
+    rig: StageRig
+    character: Character
+    to_bind: np.ndarray
+    how: str
+    skinned: bool
+    at_default: np.ndarray | None = None
+    far: float = 0.0
+
+
+def attach(
+    prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None, notes: list[str]
+) -> Attachment:
+    """Find what carries the groom.
+
+    Args:
+        prim: a BasisCurves.
+        rigs: candidates; not empty.
+        placement: where the prim stands.
+        head: the user's `--head`, used where no binding says otherwise.
+        notes: what a user should know is added here.
+
+    Raises:
+        NeuralocksError: nothing, or no single one, can carry it.
+    """
+    path = str(prim.GetPath())
+    bound = bound_skeleton(prim)
+    rig = next((r for r in rigs if r.path == bound), None)
+    if rig is not None:
+        joint, why, shares = _by_own_binding(prim, rig)
+        notes += _spread(rig, path, joint, shares)
+        found = Attachment(
+            rig=rig,
+            character=_with_head(rig, joint),
+            to_bind=rig.to_bind @ geom_bind(prim),
+            how=f"{why} (its own skel binding)",
+            skinned=True,
+        )
+        notes += upside_down(prim, rig, found.to_bind)
+    else:
+        seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
+        if seats:
+            found = _on_mesh(prim, seats, placement, notes)
+        else:
+            found = _by_name(prim, rigs, placement, head)
+            notes += [] if found.far else floats(prim, found.rig, placement)
+    name = rig_joint(found)
+    if head and leaf(name) != leaf(head):
+        notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
+    return found
+
+
+def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: bool) -> tuple[str, str] | None:
+    """The joint that a binding says carries the groom, and whose binding that is; None where none says so. The binding of
+    the mesh on which the groom sits counts where it is `seated`.
+
+    Raises:
+        NeuralocksError: a binding cannot be used.
+    """
+    if bound_skeleton(prim) == rig.path:
+        return rig.source.names[_by_own_binding(prim, rig)[0]], str(prim.GetPath())
+    if seated and (seat := find_seat(prim, rig, placement, NEAR)) is not None:
+        return rig.source.names[_by_seat(seat)[0]], str(seat.mesh.prim.GetPath())
+    return None
+
+
+def of_another(
+    prim: Usd.Prim, rigs: list[StageRig], others: list[StageRig], placement: Placement, head: str | None
+) -> StageRig | None:
+    """Which of the other skeletons clearly carries the groom, rather than one of these."""
+    try:
+        found = attach(prim, [*rigs, *others], placement, head, [])
+    except NeuralocksError:  # not clear
+        return None
+    return None if found.far else next((rig for rig in others if rig is found.rig), None)
+
+
+def rig_joint(found: Attachment) -> str:
+    """Path of the carrying joint."""
+    return found.rig.source.names[found.character.head]
+
+
+def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
+    """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
+    nearest = min(seat.distance for seat in seats)
+    alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
+    # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
+    seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
+    rig, mesh = seat.rig, seat.mesh
+    joint, why, shares = _by_seat(seat)
+    path = str(prim.GetPath())
+    notes += _spread(rig, path, joint, shares) + moved_away(path, rig, seat.roots)
+    how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
+    at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
+    return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
+
+
+def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
+    path = str(prim.GetPath())
+    able = [r for r in rigs if "head" in r.character.humanoid]
+    if not able:
+        raise NeuralocksError(
+            f"{path}: no joint of {rigs[0].path} is named like a head; name the joint that carries it with --head JOINT"
+        )
+    roots = some_ends(prim)
+
+    def away(rig: StageRig, to_bind: np.ndarray) -> float:
+        head_at = rig.character.canonical_to_bind[:3, 3]
+        return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
+
+    when = moment(prim)
+    far = [(min(away(rig, way) for way in ways(rig, None, placement, when)), rig) for rig in able]
+    # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
+    least = min(distance for distance, _ in far)
+    close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
+    kin = max(kinship(prim, rig) for _, rig in close)
+    close = [(distance, rig) for distance, rig in close if kinship(prim, rig) == kin]
+    nearest, rig = close[0]
+    out_of_reach = nearest > max(REACH, _trunk(rig))
+    if len(close) > 1 and not out_of_reach:
+        names = ", ".join(r.path for r in able[:5])
+        raise NeuralocksError(
+            f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
+        )
+    to_bind = min(ways(rig, None, placement, when), key=lambda way: round(away(rig, way), 3))
+    at_default = None if when is None else ways(rig, None, placement)[0]
+    why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
+    how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
+    far = nearest if out_of_reach else 0.0
+    return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
+
+
+def _trunk(rig: StageRig) -> float:
+    """Distance of the carrying joint from the hips [m]."""
+    bind = rig.character.skeleton.bind[:, :3, 3]
+    return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
+
+
+def _by_own_binding(prim: Usd.Prim, rig: StageRig) -> tuple[int, str, np.ndarray]:
+    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in it."""
+    shares = _shares(rig, *joint_influences(prim, len(rest_points(prim)), rig.source))
+    return *_carrier(rig, shares, exact=True), shares
+
+
+def _by_seat(seat: Seat) -> tuple[int, str, np.ndarray]:
+    """The same for a groom that sits on a mesh, by the skin under its roots."""
+    shares = _shares(seat.rig, seat.mesh.indices[seat.points], seat.mesh.weights[seat.points])
+    return *_carrier(seat.rig, shares), shares
+
+
+def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Share (J,) of each joint in these influences."""
+    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
+    return shares / max(shares.sum(), 1e-12)
+
+
+def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
+    """What to say of hair that one joint cannot carry: fur all over a body."""
+    names = [leaf(name) for name in rig.source.names]
+    # What hangs below a head is its face; what hangs below a spine is everything.
+    own = (
+        rig.character.skeleton.below(joint)
+        if joint == rig.character.humanoid.get("head")
+        else np.arange(len(names)) == joint
+    )
+    share = shares[own].sum()
+    if share >= MOST:
+        return []
+    rest = np.where(own, 0, shares)
+    others = [names[other] for other in np.argsort(-rest, kind="stable")[:3] if rest[other] > 0.02]
+    return [
+        f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
+        f"({', '.join(others)}) will leave the skin: split the groom by joint"
+    ]
+
+
+def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
+    """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
+    names = rig.source.names
+    best = int(shares.argmax())
+    head = rig.character.humanoid.get("head")
+    if head is not None and best != head:
+        below = rig.character.skeleton.below(head)
+        single = shares[best] > (0.95 if exact else 0.8)
+        if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
+            return head, f"joint '{names[head]}'"
+    return best, f"joint '{names[best]}'"
+
+
+def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
+    """Whether a joint below the head never moves against it."""
+    joints = rig.clip.joints
+    relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
+    return bool(np.abs(relative - relative[0]).max() < 1e-4)
+
+
+def _with_head(rig: StageRig, joint: int) -> Character:
+    if rig.character.humanoid.get("head") == joint:
+        return rig.character
+    skeleton = rig.character.skeleton
+    by_hand = {**rig.by_hand, "head": skeleton.names[joint]}
+    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
+    return replace(rig.character, humanoid=humanoid)

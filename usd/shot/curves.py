@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""BasisCurves as a groom: rest points, counts, widths and root attributes."""
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from neuralocks_core.rotation import transformed
+
+from ..border.prim_paths import prim_paths
+from ..skel.surface import rest_primvar, rest_value
+
+
+def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
+    """BasisCurves prims in stage order; only those `wanted` (paths; a parent stands for all below it).
+
+    Raises:
+        NeuralocksError: a wanted path is no groom.
+    """
+    every = [
+        p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.BasisCurves)
+    ]
+    if not wanted:
+        return every
+    chosen = set()
+    for text in prim_paths(wanted, "grooms"):
+        if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
+            raise NeuralocksError(f"{text}: no prim path; give an absolute one such as {_examples(every)}")
+        below = [p for p in every if p.GetPath().HasPrefix(text)]
+        if not below:
+            prim = stage.GetPrimAtPath(text)
+            fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
+            raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
+        chosen.update(below)
+    return [prim for prim in every if prim in chosen]
+
+
+def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
+    """The curves that are empty, unless all are: exporters leave such prims behind."""
+    empty = []
+    for prim in prims:
+        points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
+        if points is None or not len(points):
+            empty.append(prim)
+    return empty if len(empty) < len(prims) else []
+
+
+def rest_points(prim: Usd.Prim) -> np.ndarray:
+    """(P, 3) float32 points at rest in the prim's own space and units.
+
+    Raises:
+        NeuralocksError: there are none.
+    """
+    points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
+    if points is None or not len(points):
+        raise NeuralocksError(
+            f"{prim.GetPath()}: the groom has no points; give it its rest shape as default-time points"
+        )
+    return np.asarray(points, np.float32)
+
+
+def moment(prim: Usd.Prim) -> float | None:
+    """Time code of which the points taken for those at rest are, where they are one sample of a moving cache."""
+    points = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    if points.Get(Usd.TimeCode.Default()) is not None or not points.ValueMightBeTimeVarying():
+        return None
+    return float(points.GetTimeSamples()[0])
+
+
+def left_as_they_are(prim: Usd.Prim) -> list[str]:
+    """What to say of values that belong to the points at rest and that a bake does not carry."""
+    notes = []
+    if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
+        notes.append(
+            f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
+            "remove them, so that it is drawn as tubes or towards the camera"
+        )
+    if UsdSkel.BindingAPI(prim).GetBlendShapeTargetsRel().GetTargets():
+        notes.append(
+            f"{prim.GetPath()}: has blend shapes of its own, which a bake leaves out; put them into its points"
+        )
+    return notes
+
+
+def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
+    """The groom at rest in bind-world metres.
+
+    Args:
+        prim: a BasisCurves.
+        to_bind: the prim's own space to bind world [m], (4, 4).
+        notes: what a user should know is added here.
+
+    Raises:
+        NeuralocksError: arrays do not fit each other, or are empty or not finite.
+    """
+    curves, path = UsdGeom.BasisCurves(prim), str(prim.GetPath())
+    points = rest_points(prim)
+    if (when := moment(prim)) is not None:
+        notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
+    counts = _counts(curves)
+    scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
+    uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)
+    guides = _per_strand(prim, ("groom_guide",), counts, 1)
+    group = _per_strand(prim, ("groom_group_id",), counts, 1)
+    with np.errstate(invalid="ignore", over="ignore"):  # Groom says where a value is not finite
+        placed = transformed(points, to_bind).astype(np.float32)
+    return Groom(
+        name=path,
+        points=placed,
+        counts=counts,
+        widths=_widths(curves, counts, scale, notes),
+        root_uv=None if uv is None else uv.astype(np.float32),
+        guides=None if guides is None else guides.astype(bool),
+        group=None if group is None else group.astype(np.int32),
+    )
+
+
+def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:
+    """Points of each strand (S,), which some caches write anew for each frame."""
+    attribute = curves.GetCurveVertexCountsAttr()
+    counts = np.asarray(rest_value(attribute) or [], np.int64)
+    times = attribute.GetTimeSamples()
+    for time in times[:: max(1, len(times) // most)]:
+        if not np.array_equal(counts, attribute.Get(time)):
+            raise NeuralocksError(
+                f"{curves.GetPath()}: its curveVertexCounts at time code {time:g} are not those at rest; "
+                "hair must keep its strands, remove the other samples"
+            )
+    return counts
+
+
+def widest_sample(prim: Usd.Prim) -> float:
+    """The largest of a groom's widths that change over time, in the prim's own units; 0 where none do."""
+    attribute, widest = _widths_attribute(UsdGeom.BasisCurves(prim)), 0.0
+    for time in attribute.GetTimeSamples():
+        values = np.asarray(attribute.Get(time) or [], np.float32)
+        widest = max(widest, float(values[np.isfinite(values)].max(initial=0)))
+    return widest
+
+
+def _widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
+    """The widths that count: a primvar of that name hides the curves' own."""
+    primvar = UsdGeom.PrimvarsAPI(curves).GetPrimvar("widths")
+    return primvar.GetAttr() if primvar and primvar.HasValue() else curves.GetWidthsAttr()
+
+
+def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes: list[str]) -> np.ndarray | None:
+    """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that can be meant."""
+    attribute = _widths_attribute(curves)
+    primvar = UsdGeom.Primvar(attribute)
+    values = rest_primvar(primvar) if primvar else rest_value(attribute)
+    if values is None or not len(values):
+        return None
+    values = np.asarray(values, np.float32) * np.float32(scale)
+    strands = len(counts)
+    if np.isfinite(values).all() and (values >= 0).all():
+        if len(values) in (1, strands, counts.sum()):
+            return values
+        for knots in _knots(curves, counts):
+            if knots.sum() == len(values) and knots.min() > 0:
+                # Strand i runs from 2 i to 2 i + 1.
+                ends, places = (np.repeat(2.0 * np.arange(strands), each) + _places(each) for each in (knots, counts))
+                return np.interp(places, ends, values).astype(np.float32)
+    notes.append(
+        f"{curves.GetPath()}: {len(values)} widths do not fit {strands} strands or are not finite; "
+        "they are left as they are"
+    )
+    return None
+
+
+def _knots(curves: UsdGeom.BasisCurves, counts: np.ndarray) -> list[np.ndarray]:
+    """How many varying values each cubic strand has, (S,): one for every end of a segment. Of strands with pinned ends
+    some tools take the ones that pinning adds for none.
+    """
+    if curves.GetTypeAttr().Get() != UsdGeom.Tokens.cubic:
+        return []
+    wrap = curves.GetWrapAttr().Get()
+    if curves.GetBasisAttr().Get() == UsdGeom.Tokens.bezier:
+        return [counts // 3 if wrap == UsdGeom.Tokens.periodic else (counts - 4) // 3 + 2]
+    return [] if wrap == UsdGeom.Tokens.periodic else [counts - 2]
+
+
+def _places(each: np.ndarray) -> np.ndarray:
+    """Where values lie along their strands, each strand's evenly from 0 to 1; `each` (S,) is how many it has."""
+    number = np.arange(each.sum()) - np.repeat(np.cumsum(each) - each, each)
+    return number / np.repeat(np.maximum(each - 1, 1), each)
+
+
+def _per_strand(prim: Usd.Prim, names, counts: np.ndarray, width: int) -> np.ndarray | None:
+    """A primvar of each strand (S, width), or (S,) for width 1: the first of `names` that fits.
+
+    One value counts for all strands; of values of each vertex, as some tools write them, the root's is taken.
+    """
+    api, strands = UsdGeom.PrimvarsAPI(prim), len(counts)
+    for name in names:
+        primvar = api.GetPrimvar(name)
+        if not primvar or not primvar.HasValue():
+            continue
+        try:
+            values = np.asarray(rest_primvar(primvar))
+        except (TypeError, ValueError):
+            continue
+        if values.dtype.kind not in "biuf" or values.size % width or not np.isfinite(values).all():
+            continue
+        values = values.reshape(-1, width) if width > 1 else values.reshape(-1)
+        if len(values) == 1:
+            values = np.repeat(values, strands, axis=0)
+        elif len(values) == counts.sum() != strands and counts.min() > 0:
+            values = values[np.cumsum(counts) - counts]
+        if len(values) == strands:
+            return values
+    return None
+
+
+def _examples(prims) -> str:
+    paths = [str(p.GetPath()) for p in prims]
+    return (
+        ", ".join(paths[:5]) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
+        if paths
+        else "none (no BasisCurves)"
+    )

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which curves of a stage are hair, and what carries them: the same answer for a bake and for `inspect`."""
+
+from collections.abc import Sequence
+
+from pxr import Usd
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from .attach import Attachment, attach, of_another
+from .curves import left_as_they_are, without_points
+from .notes import another_carries, few, no_points, too_far
+
+
+class HairSearch:
+    """Tells hair from other curves; what is left out is told in the notes.
+
+    Args:
+        rigs: skeletons that may carry hair; not empty where `attachment` is asked.
+        head: the user's `--head`.
+        notes: what a user should know is added here.
+        named: the user named these curves: none is left out because it is empty or far away.
+        others: skeletons whose hair is not wanted.
+
+    Attributes:
+        far: why curves were too far from every head to be hair, one line each. A note where other hair was found, the
+            error where none was.
+    """
+
+    def __init__(
+        self,
+        rigs: list[StageRig],
+        head: str | None,
+        notes: list[str],
+        *,
+        named: bool = False,
+        others: Sequence[StageRig] = (),
+    ):
+        self._rigs, self._head, self._notes = rigs, head, notes
+        self._named, self._others = named, list(others)
+        self.far: list[str] = []
+
+    def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
+        """The curves that have points, with a note on the others."""
+        empty = [] if self._named else without_points(curves)
+        self._notes += few([no_points(str(prim.GetPath())) for prim in empty])
+        return [prim for prim in curves if prim not in empty]
+
+    def attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
+        """What carries the curves of a prim; None where they are another skeleton's, or no hair.
+
+        Raises:
+            NeuralocksError: as `attach`.
+        """
+        path = str(prim.GetPath())
+        if self._others and (other := of_another(prim, self._rigs, self._others, placement, self._head)):
+            self._notes.append(another_carries(path, other))
+            return None
+        found = attach(prim, self._rigs, placement, self._head, self._notes)
+        if found.far and not self._named:
+            self.far.append(too_far(prim, found))
+            return None
+        self._notes += left_as_they_are(prim)
+        return found

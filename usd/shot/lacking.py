@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors about a stage that lacks what a bake needs, with the likely cause: what it has in its place."""
+
+from pathlib import Path
+
+from pxr import Usd, UsdGeom, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.hair_names import says_hair
+
+from ..skel.source import find_skeletons
+from .notes import composition_notes
+
+MOST_VARIANTS = 64
+"""Variants that are tried: each composes the stage anew."""
+
+
+def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
+    """The error for a stage without BasisCurves."""
+    other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
+    remedy = _in_a_variant(stage) or _on_joints(stage) or "add one, or import a hair file with 'neuralocks import'"
+    if other:
+        remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
+    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
+
+
+def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
+    """The error for a stage that lacks what a bake needs; where layers are missing, it names those as the likely cause."""
+    missing = composition_notes(stage, path)
+    if missing:
+        loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
+        remedy = f"not all of it is there ({loaded}); bring along what the file refers to"
+    return NeuralocksError(f"{path}: holds no {what}; {remedy}")
+
+
+def has_hair_joints(prim: Usd.Prim) -> bool:
+    """Whether joints of a Skeleton are named like hair."""
+    return any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()))
+
+
+def _on_joints(stage: Usd.Stage) -> str:
+    """Which skeleton has joints for hair, and what moves them; '' if none has."""
+    hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
+    if hairy is None:
+        return ""
+    return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
+
+
+def _in_a_variant(stage: Usd.Stage) -> str:
+    """Which variant that is not chosen has curves, and what to do then; '' if none of MOST_VARIANTS has."""
+    tried = 0
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for path in [prim.GetPath() for prim in stage.Traverse() if prim.HasVariantSets()]:
+            for name in stage.GetPrimAtPath(path).GetVariantSets().GetNames():
+                variants = stage.GetPrimAtPath(path).GetVariantSet(name)
+                for variant in variants.GetVariantNames()[: MOST_VARIANTS - tried]:
+                    tried += 1
+                    variants.SetVariantSelection(variant)
+                    curves = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)), None)
+                    if curves:
+                        found = f"choose variant '{variant}' of '{name}' on {path}, which has {curves.GetPath()}"
+                        variants.ClearVariantSelection()
+                        return found
+                variants.ClearVariantSelection()
+    return ""

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Notes: what a user should know about a shot though the bake goes on. One line each: prim or file, fact, remedy."""
+
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.boundary import POSE_JOINTS, joints_read
+from neuralocks_core.character import HEAD_WIDTHS
+from neuralocks_core.groom import Groom
+from neuralocks_core.rig.hair_names import says_hair
+from neuralocks_core.strands.arclength import count_pointlike
+
+from ..border.units import Border
+from ..skel.source import StageRig
+from .attach import Attachment, rig_joint
+
+SAME = 0.01
+"""Joints of two skeletons at most so far apart [m] are one."""
+FEW = 3
+"""Similar lines told one by one."""
+
+
+def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
+    """What USD could not compose: missing layers, for example."""
+    return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+
+
+def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
+    """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them."""
+    border = Border.of(stage)
+    for layer in stage.GetLayerStack(includeSessionLayers=False)[1:]:
+        if differs := border.differing(layer):
+            return [
+                f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
+            ]
+    return []
+
+
+def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: list[float]) -> list[str]:
+    """The notes on a layer that was written over a shot.
+
+    Args:
+        stage: the shot.
+        rigs: skeletons that carry what was baked.
+        out: the layer.
+        codes: the time codes that were asked for, ascending.
+    """
+    return [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])] + out_of_place(stage, out)
+
+
+def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
+    """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
+    if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
+        return []
+    found = {str(error) for error in stage.GetCompositionErrors()}
+    lost = [str(error) for error in Usd.Stage.Open(str(out)).GetCompositionErrors() if str(error) not in found]
+    return [
+        f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "
+        "have USD search that folder (PXR_AR_DEFAULT_SEARCH_PATH)"
+        for text in lost[:1]
+    ]
+
+
+def left_out(error) -> str:
+    """The note on a skeleton that cannot be used, beside others that can."""
+    return f"{error} (this skeleton is left out)"
+
+
+def first_of(rigs: Sequence[StageRig]) -> list[str]:
+    """The note on a file with several skeletons of which the first is taken."""
+    if len(rigs) < 2:
+        return []
+    return [
+        f"{rigs[0].path}: the first of {len(rigs)} skeletons is taken; choose another, such as {rigs[1].path}, with "
+        "--skeleton PRIM"
+    ]
+
+
+def few(lines: list[str]) -> list[str]:
+    """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
+    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more prims are left out like that"]
+
+
+def no_points(path: str) -> str:
+    """The note on a prim of curves without points, beside others that have some."""
+    return f"{path}: the curves have no points; left out"
+
+
+def not_animated(rig: StageRig) -> str:
+    """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with that one."""
+    ignored = rig.source.ignored
+    why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
+    return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
+
+
+def stands_still(path: str, rig: StageRig) -> str:
+    """The note on a groom whose character is not animated, beside others that are."""
+    return f"{path}: {rig.path}, which carries it, has no animation; left out"
+
+
+def another_carries(path: str, rig: StageRig) -> str:
+    """The note on a groom that another skeleton carries than the one the user named."""
+    return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
+
+
+def too_far(prim: Usd.Prim, found: Attachment) -> str:
+    """The note on curves that are not taken for hair because they start too far from any head."""
+    return (
+        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(rig_joint(found))}' of {found.rig.path} "
+        f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}, so it is not taken for hair; "
+        "if it is, name it with --groom"
+    )
+
+
+def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
+    """The notes on a held pose, on joints that were not recognized by name and on a head of an unlikely size."""
+    held = len(rig.time_codes) == 1
+    notes = [f"{rig.path}: the animation has one sample, so the hair is that of a held pose"] if held else []
+    return notes + unfound(rig, joints) + unlikely_head(rig)
+
+
+def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
+    """The note on joints that a network reads and that were not recognized by name."""
+    missing = [name for name in joints if name not in rig.character.humanoid]
+    if not missing:
+        return []
+    head = rig.character.humanoid.get("head")
+    if head is not None and rig.source.parents[head] < 0:
+        return [
+            f"{rig.path}: nothing carries its head joint '{rig.source.names[head]}', so hair does not feel how neck and body "
+            "turn against it; export it with the body's skeleton as one"
+        ]
+    return [
+        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint"
+    ]
+
+
+def unlikely_head(rig: StageRig) -> list[str]:
+    """The note on a head of a size that no human's has."""
+    width = rig.character.head_width
+    if width is None or HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+        return []
+    foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"))
+    remedy = foreign or f"; check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
+    return [f"{rig.path}: the head is {width:.3g} m wide{remedy}"]
+
+
+def another_head(rig: StageRig) -> list[str]:
+    """The note on hair joints of a second character in the skeleton."""
+    names, head = rig.source.names, rig.character.head
+    for joint in np.flatnonzero(~rig.character.skeleton.below(head)):
+        *above, own = names[joint].split("/")
+        heads = [name for name in above if "head" in name.lower()]
+        if heads and says_hair(own):
+            return [
+                f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{leaf(names[head])}', so it is not moved; "
+                f"take that head with --head {heads[-1]}"
+            ]
+    return []
+
+
+def without_turn(rig: StageRig) -> list[str]:
+    """What stops a bake of strands: joints that the network reads and that have no rotation, hidden by a scale of zero or
+    mirrored.
+    """
+    humanoid, found = rig.character.humanoid, []
+    if "head" not in humanoid:
+        return []
+    for joint in dict.fromkeys(joints_read(humanoid)):
+        linear = rig.clip.joints[:, joint, :3, :3]
+        flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
+        for fact, bad, remedy in (
+            ("has zero scale", flat, "give it a scale above zero; 0.0001 hides what it moves, too"),
+            ("is mirrored or flat", ~flat & (np.linalg.det(linear) <= 0), "apply or remove the negative or zero scale"),
+        ):
+            if bad.any():
+                code = rig.time_codes[bad.argmax()]
+                found.append(f"{rig.path}: joint '{rig.source.names[joint]}' {fact} at time code {code:g}; {remedy}")
+    return found
+
+
+def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
+    """The note on a character in several skeletons, head and body or clothes: those that have meshes, and whose head, neck or
+    chest is where this one's is.
+    """
+    others = [other.path for other in rigs if other.path != rig.path and other.meshes and _one_person(rig, other)]
+    if not others:
+        return []
+    return [
+        f"{rig.path}: {', '.join(others[:3])} {'is' if len(others) == 1 else 'are'} the same character, whose meshes hair is not "
+        "kept out of; bind them to one skeleton if hair touches them"
+    ]
+
+
+def _one_person(rig: StageRig, other: StageRig) -> bool:
+    """Whether a joint of the upper body is at the same place in both, when bound and as the first one's motion begins and ends."""
+    mine, its = rig.character, other.character
+    ends = rig.clip.times[[0, -1]]
+    for name in ("head", "neck", "upper_chest", "chest"):
+        if name not in mine.humanoid or name not in its.humanoid:
+            continue
+        a, b = mine.humanoid[name], its.humanoid[name]
+        there = np.concatenate([mine.skeleton.bind[None, a], rig.clip.joints[[0, -1], a]])[:, :3, 3]
+        if np.abs(there[0] - its.skeleton.bind[b, :3, 3]).max() < SAME:
+            return bool(np.abs(there[1:] - other.clip.at(ends)[:, b, :3, 3]).max() < SAME)
+    return False
+
+
+def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
+    """The note on a range of time codes that the animation does not reach, so that the character stands still."""
+    samples = rig.source.samples
+    if len(samples) < 2 or (samples[0] <= last and first <= samples[-1]):
+        return []
+    return [
+        f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, none of it within {first:g} to "
+        f"{last:g}: a held pose; check --frames, the shot's range and the layer offsets"
+    ]
+
+
+def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
+    """The notes on strands without length and on lengths that no hair has."""
+    path = str(prim.GetPath())
+    notes = []
+    filled = np.flatnonzero(groom.counts > 0)
+    spread = np.zeros(groom.strand_count, np.float32)
+    low = np.minimum.reduceat(groom.points, groom.starts[filled])
+    high = np.maximum.reduceat(groom.points, groom.starts[filled])
+    spread[filled] = (high - low).max(axis=1)
+    still = count_pointlike(groom)
+    if still:
+        notes.append(
+            f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"
+        )
+    longest = float(spread.max())
+    if longest > 2.5 or longest < 0.002:
+        remedy = border.foreign(prim.GetAttribute("points")) or "; check the stage's metersPerUnit"
+        notes.append(f"{path}: the longest strand reaches {longest:.3g} m{remedy}")
+    return notes

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where curves that nothing binds lie in a rig's bind pose, and on which skin.
+
+A file does not say of what their place in the stage is the place: of the bind pose, of a skin elsewhere in the stage,
+or of the pose at one moment. That of curves that move with the head or are a moving cache is of a moment; of the rest
+it is where their roots lie on skin.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom
+from scipy.spatial import cKDTree
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from ..skel.surface import StageMesh, rest_value
+from .curves import moment, rest_points
+
+NEAR = 0.03
+"""Roots this far from a mesh, in the median, still sit on it [m]."""
+SOME_ROOTS, SOME_TIMES = 1000, 16
+"""How many of a groom's roots and of a prim's samples are looked at, about: all are too many."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """How a groom would sit on a rig's nearest mesh.
+
+    Attributes:
+        distance: of its roots from the mesh, in the median [m].
+        rig, mesh: on what.
+        to_bind: its way to bind world, (4, 4).
+        way: whether that way is unlikely, and its place among `ways`.
+        roots: of some strands, in bind world [m], (n, 3).
+        tree: the mesh's points there.
+    """
+
+    distance: float
+    rig: StageRig
+    mesh: StageMesh
+    to_bind: np.ndarray
+    way: tuple[bool, int]
+    roots: np.ndarray = field(repr=False)
+    tree: cKDTree = field(repr=False)
+
+    @property
+    def points(self) -> np.ndarray:
+        """The mesh's nearest point to each root (n,)."""
+        return self.tree.query(self.roots)[1]
+
+
+def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf) -> Seat | None:
+    """A groom on a rig's nearest skin; None where the rig has no skin, or none `within` so far [m]."""
+    roots, when, best = some_ends(prim), moment(prim), None
+
+    def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
+        placed = transformed(roots, to_bind)
+        # In a crowd nearly all skins are far, and to find the nearest point of a far one takes a hundred times as long
+        # as to find that none is near. A median within the bound is of distances of which none is twice as large.
+        middle = float(np.median(tree.query(placed, distance_upper_bound=2 * within)[0]))
+        better = middle <= within and (best is None or middle < best.distance - 1e-4)
+        return Seat(middle, rig, mesh, to_bind, way, placed, tree) if better else best
+
+    for likely in (True, False):
+        for mesh, tree in zip(rig.meshes, rig.skins, strict=True):
+            for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely)):
+                best = nearest(best, mesh, tree, (not likely, place), to_bind)
+        if best is not None and best.distance <= NEAR:
+            break
+    return best
+
+
+def ways(
+    rig: StageRig,
+    mesh: StageMesh | None,
+    placement: Placement,
+    when: float | None = None,
+    *,
+    likely: bool = True,
+) -> list[np.ndarray]:
+    """Candidates (4, 4) for the way from the groom's own space to bind world, the likeliest first.
+
+    Args:
+        rig: what carries the groom.
+        mesh: its skin below the groom, if it has one.
+        placement: where the groom's prim stands.
+        when: time code at which the groom has the points it is read with, if they are no points at rest.
+        likely: those that serve unless skin says otherwise, or the others.
+    """
+    groom = placement.reference
+    still = []
+    if mesh is not None:
+        still.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
+    still += [rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom, rig.to_bind @ groom]
+    if not rig.source.animated:
+        return still if likely else []
+    if when is not None:  # it is seen where it is then
+        return [_posed(rig, placement, when)] if likely else still
+    if not placement.samples or _steady(placement, rig.source.placement.at):
+        # Or it was made where the character stands when its motion begins.
+        return still if likely else [_posed(rig, placement, float(rig.time_codes[0]))]
+    # A prim that is moved along by its parents: where it stood against the head when that motion began.
+    posed = [_posed(rig, placement, placement.samples[0])]
+    if _steady(placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core):
+        return posed if likely else still
+    return posed + still if likely else []
+
+
+def kinship(prim: Usd.Prim, rig: StageRig) -> int:
+    """How many of their parents a groom and a skeleton share."""
+    return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
+
+
+def some_ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
+    """About SOME_ROOTS finite roots (n, 3) in the prim's own space; or the last points of these strands.
+
+    Raises:
+        NeuralocksError: none is finite.
+    """
+    points = rest_points(prim)
+    counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
+    ends = np.cumsum(counts) - (1 if last else counts)
+    ends = ends[(counts > 0) & (ends >= 0) & (ends < len(points))]
+    found = points[ends[:: max(1, len(ends) // SOME_ROOTS)]] if len(ends) else points[:1]
+    found = found[np.isfinite(found).all(axis=1)]
+    if not len(found):
+        raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
+    return found
+
+
+def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
+    """The way of a groom that lies right on the head as it is at a time code."""
+    return np.linalg.inv(_carried(rig, when)) @ rig.border.to_core @ placement.at(when)
+
+
+def _carried(rig: StageRig, when: float) -> np.ndarray:
+    """What the head does to bind world [m] at a time code, (4, 4)."""
+    return rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
+
+
+def _steady(placement: Placement, against: Callable[[float], np.ndarray]) -> bool:
+    """Whether a moving prim stands still against something else in stage space, which then is what moves it."""
+    times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
+    places = np.stack([placement.at(time) for time in times])
+    relative = np.stack([np.linalg.inv(against(time)) for time in times]) @ places
+    turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
+    reach = max(1.0, np.abs(places[..., 3]).max(), np.abs(relative[..., 3]).max())
+    return bool(turned <= 1e-4 * np.abs(relative[0, :3, :3]).max() and moved <= 1e-4 * reach)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Notes on how a groom sits on skin: off it, upside down, or on a face that moves away below it."""
+
+import numpy as np
+from pxr import Usd
+from scipy.spatial import cKDTree
+
+from neuralocks_core.rotation import transformed
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from .seat import NEAR, find_seat, some_ends
+
+MOVES = 0.002
+"""Skin that blend shapes move by less [m] stays with its roots."""
+
+
+def floats(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
+    """What to say of hair that nothing binds and that lies off the skin of what carries it."""
+    seat = find_seat(prim, rig, placement)
+    if seat is None:
+        return []
+    return upside_down(prim, rig, seat.to_bind) or [
+        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {rig.path}"
+        f"{rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
+        "check that it was made for this pose"
+    ]
+
+
+def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:
+    """What to say of strands whose last points lie on skin, and whose first ones do not."""
+    if not rig.skins:
+        return []
+
+    def off_skin(ends: np.ndarray) -> float:
+        far = [tree.query(transformed(ends, to_bind))[0] for tree in rig.skins]
+        return float(np.median(np.min(far, axis=0)))
+
+    roots = off_skin(some_ends(prim))
+    if roots <= NEAR or off_skin(some_ends(prim, last=True)) > NEAR:
+        return []
+    return [
+        f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "
+        f"their first ones {roots:.2g} m away; reverse the strands"
+    ]
+
+
+def moved_away(path: str, rig: StageRig, roots: np.ndarray) -> list[str]:
+    """What to say of a groom whose skin a blend shape moves during the shot; its roots (n, 3) in bind world [m]."""
+    body, spans = rig.character.body, np.ptp(rig.clip.shape, axis=0)
+    if body is None or not spans.any():
+        return []
+    below = cKDTree(body.points).query(roots)[1]
+    ways = {
+        name: span * float(np.percentile(np.linalg.norm(offsets[below], axis=1), 90))
+        for (name, offsets), span in zip(body.shapes.items(), spans, strict=True)
+    }
+    name = max(ways, key=ways.get)
+    if ways[name] < MOVES:
+        return []
+    return [
+        f"{path}: blend shape '{name}' moves the skin below it by up to {1000 * ways[name]:.2g} mm; its roots stay with the "
+        "joint that carries them"
+    ]

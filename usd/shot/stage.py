@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A shot: any stage with animated skeletons and BasisCurves grooms, read into core types."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.groom import Groom
+
+from ..border.damage import names_damage
+from ..border.placement import Placement
+from ..border.prim_paths import prim_path
+from ..border.units import Border, open_stage
+from ..skel.source import StageRig, find_skeletons
+from .attach import Attachment, rig_joint
+from .curves import find_curves, read_groom
+from .hair_search import HairSearch
+from .lacking import no_groom, nothing_found
+from .notes import (
+    composition_notes,
+    few,
+    groom_notes,
+    layer_notes,
+    left_out,
+    not_animated,
+    partial_body,
+    rig_notes,
+    stands_still,
+    without_turn,
+)
+from .unnamed_head import read_each_rig
+
+
+@dataclass(frozen=True)
+class StageGroom:
+    """One groom of a shot.
+
+    Attributes:
+        path: the BasisCurves prim.
+        prim: the same, of the opened stage.
+        groom: at rest, bind-world metres.
+        attachment: what carries it, and where it lies in the bind pose.
+        placement: where the prim stands.
+    """
+
+    path: str
+    prim: Usd.Prim = field(repr=False)
+    groom: Groom = field(repr=False)
+    attachment: Attachment = field(repr=False)
+    placement: Placement = field(repr=False)
+
+    @property
+    def joint(self) -> str:
+        """Path of the joint that carries it."""
+        return rig_joint(self.attachment)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A stage read for a bake.
+
+    Attributes:
+        path: the file.
+        stage: kept open: poses are sampled from it at the exact time codes of a bake.
+        border: its units.
+        rigs: skeletons, those that carry a groom at least.
+        grooms: what is to be deformed.
+        first, last: frame range in time codes.
+        notes: what a user should know, one line each.
+    """
+
+    path: Path
+    stage: Usd.Stage = field(repr=False)
+    border: Border
+    rigs: tuple[StageRig, ...]
+    grooms: tuple[StageGroom, ...]
+    first: float
+    last: float
+    notes: tuple[str, ...]
+
+
+@names_damage
+def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None, cuts=None) -> Shot:
+    """Read a shot for a bake.
+
+    Args:
+        path: a USD file.
+        grooms: prim paths of the grooms wanted; if left out, all curves that lie on a skin or near a head.
+        skeleton: prim path of the skeleton that carries them; found if left out.
+        head: joint (path, or its last part) that carries grooms for which no binding says so.
+        joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        cuts: time codes from which every character is elsewhere and its hair starts anew, or these by skeleton path; found
+            where None.
+
+    Raises:
+        NeuralocksError: what stops a bake, with the prim and the remedy.
+    """
+    path, skeleton = as_path(path, "shot"), prim_path(skeleton, "skeleton")
+    stage = open_stage(path)
+    border = Border.of(stage)
+    notes = composition_notes(stage, path) + layer_notes(stage, path)
+    curves = find_curves(stage, grooms)
+    if not curves:
+        raise no_groom(stage, path)
+    rigs = _rigs(stage, border, skeleton, head, path, joints=joints, cuts=cuts)
+    _check_animated(rigs)
+    check_cuts(cuts, rigs)
+    # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
+    every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
+    others = [rig for rig in every if skeleton and rig.path != skeleton]
+    search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
+    found = _grooms(search, curves, notes)
+    if not found:
+        raise NeuralocksError(
+            search.far[0] if search.far else f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
+        )
+    notes += few(search.far)
+    if not grooms:
+        found = _moving(found, notes)
+    used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
+    for rig in used:
+        _check_animated([rig])
+        notes += rig.notes + partial_body(rig, every)
+    for item in found:
+        carrying = replace(item.attachment.rig, character=item.attachment.character)
+        if stops := without_turn(carrying):
+            raise NeuralocksError(stops[0])
+        notes += rig_notes(carrying)
+    first, last = frame_range(stage, used)
+    return Shot(
+        path=path,
+        stage=stage,
+        border=border,
+        rigs=used,
+        grooms=tuple(found),
+        first=first,
+        last=last,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+@names_damage
+def read_rigs(
+    path, skeleton: str | None = None, head: str | None = None, joints: dict[str, str] | None = None
+) -> tuple[StageRig, ...]:
+    """The characters and motion of a file, without grooms and whether animated or not.
+
+    Args:
+        path: a USD file.
+        skeleton: prim path of the one wanted; all if left out.
+        head: joint that is the head, where its name does not tell.
+        joints: semantic joint -> joint, where names do not tell.
+    """
+    stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
+    return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints))
+
+
+def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
+    """First and last time code: the stage's own, else the animation's."""
+    if stage.HasAuthoredTimeCodeRange():
+        first, last = float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
+        if np.isfinite([first, last]).all() and first <= last:
+            return first, last
+    return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
+
+
+def check_cuts(cuts, rigs) -> None:
+    """Refuse time codes of cuts at which no rig's animation could have one."""
+    for cut in () if isinstance(cuts, dict) else cuts or ():
+        if not any(rig.time_codes[0] < cut <= rig.time_codes[-1] for rig in rigs):
+            known = rigs[0].time_codes
+            raise NeuralocksError(
+                f"--cuts {cut:g}: lies outside the animation, which goes from {known[0]:g} to {known[-1]:g}; "
+                "give the first time code after each cut"
+            )
+
+
+def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> list[StageGroom]:
+    """The curves that are hair, read in bind-world metres."""
+    found = []
+    for prim in search.filled(curves):
+        placement = Placement(prim)
+        attachment = search.attachment(prim, placement)
+        if attachment is not None:
+            groom = read_groom(prim, attachment.to_bind, notes)
+            found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
+            notes += groom_notes(prim, groom, attachment.rig.border)
+    return found
+
+
+def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
+    """The grooms whose skeleton is animated, with a note on the others; all where none is."""
+    moving = [item for item in grooms if item.attachment.rig.source.animated]
+    if not moving:
+        return grooms
+    still = [item for item in grooms if not item.attachment.rig.source.animated]
+    notes += [stands_still(item.path, item.attachment.rig) for item in still]
+    return moving
+
+
+def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> list[StageRig]:
+    if not isinstance(joints, dict | None):
+        raise NeuralocksError(f"joints: {joints!r} is no dict; give one such as {{'left_upper_arm': 'arm_L'}}")
+    prims = find_skeletons(stage)
+    names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
+    if skeleton is not None:
+        prims = [p for p in prims if str(p.GetPath()) == skeleton]
+        if not prims:
+            raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
+    if not prims:
+        raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
+    rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)
+    if errors and (not rigs or skeleton):
+        raise errors[0]
+    for error in errors:
+        rigs[0].notes.append(left_out(error))
+    return rigs
+
+
+def _check_animated(rigs: list[StageRig]) -> None:
+    if not any(rig.source.animated for rig in rigs):
+        raise NeuralocksError(not_animated(rigs[0]))

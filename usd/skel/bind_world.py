@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bind pose in the world: which way is up in it, and how large it is."""
+
+import numpy as np
+
+from neuralocks_core.anatomy.humanoid import Humanoid
+from neuralocks_core.anatomy.standing import standing
+from neuralocks_core.character import sizes_shown
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import sizes
+
+from ..border.units import Border
+from .joints import JointSource
+
+
+def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humanoid: Humanoid) -> np.ndarray:
+    """Authored bind space to bind world [m], (4, 4).
+
+    Bind transforms are meant in world space, yet skinning takes them as the skeleton's own space, and files of both
+    kinds exist. They differ where the skeleton's parents scale or turn. The size is taken from what skinning makes of
+    the head, so that the head carries the groom without scaling; the axes are those in which the character stands
+    upright.
+
+    Args:
+        source: the skeleton.
+        border: the stage's units.
+        posed: its joints (T, J, 4, 4) in the stage.
+        humanoid: which of them is the head.
+
+    Raises:
+        NeuralocksError: the character is mirrored.
+    """
+    placed = source.placement.reference[:3, :3]
+    if np.linalg.det(placed) < 0:
+        raise NeuralocksError(
+            f"{source.path}: its root is mirrored (negative scale); apply or remove the negative scale"
+        )
+    head = humanoid.get("head", 0)
+    shown = sizes_shown(posed[:, head], source.bind[head])
+    if (shown < 0).any():
+        raise NeuralocksError(
+            f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
+            "apply or remove the negative scale"
+        )
+    ratio = np.median(shown) / sizes(placed)
+    if abs(ratio - 1) < 1e-4:
+        ratio = 1.0
+    up = border.to_core[1, :3] / np.linalg.norm(border.to_core[1, :3])
+    result = np.eye(4)
+    result[:3, :3] = standing(placed, source.bind[:, :3, 3], humanoid, up) * ratio
+    return border.to_core @ result

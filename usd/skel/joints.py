@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A UsdSkel skeleton and its animation as arrays in stage space: names, bind pose, and posed joints at any time.
+
+Evaluated here rather than by a UsdSkelSkeletonQuery, which exists only below a SkelRoot and takes one time at a time; a
+test holds the two together.
+"""
+
+import numpy as np
+from pxr import Sdf, Usd, UsdSkel, Vt
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import from_quaternion, relative_to_parents
+
+from ..border.arrays import wxyz
+from ..border.placement import Placement
+
+STRETCH = 0.003
+"""A quaternion's length may be off by so much before a user is told: single and half precision are nearer."""
+
+
+class JointSource:
+    """One Skeleton prim.
+
+    Attributes:
+        prim: the Skeleton.
+        names: joint paths (J).
+        parents: (J,) int, -1 for a root.
+        bind: bind transforms as authored, (J, 4, 4).
+        rest: local rest transforms, (J, 4, 4).
+        animation: the SkelAnimation prim, or None.
+        placement: where the skeleton stands.
+        notes: what a user should know about it.
+        ignored: the note that says why the animation does not count; None if it does, or if there is none.
+
+    Raises:
+        NeuralocksError: it has no joints, or arrays that do not fit each other.
+    """
+
+    def __init__(self, prim: Usd.Prim):
+        self.prim, self.path = prim, str(prim.GetPath())
+        self._stage = prim.GetStage()  # a prim alone does not keep its stage open
+        self.notes: list[str] = []
+        self.ignored: str | None = None
+        skeleton = UsdSkel.Skeleton(prim)
+        self.names = tuple(str(name) for name in skeleton.GetJointsAttr().Get() or ())
+        if not self.names:
+            raise NeuralocksError(f"{self.path}: the skeleton has no joints; export it with its joints")
+        self.parents = self._parents()
+        self.bind, self.rest = self._bind_and_rest(skeleton)
+        self.placement = Placement(prim)
+        source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
+        self.animation = source if source and source.IsA(UsdSkel.Animation) else None
+        self._animation = UsdSkel.Animation(self.animation) if self.animation else None
+        self._columns = self._animated_joints()
+
+    @property
+    def samples(self) -> list[float]:
+        """Ascending time codes with an authored sample: the animation's and the moving parents'."""
+        times = set(self.placement.samples)
+        if self._columns is not None:
+            for attribute in self._channels() + (self._animation.GetBlendShapeWeightsAttr(),):
+                times.update(attribute.GetTimeSamples())
+        return sorted(times)
+
+    @property
+    def animated(self) -> bool:
+        """Whether a SkelAnimation, or a parent's transform, drives it."""
+        return self._columns is not None or bool(self.placement.samples)
+
+    @property
+    def moves_joints(self) -> bool:
+        """Whether a SkelAnimation gives the pose; else UsdSkel shows the rest pose."""
+        return self._columns is not None
+
+    def posed(self, time_codes) -> np.ndarray:
+        """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
+        local = self._local(time_codes)
+        for joint, parent in enumerate(self.parents):  # parents come first
+            if parent >= 0:
+                local[:, joint] = local[:, parent] @ local[:, joint]
+        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ local
+
+    def shape(self, names, time_codes) -> np.ndarray:
+        """Blend shape weights (T, B) of the named shapes at time codes (T,); 0 where the animation has none."""
+        result = np.zeros((len(time_codes), len(names)))
+        order = [] if self._animation is None else [str(n) for n in self._animation.GetBlendShapesAttr().Get() or ()]
+        wanted = [(column, order.index(name)) for column, name in enumerate(names) if name in order]
+        if not wanted:
+            return result
+        weights = self._animation.GetBlendShapeWeightsAttr()
+        for row, time in enumerate(time_codes):
+            values = np.asarray(weights.Get(time) if weights.HasValue() else [], float)
+            if len(values) != len(order):
+                raise NeuralocksError(
+                    f"{self.animation.GetPath()}: {len(values)} blendShapeWeights for {len(order)} blendShapes; "
+                    "author one each"
+                )
+            result[row, [c for c, _ in wanted]] = values[[i for _, i in wanted]]
+        if not np.isfinite(result).all():
+            raise NeuralocksError(
+                f"{self.animation.GetPath()}: blendShapeWeights hold NaN or infinity; repair the animation"
+            )
+        return result
+
+    def _parents(self) -> np.ndarray:
+        seen: dict[str, int] = {}
+        parents = []
+        for index, name in enumerate(self.names):
+            if not Sdf.Path.IsValidPathString(name):
+                raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is no path; rename it")
+            if name in seen:
+                # Exporters put '_' for each letter that they do not take: all names of a Japanese rig become alike.
+                lost = not any(letter.isalnum() for letter in leaf(name))
+                remedy = (
+                    "export it with Unicode names allowed, or rename its bones" if lost else "make joint paths unique"
+                )
+                raise NeuralocksError(f"{self.path}: joint '{name}' is listed twice; {remedy}")
+            above = Sdf.Path(name).GetParentPath()
+            while (
+                not above.isEmpty
+                and above not in (Sdf.Path.reflexiveRelativePath, Sdf.Path.absoluteRootPath)
+                and str(above) not in seen
+            ):
+                if str(above) in self.names:
+                    raise NeuralocksError(f"{self.path}: joint '{name}' comes before its parent; list parents first")
+                above = above.GetParentPath()
+            parents.append(seen.get(str(above), -1))
+            seen[name] = index
+        return np.array(parents)
+
+    def _bind_and_rest(self, skeleton: UsdSkel.Skeleton) -> tuple[np.ndarray, np.ndarray]:
+        bind, rest = (self._matrices(a) for a in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()))
+        if bind is None and rest is None:
+            raise NeuralocksError(
+                f"{self.path}: has neither bindTransforms nor restTransforms; export it with its bind pose"
+            )
+        if bind is None:
+            self.notes.append(f"{self.path}: no bindTransforms; the rest pose serves as bind pose")
+            bind = rest.copy()
+            for joint, parent in enumerate(self.parents):
+                if parent >= 0:
+                    bind[joint] = bind[parent] @ bind[joint]
+        if rest is None:
+            rest = relative_to_parents(bind, self.parents)
+        return bind, rest
+
+    def _matrices(self, attribute: Usd.Attribute) -> np.ndarray | None:
+        values = attribute.Get()
+        if values is None or not len(values):
+            return None
+        if len(values) != len(self.names):
+            raise NeuralocksError(
+                f"{self.path}: {len(values)} {attribute.GetName()} for {len(self.names)} joints; author one each"
+            )
+        matrices = np.array(values, float).reshape(-1, 4, 4).swapaxes(-1, -2)
+        bad = ~np.isfinite(matrices).all(axis=(1, 2))
+        flat = ~bad & (np.abs(np.linalg.det(np.where(bad[:, None, None], np.eye(4), matrices)[:, :3, :3])) < 1e-18)
+        if (bad | flat).any():
+            joint = int(np.flatnonzero(bad | flat)[0])
+            fact = "holds NaN or infinity" if bad[joint] else "has zero scale"
+            raise NeuralocksError(
+                f"{self.path}: {attribute.GetName()} of joint '{self.names[joint]}' {fact}; repair it"
+            )
+        return matrices
+
+    def _channels(self):
+        animation = self._animation
+        return animation.GetTranslationsAttr(), animation.GetRotationsAttr(), animation.GetScalesAttr()
+
+    def _animated_joints(self) -> list[tuple[int, int]] | None:
+        """(joint, column of the animation) pairs; None where UsdSkel would show the rest pose instead."""
+        if self._animation is None:
+            return None
+        order = {str(name): i for i, name in enumerate(self._animation.GetJointsAttr().Get() or ())}
+        pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
+        self.ignored = self._unusable_channel()
+        if not self.ignored and not pairs:
+            self.ignored = f"{self.animation.GetPath()}: animates no joint of {self.path}; check its joint paths"
+        if self.ignored:
+            self.notes.append(self.ignored)
+            return None
+        self._width = len(order)
+        return pairs
+
+    def _unusable_channel(self) -> str | None:
+        """What is wrong with a channel for which UsdSkel ignores the animation, None if nothing is."""
+        path = self.animation.GetPath()
+        for attribute, kind in zip(self._channels(), (Vt.Vec3fArray, Vt.QuatfArray, Vt.Vec3hArray)):
+            name = attribute.GetName()
+            if not attribute.HasValue():
+                return f"{path}: no {name}, so UsdSkel ignores the animation; author all three channels"
+            values = attribute.Get(Usd.TimeCode.EarliestTime())
+            if not isinstance(values, kind | None):
+                own, wanted = (Sdf.GetValueTypeNameForValue(each) for each in (values, kind()))
+                return f"{path}: its {name} are {own}, so UsdSkel ignores the animation; author {wanted}"
+        return None
+
+    def _local(self, time_codes) -> np.ndarray:
+        """Local joint transforms (T, J, 4, 4)."""
+        result = np.broadcast_to(self.rest, (len(time_codes), *self.rest.shape)).copy()
+        if self._columns is None:
+            return result
+        joints, columns = (np.array(side) for side in zip(*self._columns, strict=True))
+        translation, turn, scale = (np.empty((len(time_codes), self._width, n)) for n in (3, 4, 3))
+        for row, time in enumerate(time_codes):
+            for target, attribute, quaternions in zip(
+                (translation, turn, scale), self._channels(), (False, True, False), strict=True
+            ):
+                values = attribute.Get(time)
+                if values is None or len(values) != self._width:
+                    count = 0 if values is None else len(values)
+                    raise NeuralocksError(
+                        f"{self.animation.GetPath()}: {count} {attribute.GetName()} at time code {time:g} for {self._width} joints; "
+                        "author one each"
+                    )
+                target[row] = wxyz(values) if quaternions else np.asarray(values, float)
+        self._check(time_codes, translation, turn, scale)
+        self._note_lengths(time_codes, turn[:, columns], joints)
+        result[:, joints, :3, :3] = from_quaternion(turn[:, columns]) * scale[:, columns, None, :]
+        result[..., :3, 3][:, joints] = translation[:, columns]
+        return result
+
+    def _check(self, time_codes, translation, turn, scale) -> None:
+        finite = [np.isfinite(a).all(axis=-1) for a in (translation, turn, scale)]
+        good = finite[0] & finite[1] & finite[2] & (np.abs(turn).sum(axis=-1) > 1e-12)
+        if good.all():
+            return
+        row, column = np.argwhere(~good)[0]
+        name = (self._animation.GetJointsAttr().Get() or ())[int(column)]
+        raise NeuralocksError(
+            f"{self.animation.GetPath()}: joint '{name}' holds NaN, infinity or a null rotation at time code {time_codes[row]:g}; "
+            "repair the animation"
+        )
+
+    def _note_lengths(self, time_codes, turns, joints) -> None:
+        """A note on rotations that UsdSkel would stretch the character by, while they are read as plain ones here."""
+        off = np.abs(np.linalg.norm(turns, axis=-1) - 1) > STRETCH
+        if not off.any() or any("of unit length" in note for note in self.notes):
+            return
+        row, column = np.argwhere(off)[0]
+        self.notes.append(
+            f"{self.animation.GetPath()}: the rotation of joint '{self.names[joints[column]]}' at time code "
+            f"{time_codes[row]:g} is not of unit length, which UsdSkel shows as a stretch; normalise the rotations"
+        )

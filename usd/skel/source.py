@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A skeleton of the stage as a Character and a Clip: metres, Y up, world space."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from pxr import Usd, UsdSkel
+from scipy.spatial import cKDTree
+
+from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
+from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
+from neuralocks_core.rotation import angle_between, transformed
+
+from ..border.units import Border
+from .bind_world import to_bind_world
+from .blend_shapes import knot_weights, shares
+from .joints import JointSource
+from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
+
+CLOSE = 1.5 / 24
+"""Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
+
+
+@dataclass(frozen=True)
+class StageRig:
+    """One skeleton with its body and motion.
+
+    Attributes:
+        path: the Skeleton prim.
+        source: the skeleton as authored.
+        border: the stage's units.
+        meshes: what it skins.
+        to_bind: authored bind space to bind world [m], (4, 4).
+        character: in core axes and metres.
+        clip: world joint transforms at the time codes `time_codes`.
+        time_codes: (T,).
+        notes: what a user should know about it.
+        by_hand: semantic joint -> joint, as the user named them.
+    """
+
+    path: str
+    source: JointSource = field(repr=False)
+    border: Border
+    meshes: list[StageMesh] = field(repr=False)
+    to_bind: np.ndarray = field(repr=False)
+    character: Character = field(repr=False)
+    clip: Clip = field(repr=False)
+    time_codes: np.ndarray = field(repr=False)
+    notes: list[str] = field(repr=False)
+    by_hand: dict[str, str] = field(default_factory=dict, repr=False)
+
+    def joints_at(self, time_code: float) -> np.ndarray:
+        """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
+        return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+
+    def loop_notes(self, replaced=()) -> list[str]:
+        """What is wrong with the motion as a loop: its last sample must show the pose of its first; joints that a bake
+        replaces are left out.
+        """
+        ends = self.clip.joints[[0, -1], :, :3, :3]
+        first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
+        turn = np.degrees(angle_between(first, last))
+        turn[list(replaced)] = 0
+        if turn.max() <= LOOP_GAP:
+            return []
+        name, (start, end) = self.source.names[int(turn.argmax())], self.time_codes[[0, -1]]
+        return [
+            f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
+            "a loop ends with the pose that it begins with"
+        ]
+
+    def cut_notes(self) -> list[str]:
+        """Where the hair starts anew, if it does anywhere."""
+        if self.clip.loop or not len(self.clip.cuts):
+            return []
+        codes = self.time_codes[np.searchsorted(self.clip.times, self.clip.cuts - 1e-9)]
+        named = ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
+        return [f"{self.path}: its head is put elsewhere at {named}; the hair starts anew there (--cuts says where)"]
+
+    @cached_property
+    def skins(self) -> list[cKDTree]:
+        """The points of each mesh in bind world [m], by nearness."""
+        return [cKDTree(transformed(mesh.points, self.to_bind @ mesh.geom_bind)) for mesh in self.meshes]
+
+    @cached_property
+    def _to_world(self) -> np.ndarray:
+        return self.border.to_core
+
+    @cached_property
+    def _trim(self) -> np.ndarray:
+        return joint_trim(self.source, self.to_bind)
+
+
+def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:
+    """Per joint, the scale (J, 4, 4) that makes its bind transform a plain rotation and translation.
+
+    Applied to bind and posed transforms alike it cancels; it keeps stage units, and the mirrored joint orients of some
+    rigs, out of the core.
+    """
+    determinant = np.linalg.det((to_bind @ source.bind)[:, :3, :3])
+    trim = np.zeros((len(determinant), 4, 4))
+    size = 1 / np.cbrt(np.abs(determinant))
+    trim[:, 0, 0] = size * np.sign(determinant)
+    trim[:, 1, 1] = trim[:, 2, 2] = size
+    trim[:, 3, 3] = 1
+    return trim
+
+
+def read_rig(
+    stage: Usd.Stage,
+    prim: Usd.Prim,
+    border: Border,
+    head: str | None = None,
+    *,
+    all_shapes: bool = False,
+    joints=None,
+    cuts: list[float] | None = None,
+    skins: Skins | None = None,
+    headless: bool = False,
+) -> StageRig:
+    """Read a skeleton, its meshes and its motion.
+
+    Args:
+        stage: the shot.
+        prim: the Skeleton.
+        border: the stage's units.
+        head: joint that is the head; found by name and hierarchy if left out.
+        all_shapes: keep blend shapes that the animation does not use.
+        joints: semantic joint -> joint path or its last part, where names do not tell.
+        cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
+        skins: of the stage, if they were looked for already.
+        headless: read it without a head, and without any other joint's meaning, where no joint is named like one.
+
+    Raises:
+        NoHead: no joint is named like a head.
+        NeuralocksError: something in it cannot be used; the message names the prim.
+    """
+    source = JointSource(prim)
+    notes = source.notes
+    time_codes = _time_codes(source, border)
+    posed = source.posed(time_codes)
+    meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
+    by_hand = {**(joints or {}), **({"head": head} if head else {})}
+    try:
+        humanoid = _humanoid(source, by_hand)
+    except NoHead:
+        if not headless:
+            raise
+        humanoid = Humanoid({})
+    to_bind = to_bind_world(source, border, posed, humanoid)
+    trim = joint_trim(source, to_bind)
+    skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
+    knots = knot_weights([mesh.shapes for mesh in meshes])
+    weights = dict(zip(knots, source.shape(list(knots), time_codes).T, strict=True))
+    used = {name: column for name, column in weights.items() if all_shapes or column.any()}
+    body = merged_body(meshes, to_bind, set(used))
+    character = Character(skeleton, body, humanoid)
+    clip = Clip(
+        border.seconds(time_codes),
+        border.to_core @ posed @ trim,
+        np.concatenate([np.zeros((len(posed), 0)), *(shares(w, knots[name]) for name, w in used.items())], axis=1),
+    )
+    if cuts is not None:
+        known = border.seconds([cut for cut in sorted(cuts) if time_codes[0] < cut <= time_codes[-1]])
+    else:
+        known = find_cuts(clip, character.head) if "head" in humanoid else ()
+    clip = replace(clip, cuts=known)
+    return StageRig(
+        path=source.path,
+        source=source,
+        border=border,
+        meshes=meshes,
+        to_bind=to_bind,
+        character=character,
+        clip=clip,
+        time_codes=time_codes,
+        notes=notes,
+        by_hand=by_hand,
+    )
+
+
+def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Skeleton prims in stage order."""
+    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+
+
+def _time_codes(source: JointSource, border: Border) -> np.ndarray:
+    """Where the animation is read (T,): at its samples, and at every frame in gaps wider than CLOSE."""
+    frame = border.frame
+    samples = source.samples
+    if not samples:
+        return np.zeros(1)
+    first, last = samples[0], samples[-1]
+    stage = source.prim.GetStage()
+    if stage.HasAuthoredTimeCodeRange():
+        # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
+        start, end = min(stage.GetStartTimeCode(), first), max(stage.GetEndTimeCode(), last)
+        if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
+            samples = [start, *samples, end]
+            first, last = start, end
+    count = (last - first) / frame + len(samples)
+    if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
+        raise NeuralocksError(
+            f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
+            "remove stray keys, or samples and joints that the shot does not need"
+        )
+    begin = np.ceil(first) if frame == 1 else first
+    frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
+    samples = np.unique(samples)
+    # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
+    near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
+    wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
+    return np.unique(np.concatenate([frames[wide], samples]))
+
+
+def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
+    try:
+        return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
+    except NeuralocksError as error:
+        raise type(error)(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None

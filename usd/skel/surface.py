@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Skinned meshes as arrays: points in authored bind space, triangles, influences, blend shapes."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdSkel
+
+from neuralocks_core.body.mesh import inside_out
+from neuralocks_core.character import Body
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
+
+from ..border.arrays import column_matrix
+from ..border.placement import Placement
+from .blend_shapes import Knots, at_knot, knot_weights, read_blend_shapes
+from .joints import JointSource
+
+
+@dataclass(frozen=True)
+class StageMesh:
+    """One mesh that follows a skeleton.
+
+    Attributes:
+        prim: the Mesh.
+        geom_bind: mesh space to authored bind space, (4, 4).
+        points: (V, 3), mesh space at rest.
+        triangles: (F, 3) int, outward.
+        indices, weights: (V, I), joints of the skeleton and their shares; rows sum to one.
+        shapes: blend shape name -> its knots, mesh space.
+        placement: where the prim itself stands.
+    """
+
+    prim: Usd.Prim
+    geom_bind: np.ndarray
+    points: np.ndarray
+    triangles: np.ndarray
+    indices: np.ndarray
+    weights: np.ndarray
+    shapes: dict[str, Knots] = field(repr=False)
+    placement: Placement = field(repr=False)
+
+    def in_bind(self, to_bind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (V, 3) [m] and outward triangles (F, 3) in bind world, by its rig's way there (4, 4)."""
+        matrix = to_bind @ self.geom_bind
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        return transformed(self.points, matrix), self.triangles[:, ::-1] if mirrored else self.triangles
+
+
+Skins = dict[str, list[Usd.Prim]]
+"""Path of a skeleton -> the Mesh prims that it skins, in stage order."""
+
+
+def find_skins(stage: Usd.Stage) -> Skins:
+    """The skinned meshes of a stage: looked for once, a set may have many more meshes than its characters."""
+    found: Skins = {}
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.Mesh) and (skeleton := bound_skeleton(prim)) is not None:
+            found.setdefault(skeleton, []).append(prim)
+    return found
+
+
+def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[StageMesh]:
+    """Visible meshes that the skeleton skins, in stage order.
+
+    Raises:
+        NeuralocksError: a mesh's arrays do not fit each other or are not finite.
+    """
+    read = (_read(prim, source, notes) for prim in skins.get(source.path, ()) if _drawn(prim))
+    return [mesh for mesh in read if mesh is not None]
+
+
+def bound_skeleton(prim: Usd.Prim) -> str | None:
+    """Path of the skeleton that skins this prim by its own or an inherited binding, or did before a bake unbound it."""
+    if influences(prim)[0] is None:
+        return None
+    skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
+    if skeleton:
+        return str(skeleton.GetPath())
+    relation = prim.GetRelationship("skel:skeleton")
+    specs = relation.GetPropertyStack() if relation else []
+    for target in (target for spec in specs for target in spec.targetPathList.GetAddedOrExplicitItems()):
+        if UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(target)):
+            return str(target)
+    # A layer that unbinds and moves the points is a bake; the binding that it ended may be of a prim above.
+    if any(spec.layer.GetNumTimeSamplesForPath(spec.path.ReplaceName("points")) for spec in specs):
+        skeleton = UsdSkel.BindingAPI(prim.GetParent()).GetInheritedSkeleton()
+    return str(skeleton.GetPath()) if skeleton else None
+
+
+def influences(prim: Usd.Prim) -> tuple[UsdGeom.Primvar | None, UsdGeom.Primvar | None]:
+    """The primvars of joint indices and weights in effect on a prim; inherited ones too, as UsdSkel has it."""
+    api = UsdGeom.PrimvarsAPI(prim)
+    pair = [api.FindPrimvarWithInheritance(f"skel:joint{part}") for part in ("Indices", "Weights")]
+    return tuple(pair) if all(p and p.HasValue() for p in pair) else (None, None)
+
+
+def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into the skeleton and weights, each (count, I), of a skinned prim with `count` points.
+
+    Raises:
+        NeuralocksError: they do not fit the points or the skeleton.
+    """
+    path = prim.GetPath()
+    primvars = influences(prim)
+    size = max(int(primvars[0].GetElementSize()), 1)
+    indices, weights = (np.asarray(rest_primvar(p), kind) for p, kind in zip(primvars, (int, float)))
+    rows = 1 if primvars[0].GetInterpolation() == "constant" else count
+    if len(indices) != rows * size or len(weights) != rows * size:
+        raise NeuralocksError(
+            f"{path}: {len(indices)} joint indices and {len(weights)} weights for {rows} points of {size}; "
+            "export the skin again"
+        )
+    order = [str(name) for name in _in_effect(prim, "skel:joints") or ()] or list(source.names)
+    unknown = [name for name in order if name not in source.names]
+    if unknown:
+        raise NeuralocksError(
+            f"{path}: skel:joints names '{unknown[0]}', which {source.path} does not have; bind it again"
+        )
+    if indices.size and not 0 <= indices.min() <= indices.max() < len(order):
+        raise NeuralocksError(f"{path}: a joint index lies outside 0..{len(order) - 1}; bind it again")
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise NeuralocksError(f"{path}: joint weights hold NaN, infinity or a negative value; bind it again")
+    place = {name: i for i, name in enumerate(source.names)}
+    indices = np.array([place[name] for name in order])[indices].reshape(rows, size)
+    weights = weights.reshape(rows, size)
+    total = weights.sum(axis=1, keepdims=True)
+    weights = np.where(total > 1e-9, weights / np.maximum(total, 1e-9), np.eye(1, size))
+    return np.broadcast_to(indices, (count, size)), np.broadcast_to(weights, (count, size))
+
+
+def geom_bind(prim: Usd.Prim) -> np.ndarray:
+    """Transform (4, 4) from the prim's points to authored bind space."""
+    value = _in_effect(prim, "primvars:skel:geomBindTransform")
+    matrix = np.eye(4) if value is None else column_matrix(value)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
+        raise NeuralocksError(f"{prim.GetPath()}: its geomBindTransform is not finite or flat; bind it again")
+    return matrix
+
+
+def _in_effect(prim: Usd.Prim, name: str):
+    """The value at rest of a binding property: the prim's own, else that of the nearest prim above with a binding, as
+    UsdSkel has it. None if there is none.
+    """
+    above = prim
+    while above and not above.IsPseudoRoot():
+        attribute = above.GetAttribute(name)
+        if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
+            value = rest_value(attribute)
+            if value is not None:
+                return value
+        above = above.GetParent()
+    return None
+
+
+def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
+    """All meshes as one Body.
+
+    Args:
+        meshes: what one skeleton skins.
+        to_bind: authored bind space to bind world [m], (4, 4).
+        keep: blend shapes wanted; all if None. Each of their knots is a shape of the Body.
+    """
+    if not meshes:
+        return None
+    width = max(m.indices.shape[1] for m in meshes)
+    ends = np.cumsum([0] + [len(m.points) for m in meshes])
+    placed = [m.in_bind(to_bind) for m in meshes]
+    points = np.concatenate([own for own, _ in placed])
+    triangles = np.concatenate([faces + start for (_, faces), start in zip(placed, ends)])
+    pad = [((0, 0), (0, width - m.indices.shape[1])) for m in meshes]
+    shapes = {}
+    for name, knots in knot_weights([mesh.shapes for mesh in meshes]).items():
+        for knot in knots if keep is None or name in keep else ():
+            offsets = shapes.setdefault(name if knot == 1 else f"{name} at {knot:g}", np.zeros((len(points), 3)))
+            for mesh, start, end in zip(meshes, ends, ends[1:]):
+                if name in mesh.shapes:
+                    turn = (to_bind @ mesh.geom_bind)[:3, :3]
+                    offsets[start:end] = at_knot(mesh.shapes[name], knot) @ turn.T
+    return Body(
+        points,
+        triangles,
+        np.concatenate([np.pad(m.indices, p) for m, p in zip(meshes, pad)]),
+        np.concatenate([np.pad(m.weights, p) for m, p in zip(meshes, pad)]),
+        shapes,
+    )
+
+
+def _drawn(prim: Usd.Prim) -> bool:
+    imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+    return imageable.ComputePurpose() not in unseen and _ever_visible(prim)
+
+
+def _ever_visible(prim: Usd.Prim) -> bool:
+    """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
+    switches = []
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if above.IsA(UsdGeom.Imageable):
+            switches.append(UsdGeom.Imageable(above).GetVisibilityAttr())
+        above = above.GetParent()
+    times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
+    return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
+
+
+def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | None:
+    mesh, path = UsdGeom.Mesh(prim), prim.GetPath()
+    points = rest_value(mesh.GetPointsAttr())
+    if points is None or not len(points):
+        notes.append(f"{path}: the mesh has no points; left out of the body")
+        return None
+    points = np.asarray(points, float)
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
+    triangles = _triangles(mesh, path, len(points))
+    if inside_out(points, triangles):
+        notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to be rid of this")
+        triangles = triangles[:, ::-1]
+    indices, weights = joint_influences(prim, len(points), source)
+    shapes = read_blend_shapes(prim, len(points), notes)
+    return StageMesh(
+        prim=prim,
+        geom_bind=geom_bind(prim),
+        points=points,
+        triangles=triangles,
+        indices=indices,
+        weights=weights,
+        shapes=shapes,
+        placement=Placement(prim),
+    )
+
+
+def rest_value(attribute: Usd.Attribute):
+    """The default-time value, else the earliest sample."""
+    value = attribute.Get(Usd.TimeCode.Default())
+    return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def rest_primvar(primvar: UsdGeom.Primvar):
+    """Like `rest_value`, with one value for each element."""
+    value = primvar.ComputeFlattened(Usd.TimeCode.Default())
+    return primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _triangles(mesh: UsdGeom.Mesh, path, count: int) -> np.ndarray:
+    faces = np.asarray(rest_value(mesh.GetFaceVertexCountsAttr()) or [], np.int64)
+    corners = np.asarray(rest_value(mesh.GetFaceVertexIndicesAttr()) or [], np.int64)
+    if faces.size and faces.min() < 0 or faces.sum() != len(corners):
+        raise NeuralocksError(f"{path}: face counts sum to {faces.sum()} for {len(corners)} corners; repair the mesh")
+    if corners.size and not 0 <= corners.min() <= corners.max() < count:
+        raise NeuralocksError(f"{path}: a face names a point outside 0..{count - 1}; repair the mesh")
+    starts = np.cumsum(faces) - faces
+    fans = np.maximum(faces - 2, 0)
+    first = np.repeat(starts, fans)
+    step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+    triangles = np.stack([corners[first], corners[first + step + 1], corners[first + step + 2]], axis=1)
+    return triangles[:, ::-1] if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else triangles
