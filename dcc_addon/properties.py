@@ -143,10 +143,11 @@ class HairSettings(bpy.types.PropertyGroup):
     )
     motion: FloatProperty(
         name="Motion",
-        description="How much of the movement shows; at 0 the hair hangs as in a held pose",
+        description="How much of the movement shows; at 0 the hair hangs as in a held pose, up to 4, typed in, exaggerates",
         default=1.0,
         min=0.0,
-        max=1.0,
+        max=4.0,
+        soft_max=1.0,
         subtype="FACTOR",
         update=_look_changed,
         **SETTING,
@@ -211,10 +212,11 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     rig_motion: FloatProperty(
         name="Motion",
-        description="How much of the movement shows",
+        description="How much of the movement shows; up to 2, typed in, exaggerates",
         default=1.0,
         min=0.0,
-        max=1.0,
+        max=2.0,
+        soft_max=1.0,
         subtype="FACTOR",
         update=_rig_look_changed,
         **SETTING,
@@ -236,12 +238,12 @@ class SceneSettings(bpy.types.PropertyGroup):
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1, update=_range_changed)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
-        name="Sub-frames",
-        description="Samples between two frames, for motion blur; a shutter that is open before the first frame, or after "
-        "the last, needs a bake that is a frame longer there",
-        default=0,
-        min=0,
-        max=15,
+        name="Samples per Frame",
+        description="More than one for motion blur, as --subframes on the command line; a shutter that is open before the "
+        "first frame, or after the last, needs a bake that is a frame longer there",
+        default=1,
+        min=1,
+        max=16,
         update=_range_changed,
     )
     output: StringProperty(

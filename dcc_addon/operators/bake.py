@@ -105,7 +105,7 @@ def bake_steps(context, armature, hairs, path: str):
                     out,
                     look.model,
                     frames=f"{first}:{last}",
-                    subframes=subframes + 1,
+                    subframes=subframes,
                     material=list(look.material),
                     strength=look.motion,
                     resolve=look.resolve,

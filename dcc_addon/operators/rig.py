@@ -68,7 +68,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
                 actions.check_mode_left(armature, bones.bones)
         finally:  # whatever keeps the new keys from being made leaves earlier ones, and Live, as they were
             refresh(scene)
-        frames = frame_numbers(first, last, 0)
+        frames = frame_numbers(first, last, 1)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.

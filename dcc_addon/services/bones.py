@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair bones: which they are, and how they turn at any time."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,7 +63,9 @@ class LiveBones:
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
-        joints = model.chains.match(rig.paths, character.skeleton.below(character.head))
+        below = character.skeleton.below(character.head)
+        model = replace(model, chains=model.chains.named_as(rig.paths, below))
+        joints = model.chains.match(rig.paths, below)
         chains = chains_of(character, patterns)
         model.chains.check_same(chains)
         return cls(model, tuple(rig.bones[j] for j in joints), joints, chains)

@@ -181,8 +181,7 @@ class Motion:
 
 
 def frame_numbers(start: int, end: int, subframes: int) -> np.ndarray:
-    """Frames to sample from `start` to `end`, with `subframes` more between any two, (T,)."""
+    """Frames to sample from `start` to `end`, `subframes` of each but the last, which has one, (T,)."""
     if end < start:
         raise NeuralocksError(f"frame range: it ends at {end}, before its start {start}; set an end after the start")
-    step = subframes + 1
-    return start + np.arange((end - start) * step + 1) / step
+    return start + np.arange((end - start) * subframes + 1) / subframes

@@ -3,6 +3,8 @@
 
 import re
 from collections import Counter
+from collections.abc import Sequence
+from os.path import commonprefix
 
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NOISE = {
@@ -46,6 +48,7 @@ _JAPANESE = {
 """MikuMikuDance's standard bones, in files with UTF-8 names; of words within words the longer comes first."""
 _TRUNK = {"head", "neck", "spine", "hair"}
 """With the parts of limbs, words that say what a joint is, however many begin with them."""
+_PREFIX_ENDS = ":|_.-"
 SHARED = 0.9
 """Share of the joints that begin with a namespace; exporters put a root of their own above them."""
 
@@ -104,3 +107,25 @@ def _side_and_key(words: list[str]) -> tuple[str, str]:
         words = ["right", words[0][5:]]
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     return side, "".join(word for word in words if word not in _SIDES and word not in _NOISE)
+
+
+def prefixed_otherwise(names: Sequence[str], there: set[str]) -> tuple[str, ...] | None:
+    """What these names are called among others that begin otherwise: as 'Hair1' is 'rig:Hair1', and 'A_Hair1' 'B_Hair1'.
+
+    A prefix ends at one of `:|_.-`, or is none.
+
+    Returns:
+        One name for each, if there is one way and no more; None also if all are there as they are.
+    """
+    if there.issuperset(names):
+        return None
+    shared = commonprefix(list(names))
+    ways = set()
+    for start in (0, *(k for k in range(1, len(shared) + 1) if shared[k - 1] in _PREFIX_ENDS)):
+        rests = [name[start:] for name in names]
+        for other in there:
+            prefix = other.removesuffix(rests[0])
+            if all(rests) and prefix != other and (not prefix or prefix[-1] in _PREFIX_ENDS):
+                ways.add(tuple(prefix + rest for rest in rests))
+    ways = [way for way in ways if there.issuperset(way)]
+    return ways[0] if len(ways) == 1 else None

@@ -5,11 +5,11 @@ A *chain* is one tree of the forest; it may branch. Everything is kept in canoni
 joint, Y up, +Z face, metres), where joint orients, units and up axes of the rig are gone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.anatomy.joint_names import leaf, prefixed_otherwise
 from neuralocks_core.errors import NeuralocksError
 
 SAME_AXES = 1e-5
@@ -84,6 +84,11 @@ class HairChains:
         """First joint of every chain, (chains,)."""
         return np.flatnonzero(self.parents < 0)
 
+    @property
+    def tops(self) -> list[str]:
+        """Names of the first joints."""
+        return [self.names[root] for root in self.roots]
+
     def chain_name(self, chain: int) -> str:
         """A chain goes by its first joint."""
         return self.names[self.roots[chain]]
@@ -103,6 +108,17 @@ class HairChains:
         for joint, parent in enumerate(self.parents):
             depth[joint] = depth[parent] + 1 if parent >= 0 else 0
         return [np.flatnonzero(depth == level) for level in range(depth.max() + 1)]
+
+    def named_as(self, names, below: np.ndarray) -> "HairChains":
+        """These chains with the names that they have in another copy of the rig, where only what all names begin with is
+        another: a namespace, an exporter's prefix. Themselves where they are there, or where that does not tell.
+
+        Args:
+            names, below: as for `match`.
+        """
+        there = {leaf(names[index]) for index in np.flatnonzero(below)}
+        renamed = prefixed_otherwise(self.names, there)
+        return replace(self, names=renamed) if renamed else self
 
     def match(self, names, below: np.ndarray) -> np.ndarray:
         """Indices (N,) of these joints among `names`, joint paths or their last parts, those for which `below` (J,) says

@@ -117,10 +117,10 @@ def test_a_motion_in_parts_is_the_whole():
 
 
 def test_frame_numbers():
-    np.testing.assert_allclose(frame_numbers(1, 3, 1), [1, 1.5, 2, 2.5, 3])
+    np.testing.assert_allclose(frame_numbers(1, 3, 2), [1, 1.5, 2, 2.5, 3])
     assert list(frame_numbers(4, 4, 3)) == [4]
     with pytest.raises(NeuralocksError, match="ends at 1"):
-        frame_numbers(2, 1, 0)
+        frame_numbers(2, 1, 1)
 
 
 def test_blender_front_becomes_core_front():

@@ -13,6 +13,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
+from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 
@@ -92,7 +93,8 @@ def bake_rig(
     check_number("--strength", strength, 0, 2)
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     cuts = given_cuts(cuts, loop)
-    hair, moved = _read(shot, skeleton, head, model, cuts, joints)
+    trained = model.chains
+    hair, model, moved = _read(shot, skeleton, head, model, cuts, joints)
     source = hair.source.source
     check_not_input(out, hair.stage)
     wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
@@ -100,7 +102,12 @@ def bake_rig(
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     sampler = RigSampler(model.spec, hair.source.character, clip)
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
-    notes = [*rigged_notes(hair.source, model.spec.pose_joints), *_name_notes(source), *_held(hair, turns)]
+    notes = [
+        *_renamed(trained, model.chains),
+        *rigged_notes(hair.source, model.spec.pose_joints),
+        *_name_notes(source),
+        *_held(hair, turns),
+    ]
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
     notes += hair.source.loop_notes(moved) if loop else []
     if cuts is None and model.dynamic:
@@ -109,22 +116,36 @@ def bake_rig(
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
-def _read(shot, skeleton, head, model, cuts, joints) -> tuple[RiggedHair, np.ndarray]:
-    """The shot, and where the model's joints are in its skeleton (N,)."""
+def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHair, RigModel, np.ndarray]:
+    """The shot, the model with the shot's names of its joints, and where these are in the skeleton (N,)."""
+    given = {"skeleton": skeleton, "head": head, "joints": joints, "cuts": cuts}
     # The model knows its joints: no guess is made about which ones are hair.
-    tops = [model.chains.names[i] for i in model.chains.roots]
     try:
-        hair = read_rigged_hair(shot, skeleton=skeleton, head=head, chains=tops, joints=joints, cuts=cuts)
-    except NoHairChains:
-        raise NeuralocksError(
-            f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
-            "give a model trained for this rig (neuralocks rig train)"
-        ) from None
+        hair = read_rigged_hair(shot, chains=model.chains.tops, **given)
+    except NoHairChains as error:
+        if (chains := _named_otherwise(shot, model.chains, given)) is None:
+            tops = model.chains.tops
+            raise NeuralocksError(
+                f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
+                "give a model trained for this rig (neuralocks rig train)"
+            ) from error
+        model = replace(model, chains=chains)
+        hair = read_rigged_hair(shot, chains=chains.tops, **given)
     character = hair.source.character
     moved = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
     model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
-    return hair, moved
+    return hair, model, moved
+
+
+def _named_otherwise(shot, chains: HairChains, given: dict) -> HairChains | None:
+    """The model's chains as a shot calls them in which no name of theirs is found."""
+    try:
+        character = read_rigged_hair(shot, **given).source.character
+    except NeuralocksError:  # hair that cannot be found in it anyhow
+        return None
+    named = chains.named_as(character.skeleton.names, character.skeleton.below(character.head))
+    return None if named is chains else named
 
 
 def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
@@ -146,6 +167,13 @@ def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
             "animate the skeleton, or name the joint that carries the hair with --head JOINT"
         )
     return [f"{hair.source.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
+
+
+def _renamed(trained: HairChains, here: HairChains) -> list[str]:
+    """The note on joints that are called otherwise than in the rig that the model was trained for."""
+    if here is trained:
+        return []
+    return [f"model: its joints have other names here, '{here.names[0]}' for '{trained.names[0]}'"]
 
 
 def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:

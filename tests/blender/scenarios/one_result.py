@@ -168,7 +168,7 @@ def shutter_at_the_ends(folder: Path) -> None:
     scenes.dance(rig, (-5, 30))
     strands = scenes.hair(rig, 20)
     settings = scene.neuralocks
-    settings.subframes = 3
+    settings.subframes = 4
     for longer in (False, True):
         settings.use_scene_range, settings.frame_start, settings.frame_end = not longer, 0, 25
         make_live(rig, strands)

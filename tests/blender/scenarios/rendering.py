@@ -148,7 +148,7 @@ def motion_blur(folder: Path) -> None:
     rig = scenes.armature()
     scenes.dance(rig)
     strands, plain, scene = scenes.hair(rig, 20), scenes.hair(rig, 20, name="Plain"), bpy.context.scene
-    scene.neuralocks.subframes = 3
+    scene.neuralocks.subframes = 4
     make_live(rig, strands)
     shown = {frame: points_at(strands, int(frame), frame % 1) for frame in (3.75, 4.0, 4.25)}
     got, deformed = {}, []

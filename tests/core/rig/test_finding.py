@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from neuralocks_core.anatomy.joint_names import prefixed_otherwise
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import HairChains, find_chains
@@ -164,6 +165,22 @@ def test_a_model_for_other_chains_is_refused():
     with pytest.raises(NeuralocksError, match="elsewhere"):
         chains.check_same(longer)
     assert HairChains.from_json(chains.to_json()).names == chains.names
+
+
+@pytest.mark.parametrize(
+    ("names", "there", "called"),
+    [
+        (["Hair1", "Hair2"], {"rig:Hair1", "rig:Hair2", "Ear"}, ("rig:Hair1", "rig:Hair2")),
+        (["A_Hair1", "A_Hair2"], {"Hair1", "Hair2"}, ("Hair1", "Hair2")),
+        (["A_Hair1", "A_Hair2"], {"B_Hair1", "B_Hair2", "C_Hair1"}, ("B_Hair1", "B_Hair2")),
+        (["A_Hair1", "A_Hair2"], {"B_Hair1", "B_Hair2", "C_Hair1", "C_Hair2"}, None),
+        (["Hair1", "Hair2"], {"Hair1", "Hair2"}, None),
+        (["Hair1"], {"ChestHair1"}, None),
+        (["Hair_"], {"Tail_"}, None),
+    ],
+)
+def test_names_that_only_begin_otherwise(names, there, called):
+    assert prefixed_otherwise(names, there) == called
 
 
 def test_hair_that_hangs_from_the_neck_is_named_with_its_carrier():

@@ -65,9 +65,28 @@ def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_s
 def test_a_model_of_another_rig_is_named_as_such(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))
-    shot.write_text(shot.read_text().replace("hair_", "tuft_"))
+    shot.write_text(shot.read_text().replace("hair_", "tuft"))
     with pytest.raises(NeuralocksError, match=r"1 hair chains \(hair_0, ...\).*a model trained for this rig"):
         bake_rig(shot, tmp_path / "out.usda", model)
+
+
+@pytest.mark.parametrize("prefix", ["Anna_hair_", "tuft_"])
+def test_joints_that_only_begin_otherwise_are_the_models(tmp_path, prefix):
+    """Exporters put namespaces before names; bones elsewhere than the model's are refused all the same."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    plain = bake_rig(shot, tmp_path / "plain.usda", model)
+    text = shot.read_text()
+    shot.write_text(text.replace("hair_", prefix))
+    result = bake_rig(shot, tmp_path / "out.usda", model)
+    codes = range(1, 26)
+    np.testing.assert_array_equal(hair_turns(result.path, codes), hair_turns(plain.path, codes))
+    assert any(f"'{prefix}0' for 'hair_0'" in note for note in result.notes)
+    shot.write_text(small_shot(tmp_path / "large.usda", scale=1.2).read_text().replace("hair_", prefix))
+    UsdGeom.SetStageMetersPerUnit(stage := Usd.Stage.Open(str(shot)), 1)
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="elsewhere than in the rig"):
+        bake_rig(shot, tmp_path / "large_out.usda", model)
 
 
 def test_units_axes_and_rates_cancel(tmp_path):
