@@ -115,11 +115,9 @@ def _hair(armature, item, up, strands):
     if strands and strands < groom.strand_count:
         groom = groom.subset(np.linspace(0, groom.strand_count - 1, strands).astype(int))
     points = (groom.points @ up[:3, :3].T).astype(np.float32)
-    data = curves.create("Hair", groom.counts, points, _hair_material())
     # A little wider than a hair, for there are fewer of them than on a head.
-    radius = data.attributes.get("radius") or data.attributes.new("radius", "FLOAT", "POINT")
-    along = np.concatenate([np.linspace(1, 0.35, n) for n in groom.counts])
-    radius.data.foreach_set("value", (4e-4 * along).astype(np.float32))
+    radii = np.concatenate([np.linspace(4e-4, 1.4e-4, n) for n in groom.counts]).astype(np.float32)
+    data = curves.create("Hair", groom.counts, points, radii, _hair_material())
     hair = bpy.data.objects.new("Hair", data)
     bpy.context.scene.collection.objects.link(hair)
     hair.parent = armature

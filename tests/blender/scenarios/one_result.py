@@ -287,3 +287,17 @@ def scaled_head(folder: Path) -> None:
         assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
         for f, points in shown.items():
             assert apart(baked_points(out, "/Character/Hair_Hair", f), points) < SAME
+
+
+def shipped_shot(folder: Path) -> None:
+    """The shipped shot, put together in Blender by the script of the pictures, moves as a bake of its stage does."""
+    from examples import blender_shot
+    from usd.baking.bake import bake
+
+    armature, _, strands = blender_shot.build()
+    make_live(armature, strands)
+    model = MODEL or None
+    out = bake(blender_shot.SHOT, folder / "shot.usdc", model, frames=[40, 90], velocities=False).path
+    y_up = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for frame in (90, 40):
+        assert apart(points_at(strands, frame), baked_points(out, "/Body/Hair", frame) @ y_up.T) < SAME
