@@ -23,6 +23,9 @@ from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
 
 CLOSE = 1.5 / 24
 """Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
+SAME = 1e-4
+"""Samples nearer to each other, in frames, are one: layer offsets and other programs' clocks part what was keyed together,
+and over so little time a rounding error of a pose is a blow."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +218,8 @@ def _time_codes(source: JointSource, border: Border) -> np.ndarray:
     # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
     near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
     wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
-    return np.unique(np.concatenate([frames[wide], samples]))
+    codes = np.unique(np.concatenate([frames[wide], samples]))
+    return codes[np.diff(codes, append=np.inf) > SAME * frame]  # of a step's two samples the one after it
 
 
 def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import resample
 from usd.border.units import Border
 from usd.review.inspect import groom_facts, inspect
@@ -93,6 +94,22 @@ def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_pa
             attribute.Set(value, code)
     stage.GetRootLayer().Save()
     assert len(read_rigs(tmp_path / "shot.usda")[0].clip.times) == 3 + 20
+
+
+@pytest.mark.parametrize("off", [1e-14, 1e-10, 1e-5, -1e-10])
+def test_samples_a_rounding_error_apart_are_one(tmp_path, off):
+    """As layer offsets and clocks in single precision leave them: over so little time, any difference is a blow."""
+    shot = write_shot(tmp_path, Recipe(frames=24))
+    one = read_rigs(shot)[0]
+    stage = Usd.Stage.Open(str(shot))
+    top = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp()
+    for code in range(1, 25):
+        top.Set(Gf.Vec3d(0, 1e-7 * (code % 2), 0), code + off)
+    stage.Save()
+    apart = read_rigs(shot)[0]
+    assert len(apart.time_codes) == len(one.time_codes) and not len(apart.clip.cuts)
+    vectors = [StrandModel.load().sampler(rig.character, rig.clip).vectors([0.7])[0] for rig in (one, apart)]
+    np.testing.assert_allclose(vectors[1], vectors[0], atol=0.02 * np.abs(vectors[0]).max())
 
 
 def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before_it(tmp_path):
