@@ -23,7 +23,7 @@ class Tied:
     tie: tuple[float, float, float]
     """Direction of the tie from the head's centre."""
     tail: Callable[[Site, Knot, Scalp, Obstacle], np.ndarray]
-    """Points (S, M, 3) [m] behind the tie."""
+    """Points (S, M, 3) [m] behind the tie; all are called alike, and a bun keeps clear of nothing."""
     shape: Shape
 
 
