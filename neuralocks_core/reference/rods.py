@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours
@@ -48,8 +49,8 @@ def simulate(
     neighbours: np.ndarray | None = None,
     start: np.ndarray | None = None,
     bind_body: np.ndarray | None = None,
-    margin: float = 0.004,
-    collision: float = 1e6,
+    margin: float = MARGIN,
+    collision: float = COLLISION,
     gravity: float = G,
     volume: float = 0.0,
     device: str = "cpu",

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from neuralocks_core.materials import LINEAR
 from neuralocks_core.motion import GRAVITY, G
-from neuralocks_core.physics.body_collision import LINEAR
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig.body import rest_clearance
