@@ -119,8 +119,7 @@ class Character:
 
     Attributes:
         skeleton: the joints.
-        body: the surface that hair rests on; None leaves the hair without a collider and with average
-            measures.
+        body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
         humanoid: semantic names of joints; found by name and hierarchy where left out.
     """
 

@@ -36,8 +36,7 @@ class Knot:
     out: np.ndarray
     """(3,) unit, out of the head."""
     disc: np.ndarray
-    """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie
-    together."""
+    """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie together."""
 
 
 def gathered(site: Site, style: Tied, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
