@@ -21,7 +21,7 @@ from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.methods import normalise, samples
+from neuralocks_core.training.methods import samples
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
@@ -77,7 +77,8 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
         torch.manual_seed(options.seed)
         began = time.process_time()
         net = StrandNet(spec.size, motion=options.motion)
-        normalise(net, *samples(banks["rollouts"]), spec.slices["history"], options.static)
+        inputs = map(torch.from_numpy, samples(banks["rollouts"]))
+        net.set_normalisation(*inputs, spec.slices["history"], static=options.static)
         *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
         card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
         print(

@@ -20,7 +20,7 @@ from neuralocks_core import model as model_file  # noqa: E402
 from neuralocks_core.animation.random_motion import KINDS, scripted_clip  # noqa: E402
 from neuralocks_core.motion import Clip  # noqa: E402
 from neuralocks_core.rig import RigModel, rig_spec  # noqa: E402
-from neuralocks_core.training.rig.energy import RigMaterial  # noqa: E402
+from neuralocks_core.rig.rods import RigMaterial  # noqa: E402
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions  # noqa: E402
 from neuralocks_core.training.rig.report import hair_points, no_turns, static_report  # noqa: E402
 from usd.rig.stage import read_rigged_hair  # noqa: E402

@@ -22,7 +22,7 @@ from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.methods import MomentMethod, normalise
+from neuralocks_core.training.methods import MomentMethod
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RolloutBank
@@ -70,7 +70,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
         torch.manual_seed(options.seed)
         net = StrandNet(own.spec.size, motion=options.motion)
         history = own.spec.slices["history"]
-        normalise(net, *method.samples(), history, options.static)
+        net.set_normalisation(*map(torch.from_numpy, method.samples()), history, static=options.static)
         for _ in method.train(net, options.optimisers(net)):
             pass
         card = measure(net, held, options.output, history, options.supported).to_json()

@@ -24,8 +24,7 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13")
 """Of Blender 4.2 to 5.0, and of 5.1 and later."""
 COMPILED = ("onnxruntime==1.31.1", "usd-core==26.11", "scipy==1.15.3")
-"""scipy: the newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons. numpy is Blender's
-own.
+"""scipy: the newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons. numpy is Blender's own.
 """
 OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}}
 """The last with wheels for a platform; on Linux it gives the same points as the newest, bit for bit."""

@@ -18,8 +18,6 @@ from .session import session
 
 ROUNDING = 1e-5
 """Points that differ by less, relative to the largest coordinate, are the same."""
-
-
 KEPT = 7
 """Earlier changes that are known again."""
 

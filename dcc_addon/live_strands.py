@@ -79,7 +79,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
     wanted = time, joints, to_local, material(settings), typed(settings, "motion"), settings.resolve
-    prepared = prepare(hair, armature, sampled, wanted, wait)
+    prepared = prepare(hair, sampled, wanted, wait)
     if prepared is None:
         show_rest(hair)
         return
@@ -104,12 +104,11 @@ def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:
     return any(np.abs(at - places[name][row]).max() > TOLERANCE for name, at in now.items() if name in places)
 
 
-def prepare(hair, armature, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
-    """The hair bound to its model, prepared once; again where an undo or an edit has changed what it was prepared
-    from.
+def prepare(hair, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
+    """The hair bound to its model, prepared once; again where an undo or an edit has changed what it was prepared from.
 
     Args:
-        hair, armature, sampled: the hair object, what carries it, and how that moves.
+        hair, sampled: the hair object, and how what carries it moves.
         wanted: arguments of `LiveHair.points` for the frame that is shown.
         wait: prepare it now.
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The boundary history: what the body did up to a time, as the vector that a network reads (paper section
-3.3).
+"""The boundary history: what the body did up to a time, as the vector that a network reads (paper section 3.3).
 
 The paper gives body pose, shape coefficients and N = 30 earlier joint velocities. Here the pose is relative to the head
 and the bind pose, so that joint orients and names cancel out; the shape is measured on the body, so that it means the
@@ -36,8 +35,7 @@ class BoundarySpec:
         bins: how many steps each history sample averages over, newest first; `(1,) * 30` is the paper's N =
             30, `()` the static variant.
         pose_joints: semantic joints whose rotation relative to the head is read.
-        linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes)
-            or "none".
+        linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes) or "none".
         chest: whether the upper chest's angular velocity is in the history beside the head's.
         taper: share of the history, at its old end, that fades to nothing so that no echo follows a stop.
     """

@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import rotation_part, sizes
+from neuralocks_core.rotation import inverse, rotation_part, sizes
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
@@ -119,8 +119,7 @@ class Character:
 
     Attributes:
         skeleton: the joints.
-        body: the surface that hair rests on; None leaves the hair without a collider and with average
-            measures.
+        body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
         humanoid: semantic names of joints; found by name and hierarchy where left out.
     """
 
@@ -184,6 +183,15 @@ class Character:
     def canonical_to_world(self, joints: np.ndarray) -> np.ndarray:
         """Transforms (..., 4, 4) from canonical to world space for world joint transforms (..., J, 4, 4)."""
         return self.carrying(joints) @ self.canonical_to_bind
+
+    def skinning(self, joints: np.ndarray) -> np.ndarray:
+        """Transforms (..., J, 4, 4) that take points from the bind pose, world, to canonical space as each joint moves them,
+        for world joint transforms (..., J, 4, 4).
+        """
+        joints = np.asarray(joints, float)
+        head = self.canonical_to_world(joints)
+        to_canonical = inverse(head) if head.ndim == 2 else np.linalg.inv(head)[..., None, :, :]
+        return to_canonical @ joints @ self.inverse_bind
 
     def relative_rotations(self, joints: np.ndarray, indices) -> np.ndarray:
         """World rotations (..., n, 3, 3) of the joints since the bind pose, in axes that face +Z there."""

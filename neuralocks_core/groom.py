@@ -10,8 +10,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a
-# millimetre.
+# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a millimetre.
 LARGEST_COORDINATE = 1e4
 
 
@@ -91,8 +90,7 @@ class Groom:
 
     @cached_property
     def starts(self) -> np.ndarray:
-        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no
-        points)."""
+        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no points)."""
         ends = np.cumsum(self.counts, dtype=np.int64)
         return ends - self.counts
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What hair is made of: the four numbers that an artist moves and the network reads."""
+"""What hair is made of: the four numbers that an artist moves and the network reads, and what nobody moves."""
 
 from __future__ import annotations
 
@@ -21,6 +21,17 @@ RANGES = {
 ALIASES = {"stiffness": "bend"}
 """Names that artists use for the same."""
 
+STRETCH = 1000.0
+"""Stiffness of edges against stretch [m^2/s^2], per unit line density as all others."""
+COLLISION = 1e6
+"""Stiffness of the body [1/(m s^2)]."""
+MARGIN = 0.004
+"""Distance that hair keeps from the body [m], where it does not rest nearer."""
+LINEAR = 0.02
+"""Depth in the body [m] from which the force stops growing."""
+SMOOTHING = 0.015
+"""h of the density that tells crowded hair [m]: each vertex is smeared over 2 h."""
+
 _SOFT = 20.0  # clumping may be 0, which has no logarithm: it is counted from here
 
 
@@ -29,7 +40,7 @@ class Material:
     """Constants of the rods, per unit line density.
 
     Attributes:
-        bend: bending stiffness [m^4/s^2].
+        bend: bending stiffness [m^4/s^2]; the default is EI over line density of a human hair.
         weight: factor on gravity.
         damping: of velocity relative to the head [1/s].
         clumping: stiffness of the ties between neighbours (adhesion) [1/s^2].

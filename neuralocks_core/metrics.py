@@ -69,7 +69,7 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
         `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside.
     """
     depth = np.maximum(np.minimum(rest_distance, 0) - distance, 0.0)
-    # Half the float32 resolution of a metre-sized stage is no penetration.
+    # So far apart are float32 coordinates 20 m from the origin: rounding is no penetration.
     return {
         "penetration_percent": 100 * _mean(depth > 2e-6),
         "penetration_3mm_percent": 100 * _mean(depth > DEEP),

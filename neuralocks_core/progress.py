@@ -9,3 +9,8 @@ Progress = Callable[[int, int, str], None]
 
 def silent(done: int, total: int, message: str) -> None:
     """The Progress of work that nobody watches."""
+
+
+def within(say: Progress, begin: int, end: int) -> Progress:
+    """The Progress of a part of longer work, which goes from `begin` to `end` in thousandths of it."""
+    return lambda done, total, message: say(begin + (end - begin) * done // total, 1000, message)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strand inference with onnxruntime: what is the same for all frames once, what is the same for all strands
-once a frame.
+"""Strand inference with onnxruntime: what is the same for all frames once, what is the same for all strands once a frame.
 
 The first layer is linear in the strand and in the body, so its two parts are computed apart and added: exact, and a
 third of the arithmetic is left per strand and frame. Strands go through in chunks that stay in a core's cache, several
@@ -20,8 +19,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 
 CHUNK = 512
-"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed,
-so that results do not depend on the machine."""
+"""Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
+do not depend on the machine."""
 
 
 class StrandModel:
@@ -49,7 +48,11 @@ class StrandModel:
 
     @classmethod
     def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
-        """Load a file, or the shipped model where `path` is None."""
+        """Load a file, or the shipped model where `path` is None.
+
+        Raises:
+            NeuralocksError: it is missing, damaged, of a later format or no model of strands.
+        """
         return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
 
     def sampler(self, character: Character, clip: Clip) -> BoundarySampler:
@@ -57,12 +60,16 @@ class StrandModel:
         return BoundarySampler(self.spec, character, clip)
 
     def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
-        """One output of one graph, float32."""
+        """One output of one graph, float32, of arrays by the names of its inputs: graphs, names and shapes are those of
+        docs/architecture.md, The model file.
+        """
         return self._sessions[graph].run([output], inputs)[0]
 
     def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
-        """What all strands share in a frame, by the names under which the tail reads it, of a boundary vector
-        (spec.size,)."""
+        """What all strands share in a frame, of a boundary vector (spec.size,), by the names under which the tail reads it:
+        `frame_part` (1, 256) float32, and where the frame changes the weights behind it more (docs/architecture.md, The
+        model file).
+        """
         session = self._sessions["frame.onnx"]
         values = session.run(None, {"frame": np.asarray(vector, np.float32).reshape(1, -1)})
         return {output.name: value for output, value in zip(session.get_outputs(), values)}

@@ -218,8 +218,7 @@ def _find_head(names, sides, keys, parents, positions):
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
             return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
-    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the
-    # head.
+    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
         best = max(spine, key=lambda i: _depth(i, parents))

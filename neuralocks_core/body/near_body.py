@@ -47,8 +47,8 @@ class NearBody:
 
         Args:
             skinning: transforms (J, 4, 4) of each joint from the bind pose to canonical space.
-            low, high: corners (3,) [m] of the space in which it will be asked for distances, canonical.
             shape: change of the blend shape weights (B,) since the body's own.
+            low, high: corners (3,) [m] of the space in which it will be asked for distances, canonical.
         """
         marks = self.marks.copy()
         if self.skin is None:

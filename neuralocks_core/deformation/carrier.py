@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carrying a deformation of the network's 24 vertices back to the groom's own vertices, and these to where they are
-shown."""
+"""Carrying a deformation of the network's 24 vertices back to the groom's own, and these to where they are shown."""
 
 from __future__ import annotations
 
@@ -106,8 +105,7 @@ class Carrier:
         """The groom's own points after a deformation.
 
         Args:
-            displacement: (N, K, 3) float32 [m], canonical axes, for the strands of the slice (all S without
-                one).
+            displacement: (N, K, 3) float32 [m], canonical axes, for the strands of the slice (all S without one).
             out: (points of these strands, 3) float32, filled and returned; made if left out.
             strands: a slice of consecutive strands.
             placing: where the points are put; where they are, in bind-world space [m], if left out.
@@ -115,6 +113,9 @@ class Carrier:
 
         Returns:
             (points of these strands, 3) float32.
+
+        Raises:
+            ValueError: the slice has steps, or the displacement is of another number of strands or vertices.
         """
         first, last, step = (strands or slice(None)).indices(self._groom.strand_count)
         if step != 1:

@@ -12,7 +12,6 @@ from neuralocks_core.body.going_in import depths_along
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Body, Character
 from neuralocks_core.motion import Clip
-from neuralocks_core.rotation import inverse
 from neuralocks_core.strands.strand_set import StrandSet
 
 MARGIN = 0.001
@@ -65,7 +64,7 @@ class Resolver:
         """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: to measure with."""
         if self.body is None:
             return None
-        return Collider(self.body.posed(self._skinning(joints), shape), self.body.triangles)
+        return Collider(self.body.posed(self.character.skinning(joints), shape), self.body.triangles)
 
     def prepare(self) -> None:
         """Make now, once for all frames, what the first one would have to wait for."""
@@ -101,7 +100,7 @@ class Resolver:
 
     def _posed(self, joints, shape, low, high) -> PosedBody:
         changed = None if shape is None else np.asarray(shape, float) - self._constant
-        return self._near.posed(self._skinning(joints), changed, low, high)
+        return self._near.posed(self.character.skinning(joints), changed, low, high)
 
     @cached_property
     def clear(self) -> np.ndarray:
@@ -141,10 +140,6 @@ class Resolver:
     @property
     def _constant(self) -> np.ndarray:
         return self._clip.shape[0]
-
-    def _skinning(self, joints: np.ndarray) -> np.ndarray:
-        to_canonical = inverse(self.character.canonical_to_world(joints))
-        return to_canonical @ np.asarray(joints, float) @ self.character.inverse_bind
 
 
 def _corners(points: np.ndarray) -> np.ndarray:
@@ -265,8 +260,7 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     """
     shift = turn = np.zeros(len(character.skeleton.names))
     for joints in clip.joints:
-        against = np.linalg.inv(character.canonical_to_world(joints)) @ joints @ character.inverse_bind
-        off = against @ character.canonical_to_bind - np.eye(4)
+        off = character.skinning(joints) @ character.canonical_to_bind - np.eye(4)
         turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
         shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
     far = np.linalg.norm(character.canonical(body.points), axis=1)

@@ -27,6 +27,9 @@ def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times
         answer, reference: displacements from rest (T, S, 24, 3) [m], canonical.
         length: of the strands (S,) [m].
         times: (T,) [s].
+
+    Returns:
+        Measures by the keys of `report.LABELS`, whose units and remarks are theirs.
     """
     error = metrics.motion_error(answer, reference, length)
     return {

@@ -6,11 +6,9 @@ What training minimises is `physics/energies.py`.
 
 import numpy as np
 
-from neuralocks_core.materials import Material
+from neuralocks_core.materials import STRETCH, Material
 from neuralocks_core.motion import G
-
-STRETCH = 1000.0
-"""Stiffness against stretch [m^2/s^2]."""
+from neuralocks_core.strands.bends import bends
 
 
 def energies(
@@ -25,9 +23,10 @@ def energies(
         material: constants; the default material where left out.
 
     Returns:
-        `gravity`: -g x . down; `bend`: B/2 |Omega - Omega_rest|^2 with
-        Omega = 2/l Im(conj(q_i) q_i+1), seen in a frame that follows the strand without twist (paper, bend-twist
-        energy with exact transport).
+        sums over all vertices, divided by the mass of all. `gravity`: -g weight m (x - x_rest) . down (paper section
+        3.4.3, equation 6), m half the adjacent rest lengths; `bend`: B/2 l |Omega - Omega_rest|^2 (section 3.4.1,
+        equation 3) with Omega = 2/l Im(conj(q_i) q_i+1), l half of both rest edges, seen in a frame that follows the
+        strand without twist.
     """
     material = material or Material()
     points, rest = np.asarray(points, float), np.asarray(rest, float)
@@ -59,21 +58,6 @@ def stretch_energy(lengths: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def curvature(points: np.ndarray) -> np.ndarray:
-    """2 Im(q) = 2 sin(angle / 2) n at each inner vertex (..., K - 2, 3), in axes carried along without twist.
-
-    The axes start as the canonical ones at the root, whose first edge is clamped, and turn from edge to edge by the
-    smallest rotation. So a strand that only turns as a whole further down keeps its curvature.
-    """
+    """2 Im(q) = 2 sin(angle / 2) n at each inner vertex of strands (..., K, 3) [m]: (..., K - 2, 3), see `bends`."""
     edges = np.diff(np.asarray(points, float), axis=-2)
-    edges /= np.maximum(np.linalg.norm(edges, axis=-1, keepdims=True), 1e-12)
-    axes = np.broadcast_to(np.eye(3), (*edges.shape[:-2], 3, 3))
-    result = np.empty((*edges.shape[:-2], edges.shape[-2] - 1, 3))
-    for i in range(edges.shape[-2] - 1):
-        a, b = edges[..., i, :], edges[..., i + 1, :]
-        axis = np.cross(a, b)
-        # 1 + cos; an edge folded right back has no smallest rotation and gets a finite one.
-        room = np.maximum(1 + np.einsum("...i,...i->...", a, b), 1e-6)[..., None]
-        result[..., i, :] = np.einsum("...ij,...j->...i", axes, 2 * axis / np.sqrt(2 * room))
-        once = np.cross(axis[..., None, :], axes)
-        axes = axes + once + np.cross(axis[..., None, :], once) / room[..., None]
-    return result
+    return 2 * bends(edges / np.maximum(np.linalg.norm(edges, axis=-1, keepdims=True), 1e-12))

@@ -69,13 +69,13 @@ class Card:
         body = {"title": self.title, "grooms": self.grooms, "compared": self.compared, "notes": list(self.notes)}
         return json.dumps(_plain(body), indent=2, sort_keys=False)
 
-    def text(self, width: int = 100, encoding: str | None = "utf-8") -> str:
+    def text(self, encoding: str | None = "utf-8") -> str:
         """For people, in characters of `encoding`: what has none, a frame's corner or a letter of a name, is replaced."""
         from rich.console import Console
 
         encoding = encoding or "utf-8"
         page = io.TextIOWrapper(io.BytesIO(), encoding=encoding, errors="backslashreplace", newline="\n")
-        console = Console(file=page, width=width, force_terminal=False, highlight=False)
+        console = Console(file=page, width=100, force_terminal=False, highlight=False)
         for name, values in self.grooms.items():
             console.print(self._measures(name, values))
             if self.compared.get(name):

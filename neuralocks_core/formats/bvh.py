@@ -10,7 +10,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.character import Skeleton
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.bvh_words import LARGEST, Words
 from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import angle_between
@@ -41,28 +40,22 @@ class Motion:
     unit: float
 
 
-def read_bvh(path: str | Path, unit: float | None = None, rate: float | None = None) -> Motion:
+def read_bvh(path: str | Path) -> Motion:
     """Read a BVH file.
 
     Args:
-        path: the file.
-        unit: metres per unit of the file; left out, the usual one that gives the skeleton a human height, or else
+        path: the file. It does not say its unit: that is the usual one that gives the skeleton a human height, or else
             that which makes it 1.7 m high.
-        rate: frames a second, where the file's own is wrong.
 
     Raises:
         NeuralocksError: the file cannot be read, is truncated or malformed, or its values cannot be meant.
     """
     path = Path(path)
-    for name, value in (("unit", unit), ("rate", rate)):
-        if value is not None and not 1e-6 <= value <= 1e6:
-            raise NeuralocksError(f"{path}: a {name} of {value} cannot be meant; give a positive number")
     words = Words(path)
     joints = _hierarchy(words)
     frames, step = _motion_header(words, joints)
     values = _values(words, frames, sum(len(joint.channels) for joint in joints))
-    step = step if rate is None else 1 / rate
-    unit = _likely_unit(joints) if unit is None else unit
+    unit = _likely_unit(joints)
     skeleton, world = _forward(joints, values, unit)
     first = _first_of_motion(world)
     clip = Clip(np.arange(frames - first) * step, world[first:])

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USC-HairSalon `.data` and CT2Hair `.bin`: a number of strands, then each with its own number of
-vertices."""
+"""USC-HairSalon `.data` and CT2Hair `.bin`: a number of strands, then each with its own number of vertices."""
 
 from __future__ import annotations
 
@@ -10,8 +9,7 @@ from neuralocks_core.formats.raw import RawGroom, bad_file
 
 
 def read_hairsalon(content: bytes, subject: str) -> RawGroom:
-    """USC-HairSalon (Hu et al. 2015): x y z a vertex, metres, Y up. Strands of one vertex are strands without
-    hair.
+    """USC-HairSalon (Hu et al. 2015): x y z a vertex, metres, Y up. Strands of one vertex are strands without hair.
 
     Args:
         content: the whole file.

@@ -40,8 +40,7 @@ def bad_file(subject: str, fact: str, remedy: str = "export it again") -> Neural
 
 
 def floats(content: bytes, offset: int, count: int, subject: str, what: str) -> np.ndarray:
-    """(count,) little-endian float32 at a byte offset, not copied; refused where the file is too short for
-    them.
+    """(count,) little-endian float32 at a byte offset, not copied; refused where the file is too short for them.
 
     Python integers do not overflow, so the check holds for any offset and count that a file may claim.
     """

@@ -102,9 +102,9 @@ def _content(path: Path) -> bytes:
         if size > LARGEST_FILE:
             raise bad_file(str(path), f"has {size} bytes, more than the {LARGEST_FILE} that are read", "split it")
         return path.read_bytes()
+    except NeuralocksError:
+        raise
     except (OSError, ValueError, MemoryError) as error:
-        if isinstance(error, NeuralocksError):
-            raise
         raise bad_file(str(path), f"cannot be read ({error})", "check the path and its permissions") from None
 
 

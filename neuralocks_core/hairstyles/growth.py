@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Growing strands step by step: combed near the scalp, falling farther on, sliding over what is in the
-way."""
+"""Growing strands step by step: combed near the scalp, falling farther on, sliding over what is in the way."""
 
 from __future__ import annotations
 

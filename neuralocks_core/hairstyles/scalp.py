@@ -84,8 +84,7 @@ class Scalp:
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         weight = np.stack([1 - u - v, u, v], axis=1)
         place = np.einsum("nc,nci->ni", weight, corners[triangle])
-        # A real hairline is soft: hair thins out over its last centimetre, and does not show the mesh's
-        # corners.
+        # A real hairline is soft: hair thins out over its last centimetre, and does not show the mesh's corners.
         border = self._border_distance(place) / (0.1 * self.radius)
         chance = np.clip(0.15 + border, 0.0, 1.0) * self._surrounded(place)
         order = np.argsort(random.random(len(place)) / np.maximum(chance, 1e-6), kind="stable")[:count]
@@ -110,8 +109,7 @@ class Scalp:
         return cKDTree(line).query(places)[0]
 
     def _surrounded(self, places: np.ndarray) -> np.ndarray:
-        """(N,) 0..1: less where scalp fills less than half of the neighbourhood, as on the corners of its
-        edge."""
+        """(N,) 0..1: less where scalp fills less than half of the neighbourhood, as on the corners of its edge."""
         every = places[:: max(1, len(places) // 5000)]
         if len(every) < 500:
             return np.ones(len(places))

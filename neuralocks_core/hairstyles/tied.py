@@ -23,7 +23,7 @@ class Tied:
     tie: tuple[float, float, float]
     """Direction of the tie from the head's centre."""
     tail: Callable[[Site, Knot, Scalp, Obstacle], np.ndarray]
-    """Points (S, M, 3) [m] behind the tie."""
+    """Points (S, M, 3) [m] behind the tie; all are called alike, and a bun keeps clear of nothing."""
     shape: Shape
 
 
@@ -36,8 +36,7 @@ class Knot:
     out: np.ndarray
     """(3,) unit, out of the head."""
     disc: np.ndarray
-    """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie
-    together."""
+    """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie together."""
 
 
 def gathered(site: Site, style: Tied, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:

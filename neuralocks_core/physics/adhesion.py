@@ -6,17 +6,15 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from neuralocks_core.materials import Material
 from neuralocks_core.physics.rods import Rods
-
-STIFFNESS = 60.0
-"""[1/s^2]."""
 
 
 def adhesion(
     x: Tensor,
     rods: Rods,
     neighbours: Tensor,
-    stiffness: float | Tensor = STIFFNESS,
+    stiffness: float | Tensor = Material.clumping,
     *,
     rest_distance: bool = True,
     lagged: bool = False,

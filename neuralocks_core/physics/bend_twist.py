@@ -8,11 +8,9 @@ from enum import Enum
 import torch
 from torch import Tensor
 
+from neuralocks_core.materials import Material
 from neuralocks_core.physics.rods import Rods
 from neuralocks_core.physics.transport import conjugate, direct_frames, loop_frames, product, scan_frames
-
-STIFFNESS = 1e-3
-"""[m^4/s^2]: EI over line density of a human hair."""
 
 
 class Cosserat(Enum):
@@ -30,7 +28,9 @@ class Cosserat(Enum):
     """Quaffure's constant director: each edge is held to its own posed direction."""
 
 
-def bend_twist(x: Tensor, rods: Rods, stiffness: float | Tensor = STIFFNESS, form: Cosserat = Cosserat.EXACT) -> Tensor:
+def bend_twist(
+    x: Tensor, rods: Rods, stiffness: float | Tensor = Material.bend, form: Cosserat = Cosserat.EXACT
+) -> Tensor:
     """Energy `k/2 sum l |Omega|^2`, `Omega = 2/l (Im(conj(q_i) q_{i+1}) - Im(conj(q0_i) q0_{i+1}))`.
 
     l is the rest length that belongs to the vertex between two edges. `EXACT` is the default, not the paper's

@@ -6,20 +6,15 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from neuralocks_core.materials import COLLISION, LINEAR, MARGIN
 from neuralocks_core.physics.rods import Rods
-
-STIFFNESS = 1e6
-"""[1/(m s^2)]."""
-MARGIN = 0.004
-"""D [m]."""
-LINEAR = 0.02
-"""Depth [m] from which the force stops growing: deep vertices of an untrained network must not drown the rest."""
 
 
 def body_collision(
-    x: Tensor, rods: Rods, planes: Tensor, stiffness: float | Tensor = STIFFNESS, margin: float | Tensor = MARGIN
+    x: Tensor, rods: Rods, planes: Tensor, stiffness: float | Tensor = COLLISION, margin: float | Tensor = MARGIN
 ) -> Tensor:
-    """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`.
+    """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`: deep vertices of an untrained
+    network must not drown the rest.
 
     Weighted by vertex mass, which the paper's sum is not. The clamped vertices 0 and 1 count nothing: they lie
     on the scalp.

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from neuralocks_core.physics.adhesion import STIFFNESS as ADHESION
+from neuralocks_core.materials import COLLISION, MARGIN, STRETCH, Material
 from neuralocks_core.physics.adhesion import adhesion
-from neuralocks_core.physics.bend_twist import STIFFNESS as BEND
 from neuralocks_core.physics.bend_twist import Cosserat, bend_twist
-from neuralocks_core.physics.body_collision import MARGIN, body_collision
-from neuralocks_core.physics.body_collision import STIFFNESS as COLLISION
+from neuralocks_core.physics.body_collision import body_collision
 from neuralocks_core.physics.gravity import gravity
 from neuralocks_core.physics.hair_style import hair_style
 from neuralocks_core.physics.inertia import damping, inertia
 from neuralocks_core.physics.rods import Rods
-from neuralocks_core.physics.stretch import STIFFNESS as STRETCH
 from neuralocks_core.physics.stretch import stretch
 
 
@@ -53,10 +50,10 @@ class Stiffness:
     """Constants, per unit line density; numbers or tensors (..., S, 1). See the module of each for the unit."""
 
     stretch: float | Tensor = STRETCH
-    bend: float | Tensor = BEND
-    weight: float | Tensor = 1.0
-    damping: float | Tensor = 10.0
-    clumping: float | Tensor = ADHESION
+    bend: float | Tensor = Material.bend
+    weight: float | Tensor = Material.weight
+    damping: float | Tensor = Material.damping
+    clumping: float | Tensor = Material.clumping
     collision: float | Tensor = COLLISION
     style: float | Tensor = 0.0
     inertia: float = 1.0

@@ -8,12 +8,11 @@ import math
 import torch
 from torch import Tensor
 
+from neuralocks_core.materials import SMOOTHING
 from neuralocks_core.physics.rods import Rods
 
 STIFFNESS = 0.3
 """[m^2/s^2], on relative density."""
-SMOOTHING = 0.015
-"""h [m]; the kernel ends at 2 h."""
 
 
 def self_collision(
@@ -47,7 +46,7 @@ def self_collision(
 
 
 def density(x: Tensor, mass: Tensor) -> Tensor:
-    """`rho_i = sum_j m_j W(|x_i - x_j|)`, each vertex itself included.
+    """`rho_i = sum_j m_j W(|x_i - x_j|)`, each vertex itself included; W's smoothing length is `SMOOTHING`.
 
     Args:
         x: (..., S, K, 3) points [m].

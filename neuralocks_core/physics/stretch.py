@@ -5,13 +5,11 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from neuralocks_core.materials import STRETCH
 from neuralocks_core.physics.rods import Rods
 
-STIFFNESS = 1000.0
-"""[m^2/s^2] per unit line density."""
 
-
-def stretch(x: Tensor, rods: Rods, stiffness: float | Tensor = STIFFNESS, *, per_edge: bool = False) -> Tensor:
+def stretch(x: Tensor, rods: Rods, stiffness: float | Tensor = STRETCH, *, per_edge: bool = False) -> Tensor:
     """Energy `k/2 sum l0 ((l - l0) / l0)^2`.
 
     The paper's `k/2 sum (l - l0)^2` depends on how many edges a strand is cut into; it is taken with `per_edge`,

@@ -5,21 +5,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+ANGLE = 24.0
+"""Of a picture's height, as its camera sees it [degrees]."""
+
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera.
+    """A pinhole camera of a view ANGLE.
 
     Attributes:
         eye, target: (3,) [m].
         up: unit vector (3,).
-        angle: of the picture's height [degrees].
     """
 
     eye: np.ndarray
     target: np.ndarray
     up: np.ndarray
-    angle: float = 24.0
 
     @property
     def to_eye(self) -> np.ndarray:
@@ -87,7 +88,7 @@ class VtkCanvas:
             self._body.points, self._body["rgb"] = body, body_colours
         view = self._plotter.camera
         view.position, view.focal_point, view.up = camera.eye, camera.target, camera.up
-        view.view_angle = camera.angle
+        view.view_angle = ANGLE
         far = np.linalg.norm(camera.eye - camera.target)
         view.clipping_range = (0.2 * far, 4 * far)
         self._plotter.render()
@@ -185,6 +186,6 @@ def _project(camera: Camera, points: np.ndarray, high: int) -> np.ndarray:
     right = np.cross(camera.up, back)
     right /= np.linalg.norm(right)
     seen = (points - camera.eye) @ np.stack([right, np.cross(back, right), -back], axis=1)
-    focal = high / 2 / np.tan(np.radians(camera.angle) / 2)
+    focal = high / 2 / np.tan(np.radians(ANGLE) / 2)
     depth = np.maximum(seen[:, 2:], 1e-6)
     return np.concatenate([focal * seen[:, :2] / depth, seen[:, 2:]], axis=1)

@@ -149,6 +149,7 @@ def _frames_of(clip: Path) -> int:
 
 
 _WRITERS = {".png": _strip, ".mp4": _mp4, ".gif": _gif}
+"""Ending -> what writes such a file; all are called alike, and a strip has no rate."""
 
 
 def _need(module: str) -> None:

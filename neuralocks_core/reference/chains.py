@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulation of hair joint chains: the rods of `training/rig/energy.py` with inertia, many clips at once.
+"""Simulation of hair joint chains: rods of the energy in `training/rig/energy.py`, with inertia, many clips at once.
 
 Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per unit of mass a step minimises
 
@@ -15,6 +15,7 @@ from neuralocks_core.motion import GRAVITY
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearBody
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
+from neuralocks_core.rig.rods import RodTree
 from neuralocks_core.rotation import from_quaternion, quaternion_product
 
 ITERATIONS = 2
@@ -26,7 +27,7 @@ class ChainSolver:
 
     Args:
         chains: the hair joints.
-        tree: masses, stiffnesses and rest support (`training.rig.energy.RodTree`).
+        tree: their masses, stiffnesses and rest support.
         damping: of motion in the head's frame [1/s].
         weight: times gravity.
         contacts: what meets the body; ends and middles of the bones if left out.
@@ -35,7 +36,14 @@ class ChainSolver:
     STIFFNESS = 4e4
     """Of contact, per unit of the mass that a joint moves [1/s^2]: one g presses it 0.25 mm deep."""
 
-    def __init__(self, chains: HairChains, tree, damping: float, weight: float = 1.0, contacts: Contacts | None = None):
+    def __init__(
+        self,
+        chains: HairChains,
+        tree: RodTree,
+        damping: float,
+        weight: float = 1.0,
+        contacts: Contacts | None = None,
+    ):
         self.chains, self.tree, self.damping, self.weight = chains, tree, damping, weight
         self.contacts = contacts or Contacts.of_bones(chains)
         count, owner = len(chains), self.contacts.joint

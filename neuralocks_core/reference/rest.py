@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import GRAVITY
+from neuralocks_core.strands.bends import bends
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
 
     Args:
         points: (S, K, 3) canonical rest points [m], K at least 3.
-        rest_support: make the rest shape an equilibrium (docs/architecture.md, Physics); else hair is
-            stress free at rest and droops, as in the paper.
+        rest_support: make the rest shape an equilibrium (docs/architecture.md, Physics); else hair is stress free at
+            rest and droops, as in the paper.
 
     Raises:
         NeuralocksError: wrong shape, not finite, or an edge without length.
@@ -50,34 +51,9 @@ def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
     length = np.concatenate([np.zeros_like(edge_length[:, :1]), edge_length], 1)
     mass = 0.5 * (length + np.concatenate([edge_length, np.zeros_like(edge_length[:, :1])], 1))
     support = _support(direction, mass) if rest_support else np.zeros_like(points)
-    return RestRods(points, length, mass, _curl(direction), support)
-
-
-def _curl(direction: np.ndarray) -> np.ndarray:
-    """Bend vectors of (S, K-1, 3) unit edges in the root edge's frame, by sequential parallel transport."""
-    strands, edges = direction.shape[:2]
-    curl = np.zeros((strands, edges + 1, 3))
-    frame = np.broadcast_to(np.eye(3), (strands, 3, 3)).copy()
-    for i in range(edges - 1):
-        a, b = direction[:, i], direction[:, i + 1]
-        one_plus_cos = np.maximum(1.0 + (a * b).sum(-1, keepdims=True), 1e-6)
-        bend = np.cross(a, b) / np.sqrt(2.0 * one_plus_cos)
-        curl[:, i + 1] = np.einsum("sji,sj->si", frame, bend)
-        frame = np.einsum("sij,sjk->sik", _rotation(bend, np.sqrt(0.5 * one_plus_cos)), frame)
-    return curl
-
-
-def _rotation(vector: np.ndarray, scalar: np.ndarray) -> np.ndarray:
-    """(S, 3, 3) rotation matrices of quaternions with imaginary part (S, 3) and real part (S, 1)."""
-    norm = np.sqrt((vector**2).sum(-1, keepdims=True) + scalar**2)
-    x, y, z = np.moveaxis(vector / norm, -1, 0)
-    w = (scalar / norm)[:, 0]
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    curl = np.zeros_like(points)
+    curl[:, 1:-1] = bends(direction)
+    return RestRods(points, length, mass, curl, support)
 
 
 def _support(direction: np.ndarray, mass: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours
@@ -28,7 +29,7 @@ class Rollout:
     """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; (0, 0, 0, -1e3) if
     it is farther than 2 cm."""
     residual: np.ndarray
-    """(T,) rms over strands and vertices of the net force left, relative to gravity."""
+    """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity."""
     iterations: np.ndarray
     """(T,) mean Newton steps a strand took for the frame."""
 
@@ -48,8 +49,8 @@ def simulate(
     neighbours: np.ndarray | None = None,
     start: np.ndarray | None = None,
     bind_body: np.ndarray | None = None,
-    margin: float = 0.004,
-    collision: float = 1e6,
+    margin: float = MARGIN,
+    collision: float = COLLISION,
     gravity: float = G,
     volume: float = 0.0,
     device: str = "cpu",

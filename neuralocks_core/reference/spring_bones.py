@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """VRM spring bones, as specified (VRM 1.0 VRMC_springBone): what avatars' hair moves by today.
 
-    next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt + gravity
-    direction * gravity power dt
+    next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt
+        + gravity direction * gravity power dt
 
-then back to the bone's length, and the joint turns from its rest axis to the new one. State is
-carried from frame to frame, and drag acts per frame, whatever its length: that is the specified behaviour.
+then back to the bone's length, and the joint turns from its rest axis to the new one. State is carried from frame to
+frame, and drag acts per frame, whatever its length: that is the specified behaviour.
 """
 
 from dataclasses import dataclass
@@ -32,10 +32,7 @@ class SpringSettings:
 
 
 def spring_bones(
-    chains: HairChains,
-    heads: np.ndarray,
-    step: float,
-    settings: SpringSettings = SpringSettings(),
+    chains: HairChains, heads: np.ndarray, step: float, settings: SpringSettings = SpringSettings()
 ) -> np.ndarray:
     """Turns (C, T, N, 4) wxyz, canonical, of joints that swing as spring bones.
 

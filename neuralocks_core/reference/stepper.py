@@ -177,7 +177,7 @@ class Stepper:
         self._solve(dt, iterations, settling=0)
 
     def read(self, points: np.ndarray, planes: np.ndarray) -> tuple[float, float]:
-        """Write (S, K, 3) and (S, K, 4) canonical; return rms residual relative to gravity, and mean Newton steps."""
+        """Write (S, K, 3) and (S, K, 4) canonical; return residual and Newton steps as `rods.Rollout` has them."""
         args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()

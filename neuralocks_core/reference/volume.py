@@ -10,10 +10,9 @@ import math
 
 import warp as wp
 
+from neuralocks_core.materials import SMOOTHING
 from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
-SMOOTHING = 0.015
-"""h [m]; the kernel ends at 2 h. As in `physics.self_collision`."""
 STRIDE = wp.constant(wp.float64(0.1 * SMOOTHING))
 """[m] Most that this force alone moves a vertex between two looks at it."""
 H = wp.constant(wp.float64(SMOOTHING))

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.rods import Rollout
+from neuralocks_core.reference.stepper import REACH
 from neuralocks_core.warp_device import start_warp
-
-REACH = 0.1
-"""[m] how far a vertex looks for the body."""
 
 
 def simulate_xpbd(
@@ -30,7 +29,7 @@ def simulate_xpbd(
     substeps: int = 20,
     rest_support: bool = True,
     bind_body: np.ndarray | None = None,
-    margin: float = 0.004,
+    margin: float = MARGIN,
     gravity: float = G,
     device: str = "cpu",
     progress: Progress | None = None,

@@ -201,7 +201,7 @@ class HairChains:
             if len(values["names"]) > 10000 or not all(isinstance(n, str) for n in values["names"]):
                 raise ValueError("names")
             return cls(**{name: values[name] for name in cls.__dataclass_fields__})
+        except NeuralocksError:
+            raise
         except (KeyError, TypeError, ValueError, IndexError) as error:
-            if isinstance(error, NeuralocksError):
-                raise
             raise NeuralocksError(f"model: unreadable hair chains ({error}); get an undamaged copy") from None

@@ -16,8 +16,6 @@ _AT_ONCE = 4
 """Rows of a layer that are added at a time."""
 _WIDTH = 8
 """Columns of a layer are a multiple of it: what vector units take at once."""
-
-
 MADE = "Made by `neuralocks rig export-c`"
 """What both files say in their first lines."""
 

@@ -174,9 +174,9 @@ class RigModel:
                 float(meta["max_angle"]),
                 *(meta.get(name, empty) for name, empty in (("training", {}), ("report", {}), ("credits", []))),
             )
+        except NeuralocksError as error:
+            raise NeuralocksError(f"{path}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            if isinstance(error, NeuralocksError):
-                raise NeuralocksError(f"{path}: {error}") from None
             raise NeuralocksError(f"{path}: unreadable rig model ({error}); get an undamaged copy") from None
 
 

@@ -30,8 +30,7 @@ def resample(groom: Groom, vertices: int) -> tuple[np.ndarray, np.ndarray]:
     sampled = np.repeat(own[np.minimum(groom.starts, len(own) - 1)][:, None], vertices, axis=1)
 
     strands = np.flatnonzero(valid)
-    # One ascending key over all strands, strand s covering [s, s + 1], lets one binary search serve all of
-    # them.
+    # One ascending key over all strands, strand s covering [s, s + 1], lets one binary search serve all of them.
     share = arc / np.where(valid, length, 1.0)[groom.strand_of_point]
     key = groom.strand_of_point + np.minimum(share, 1.0)
     wanted = np.linspace(0.0, 1.0, vertices)

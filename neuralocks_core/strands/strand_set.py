@@ -33,13 +33,11 @@ class StrandSet:
     """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; of curls finer than that,
     the line they wind around (`centreline`)."""
     valid: np.ndarray
-    """(S,) bool, false where the groom's strand has no two distinct points; all else there is a
-    placeholder."""
+    """(S,) bool, false where the groom's strand has no two distinct points; all else there is a placeholder."""
     uv: np.ndarray
     """(S, 2) float32 in [0, 1], direction of the root seen from the head's centre."""
     root_frame: np.ndarray
-    """(S, 3, 3) float32, rotation from canonical to scalp axes (rows are the scalp axes; +Y leaves the
-    head)."""
+    """(S, 3, 3) float32, rotation from canonical to scalp axes (rows are the scalp axes; +Y leaves the head)."""
     lock: np.ndarray
     """(S,) int32, which lock each strand belongs to; numbered without gaps from 0."""
     length: np.ndarray
@@ -53,8 +51,7 @@ class StrandSet:
 
     @property
     def root_normal(self) -> np.ndarray:
-        """(S, 3) float32, canonical unit vector out of the head at the root: the scalp frame's second
-        axis."""
+        """(S, 3) float32, canonical unit vector out of the head at the root: the scalp frame's second axis."""
         return self.root_frame[:, 1]
 
     def subset(self, strands: np.ndarray) -> StrandSet:
@@ -133,11 +130,9 @@ def scalp_local(strands: StrandSet) -> np.ndarray:
 
 
 def root_uv(roots: np.ndarray, head_centre: np.ndarray) -> np.ndarray:
-    """(S, 2) float32 in [0, 1]: Lambert's equal-area azimuthal map of the root's direction, its pole at the
-    crown.
+    """(S, 2) float32 in [0, 1]: Lambert's equal-area azimuthal map of the root's direction, its pole at the crown.
 
-    It depends on no mesh's own chart, so one network serves any head. Singular only straight down, inside the
-    neck.
+    It depends on no mesh's own chart, so one network serves any head. Singular only straight down, inside the neck.
 
     Args:
         roots: (S, 3) [m] in canonical space.

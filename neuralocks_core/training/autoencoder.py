@@ -35,8 +35,7 @@ def train_autoencoder(
 ) -> StrandAutoencoder:
     """Trains on all strands of all grooms and returns the autoencoder with frozen weights.
 
-    Only the encoder goes on living; the decoder is there to show what a code is worth
-    (`StrandAutoencoder.errors`).
+    Only the encoder goes on living; the decoder is there to show what a code is worth (`StrandAutoencoder.errors`).
 
     Args:
         shapes: (n, 24, 3) strands in scalp-local, root-relative coordinates, metres.

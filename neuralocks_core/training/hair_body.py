@@ -28,8 +28,7 @@ def hair_body(character: Character, reach: float) -> Body | None:
     used = np.unique(faces)
     if not len(used):
         return None
-    # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs it hangs
-    # beside.
+    # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs it hangs beside.
     main = body.joint_indices[np.arange(len(points)), body.joint_weights.argmax(axis=1)]
     key = np.column_stack([np.floor(points[used] / CELL).astype(np.int64), main[used]])
     _, group = np.unique(key, axis=0, return_inverse=True)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-import torch
 
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.errors import NeuralocksError
@@ -114,13 +113,6 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
         frames.append(r.vectors.copy())
         frames[-1][:, bank.material] = r.materials[np.arange(len(r.vectors)) % len(r.materials)]
     return strands, np.concatenate(frames)
-
-
-def normalise(net: StrandNet, strands: np.ndarray, frames: np.ndarray, history: slice, static: bool) -> None:
-    """Set the network's input normalisation from strand inputs (n, 70) and boundary vectors (m, F), whose history lies
-    at `history`; `static` networks do not see it.
-    """
-    net.set_normalisation(torch.from_numpy(strands), torch.from_numpy(frames), history, static=static)
 
 
 def wait(farm: RolloutFarm, count: int, say: Callable[[str], None]) -> None:

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.materials import MARGIN
 from neuralocks_core.motion import GRAVITY
-from neuralocks_core.physics.body_collision import MARGIN
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density
 from neuralocks_core.strands.locks import lock_mates, neighbours

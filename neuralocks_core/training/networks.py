@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The strand simulator network: two hidden layers, its first layer split into a strand part and a frame
-part."""
+"""The strand simulator network: two hidden layers, its first layer split into a strand part and a frame part."""
 
 from __future__ import annotations
 
@@ -19,6 +18,8 @@ DEEP = 192
 """Width of the deep map of the frame."""
 RANKS = (64, 32)
 """Ranks of the matrices that a frame adds to the second layer's and to the output layer's."""
+HISTORY_SCALE = 0.25
+"""The many history entries are scaled down by it after normalisation, or they drown the pose."""
 
 
 class StrandNet(nn.Module):
@@ -37,13 +38,7 @@ class StrandNet(nn.Module):
             per strand.
     """
 
-    def __init__(
-        self,
-        frame_size: int,
-        strand_size: int = 70,
-        *,
-        motion: str = "linear",
-    ):
+    def __init__(self, frame_size: int, strand_size: int = 70, *, motion: str = "linear"):
         super().__init__()
         if motion not in MOTIONS:
             raise ValueError(f"motion: {motion!r} is not one of {MOTIONS}")
@@ -84,23 +79,13 @@ class StrandNet(nn.Module):
             self.register_buffer(f"{name}_scale", torch.ones(size))
 
     @torch.no_grad()
-    def set_normalisation(
-        self,
-        strands: Tensor,
-        frames: Tensor,
-        history: slice,
-        *,
-        history_scale: float = 0.25,
-        static: bool = False,
-    ) -> None:
+    def set_normalisation(self, strands: Tensor, frames: Tensor, history: slice, *, static: bool = False) -> None:
         """Takes mean and standard deviation of the inputs from training samples.
 
         Args:
             strands: (n, strand_size) sampled strand inputs.
             frames: (m, frame_size) sampled boundary vectors.
             history: where the velocity history lies in the boundary vector.
-            history_scale: the many history entries are scaled down after normalisation, or they drown the
-            pose.
             static: the quasi-static variant: the history is not read at all.
         """
         for name, samples in (("strand", strands), ("frame", frames)):
@@ -116,7 +101,7 @@ class StrandNet(nn.Module):
             if name == "frame":
                 mean[history] = 0.0  # a held pose is exactly zero here and stays so
                 rms = samples[:, history].square().mean(0).sqrt()
-                live = torch.where(rms > 1e-6, history_scale / rms.clamp_min(1e-12), torch.zeros_like(rms))
+                live = torch.where(rms > 1e-6, HISTORY_SCALE / rms.clamp_min(1e-12), torch.zeros_like(rms))
                 scale[history] = 0.0 if static else live
             getattr(self, f"{name}_mean").copy_(mean)
             getattr(self, f"{name}_scale").copy_(scale)
@@ -151,8 +136,7 @@ class StrandNet(nn.Module):
         """Offsets for every frame and strand.
 
         Args:
-            strands: (S, strand_size), the same strands in all frames, or (B, S, strand_size), own ones in
-            each.
+            strands: (S, strand_size), the same strands in all frames, or (B, S, strand_size), own ones in each.
             frames: (B, frame_size) boundary vectors.
 
         Returns:
@@ -185,8 +169,7 @@ def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None
     Args:
         offsets: (..., S, 24, 3) network output.
         rest: (S, 24, 3), or broadcastable to the offsets; canonical space, metres.
-        anchored_offsets: the network's answer for the held bind pose, subtracted so that this pose gives
-        the groom.
+        anchored_offsets: the network's answer for the held bind pose, subtracted so that this pose gives the groom.
         output: `"direction"` or `"displacement"`.
 
     Returns:

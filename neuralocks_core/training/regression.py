@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.deformation.strand_session import strand_inputs
-from neuralocks_core.physics.body_collision import MARGIN
+from neuralocks_core.materials import MARGIN
 from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training.descent import Descended, Schedule, descend, muon
 from neuralocks_core.training.farm import load

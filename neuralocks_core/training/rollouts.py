@@ -71,8 +71,7 @@ class Rollout:
         vectors: boundary vectors (T, F) float32.
         bind: the anchor's vector (F,) float32.
         moved: displacement in canonical space (T, n, 24, 3) int16, in units of STEP.
-        planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest
-            vertex.
+        planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest vertex.
         residual: of the solver, rms relative to weight.
         materials: log-ratios of each strand's material (n, 4) float32, the same within a lock; `vectors` and `bind`
             have the first strand's.

@@ -24,7 +24,7 @@ from neuralocks_core.training.beginning import Beginning, kept_coder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.gauge import Gauge, measure
-from neuralocks_core.training.methods import method_of, normalise, wait
+from neuralocks_core.training.methods import method_of, wait
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
@@ -164,7 +164,8 @@ class _Run:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self._options.seed)
             self.net = StrandNet(scene.spec.size, method.inputs[0].shape[1], motion=self._options.motion)
-        normalise(self.net, *method.samples(), self._history, self._options.static)
+        samples = map(torch.from_numpy, method.samples())
+        self.net.set_normalisation(*samples, self._history, static=self._options.static)
         if beginning:
             beginning.fill(self.net)
         self.net.to(self._options.device)

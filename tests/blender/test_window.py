@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in a real window under a virtual screen: a script clicks the tab and Live, scrubs, bakes, takes a
-picture.
-"""
+"""The panel in a real window under a virtual screen: a script clicks the tab and Live, scrubs, bakes, takes a picture."""
 
 import contextlib
 import os

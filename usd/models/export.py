@@ -9,6 +9,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.materials import Material
 from neuralocks_core.measures import MEASURES
 
 from ..border.stopping import check
@@ -36,7 +37,7 @@ BOUNDARY = {
     "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 but for upper arms",
     "gravity": "T(R_head(t)) g / 9.81",
     "shape": "ten lengths of the bind body [m], as in `held`",
-    "material": "logarithms of bend / 0.001, weight, damping / 10; 0, since clumping is no input",
+    "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; 0, since clumping is no input",
     "history": "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the head joint's place and t_k = t - k dt: "
     "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
     "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
@@ -50,8 +51,8 @@ SLIDERS = {
     "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, `anchor` anew: `offsets` of "
     "tail.onnx with `anchor` zero and the frame `held`",
     "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
-    "clumping": "scales how far a strand strays from its lock, by f = (k0 + 120) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 "
-    "+ 9.81 weight / length; 60 changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
+    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g}) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 "
+    f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     "it, scaled to the rest edge's length",

@@ -52,8 +52,8 @@ def train(
         grooms: USD files, or "library".
         motion: BVH or USD files.
         out: `.neuralocks` file to write.
-        settings: fields of `training.regression.RegressionOptions`, or of
-            `training.selfsupervised.SelfSupervisedOptions`; values may be words.
+        settings: fields of `training.regression.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;
+            values may be words.
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
         skeleton, head, joints: as for `bake`.

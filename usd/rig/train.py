@@ -38,10 +38,10 @@ def train_rig(
         character: USD file.
         out: `.neuralocks` file to write.
         dynamic: learn lag, swing and settling from a simulation of the chains; else held poses, from the energy alone.
-        seconds, steps, hidden, seed: see `training.rig.train.train_static` and `training.rig.dynamic.train_dynamic`, whose
+        seconds, steps, hidden, seed: see `training.rig.static.train_static` and `training.rig.dynamic.train_dynamic`, whose
             defaults hold for what is None.
         clips: see the latter.
-        material: fields of `training.rig.energy.RigMaterial`.
+        material: fields of `rig.rods.RigMaterial`.
         chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
         tell: called with notes for the user before the training, whose minutes some of them would save.
@@ -57,7 +57,7 @@ def train_rig(
         import torch  # noqa: F401
     except ImportError as error:
         raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
-    from neuralocks_core.training.rig.energy import RigMaterial
+    from neuralocks_core.rig.rods import RigMaterial
 
     character, out = as_path(character, "character"), as_path(out, "out")
     _check_writable(out)
@@ -75,7 +75,7 @@ def train_rig(
 
         options["clips"] = clips
     else:
-        from neuralocks_core.training.rig.train import train_static as train
+        from neuralocks_core.training.rig.static import train_static as train
     chosen = {name: value for name, value in options.items() if value is not None}
     model = train(hair.rig, values, seed=seed, progress=progress, **chosen)
     if command:

@@ -21,7 +21,7 @@ from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .curves import moment, rest_points
 from .seat import NEAR, Seat, find_seat, kinship, some_ends, ways
-from .seat_notes import floats, moved_away, upside_down
+from .seat_notes import lies_off_skin, moved_away, upside_down
 
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
@@ -91,7 +91,7 @@ def attach(
             found = _on_mesh(prim, seats, placement, notes)
         else:
             found = _by_name(prim, rigs, placement, head)
-            notes += [] if found.far else floats(prim, found.rig, placement)
+            notes += [] if found.far else lies_off_skin(prim, found.rig, placement)
     name = rig_joint(found)
     if head and leaf(name) != leaf(head):
         notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")

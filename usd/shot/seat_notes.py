@@ -15,7 +15,7 @@ MOVES = 0.002
 """Skin that blend shapes move by less [m] stays with its roots."""
 
 
-def floats(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
+def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
     """What to say of hair that nothing binds and that lies off the skin of what carries it."""
     seat = find_seat(prim, rig, placement)
     if seat is None:

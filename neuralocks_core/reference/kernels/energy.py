@@ -3,13 +3,13 @@
 
 import warp as wp
 
+from neuralocks_core.materials import LINEAR
 from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
 FOLD = wp.constant(wp.float64(0.02))
 """1 + cos of the angle between two edges below which (168 degrees) the bend's direction fades out. The direction of an
 exact fold is undefined, and a strand that swings through one would meet a cliff in the energy."""
-MARGIN_LINEAR = wp.constant(wp.float64(0.02))
-"""Penetration [m] from which the collision force stops growing."""
+MARGIN_LINEAR = wp.constant(wp.float64(LINEAR))
 
 
 @wp.struct

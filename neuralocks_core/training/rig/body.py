@@ -46,9 +46,8 @@ class BodyPatch:
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
-    character = rig.character
     body = BodyPatch(rig, np.random.default_rng(0), 1).body
-    skinning = np.linalg.inv(character.canonical_to_world(joints))[:, None] @ joints @ character.inverse_bind
+    skinning = rig.character.skinning(joints)
     return np.stack([proven_distances(body.posed(m), body.triangles, p) for m, p in zip(skinning, points)])
 
 
@@ -81,10 +80,10 @@ def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
     canonical space of the head; None if there are none.
     """
-    body, character = rig.character.body, rig.character
+    body = rig.character.body
     if body is None:
         return None
-    canonical = rig.character.canonical(rig.character.body.points)
+    canonical = rig.character.canonical(body.points)
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
@@ -92,10 +91,8 @@ def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarra
         return None
     chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
     normals = vertex_normals(body.points, body.triangles)[chosen]
-    to_head = np.linalg.inv(character.canonical_to_world(joints))
-    skinning = to_head[:, None] @ joints @ character.inverse_bind
     points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
-    for row, matrices in enumerate(skinning):
+    for row, matrices in enumerate(rig.character.skinning(joints)):
         blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
         points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
         turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)

@@ -8,7 +8,8 @@ import torch
 
 from neuralocks_core.rig.network import POSE, feature_columns
 from neuralocks_core.rig.rigging import HairRig
-from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial
+from neuralocks_core.rig.rods import RigMaterial
+from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.poses import PosePool
 
 COLLIDING = 96

@@ -12,15 +12,16 @@ import numpy as np
 import torch
 
 from neuralocks_core.animation.random_motion import random_clip
-from neuralocks_core.progress import Progress, silent
+from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend, muon
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
-from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial
+from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
-from neuralocks_core.training.rig.report import static_report, within
+from neuralocks_core.training.rig.report import static_report
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""

@@ -16,9 +16,9 @@ from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig.kinematics import pose_chains, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig.body import body_around, posed_distances, rest_distances
-from neuralocks_core.training.rig.energy import RigMaterial, RodTree
 from neuralocks_core.training.rig.report import depths, hair_points, no_turns
 
 RATE = 30.0

@@ -5,11 +5,12 @@ import numpy as np
 import torch
 
 from neuralocks_core.anatomy.joint_names import leaf
-from neuralocks_core.progress import Progress, silent
+from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
+from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig.body import rest_distances
-from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial, bounded_turns
+from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
 from neuralocks_core.training.rig.poses import PosePool
 
 POINTS = 400
@@ -97,11 +98,6 @@ def hair_points(rig, turns: np.ndarray) -> np.ndarray:
 def no_turns(rig) -> np.ndarray:
     """The turns (N, 4) wxyz of hair that is carried rigidly."""
     return np.tile([1.0, 0.0, 0.0, 0.0], (len(rig.chains), 1))
-
-
-def within(say, begin: int, end: int):
-    """A progress callback for the part of a longer work that goes from `begin` to `end`, in thousandths of it."""
-    return lambda done, total, message: say(begin + (end - begin) * done // total, 1000, message)
 
 
 def depths(distance: np.ndarray) -> dict:

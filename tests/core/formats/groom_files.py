@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small groom as a file of every format."""
+"""A small groom as a file of every format, and any groom as a .hair file."""
 
 import struct
 
 import numpy as np
+
+from neuralocks_core.formats.look import Look
 
 COUNTS = [4, 1, 3]
 POINTS = np.random.default_rng(0).normal(size=(8, 3)).astype("<f4") * 0.1
@@ -65,6 +67,24 @@ FILES = {
     "a.data": counted(3),
     "a.bin": counted(7),
 }
+
+
+def write_hair(path, groom, unit=0.01, up="Z", look=None):
+    """Write a groom, and its colours, as .hair: `unit` metres per unit of the file, whose upward axis is `up`."""
+    look = look or Look(None, None)
+    points, widths, scale = groom.points, groom.widths, np.float32(1.0 / unit)
+    if up == "Z":
+        points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
+    if len(widths) == groom.strand_count and len(widths) > 1:
+        widths = np.repeat(widths, groom.counts)
+    color = np.zeros((1, 3), np.float32) if look.color is None else look.color
+    clear = np.zeros(1, np.float32) if look.opacity is None else 1 - look.opacity
+    # Segments and points always, and of thickness, transparency and colours what is more than one number.
+    each = [(flag, values) for flag, values in ((4, widths * scale), (8, clear), (16, color)) if len(values) > 1]
+    flags, first = 3 + sum(flag for flag, _ in each), (float(widths[0] * scale), float(clear[0]), *color[0].tolist())
+    header = struct.pack("<4sIIIIfffff88s", b"HAIR", groom.strand_count, len(points), flags, 0, *first, b"")
+    blocks = [(groom.counts - 1).astype("<u2"), (points * scale).astype("<f4"), *(v.astype("<f4") for _, v in each)]
+    path.write_bytes(header + b"".join(block.tobytes() for block in blocks))
 
 
 def put(folder, name, content):

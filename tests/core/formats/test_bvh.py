@@ -61,12 +61,6 @@ def test_channels_turn_in_the_order_in_which_they_stand(tmp_path):
     assert np.allclose(motion.clip.joints[1, 1, :3, 3], [0.1 - 0.8, 0.9, 0])
 
 
-def test_unit_and_rate_can_be_given(tmp_path):
-    motion = read_bvh(written(tmp_path), unit=0.02, rate=50)
-    assert np.allclose(motion.skeleton.bind[1, :3, 3], [0, 1.6, 0])
-    assert np.allclose(motion.clip.times, [0, 0.02])
-
-
 @pytest.mark.parametrize(
     ("old", "new", "fact"),
     [

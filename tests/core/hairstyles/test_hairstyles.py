@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The library grows every style on any scalp: the right number of strands, from the skin and out of the
-body."""
+"""The library grows every style on any scalp: the right number of strands, from the skin and out of the body."""
 
 import numpy as np
 import pytest

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import torch
 
+from neuralocks_core.materials import LINEAR
 from neuralocks_core.physics import self_collision as volume
 from neuralocks_core.physics.adhesion import adhesion
 from neuralocks_core.physics.bend_twist import Cosserat, bend_twist
-from neuralocks_core.physics.body_collision import LINEAR, body_collision
+from neuralocks_core.physics.body_collision import body_collision
 from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
 from neuralocks_core.physics.gravity import gravity
 from neuralocks_core.physics.hair_style import hair_style

@@ -16,14 +16,15 @@ from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
 from neuralocks_core.rig.network import feature_columns
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import BodyPatch
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments
-from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial, RodTree
+from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.report import hair_points, no_turns
-from neuralocks_core.training.rig.train import train_static
+from neuralocks_core.training.rig.static import train_static
 from tests.core.rig.builders import character, tail
 
 RADIUS = 0.12

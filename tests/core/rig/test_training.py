@@ -16,14 +16,15 @@ from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, skin
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import posed_distances, rest_distances
 from neuralocks_core.training.rig.dynamic import train_dynamic
-from neuralocks_core.training.rig.energy import RigEnergy, RigMaterial, RodTree, bounded_turns
+from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
 from neuralocks_core.training.rig.motion import SPRINGS, motion_report
 from neuralocks_core.training.rig.poses import PosePool
-from neuralocks_core.training.rig.train import train_static
+from neuralocks_core.training.rig.static import train_static
 from tests.core.rig.builders import character, random_model, tail
 
 

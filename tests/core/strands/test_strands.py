@@ -148,8 +148,7 @@ def test_corners_of_a_smooth_groom_turn_with_it():
 
 
 def test_a_bent_coil_stays_a_coil():
-    """Lengths of a coil's own edges survive a bend of 90 degrees of its axis, though 17 of them share a
-    segment."""
+    """Lengths of a coil's own edges survive a bend of 90 degrees of its axis, though 17 of them share a segment."""
     groom = coil_groom()
     strands = strand_set(groom, ORIGIN, CENTRE)
     length = np.linalg.norm(np.diff(strands.rest, axis=1), axis=2)

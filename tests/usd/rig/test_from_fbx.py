@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError  # noqa: E402
 from neuralocks_core.rig import RigModel  # noqa: E402
 from neuralocks_core.rig.export_c import export_c  # noqa: E402
 from neuralocks_core.training.rig.dynamic import train_dynamic  # noqa: E402
-from neuralocks_core.training.rig.train import train_static  # noqa: E402
+from neuralocks_core.training.rig.static import train_static  # noqa: E402
 from usd.review.inspect import inspect  # noqa: E402
 from usd.rig.bake import bake_rig  # noqa: E402
 from usd.rig.stage import describe_chains, read_rigged_hair  # noqa: E402

@@ -6,12 +6,12 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.formats import cemyuksel
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
 from usd.assets.groom import import_groom
 from usd.shot.curves import left_as_they_are, read_groom
 
+from ...core.formats.groom_files import write_hair
 from ..shots import Recipe, write_shot
 
 COUNTS = [2, 3, 2]
@@ -118,7 +118,7 @@ def test_colors_of_a_hair_file_are_shown(tmp_path, rows, scope):
     rng = np.random.default_rng(0)
     look = Look(rng.uniform(0.1, 1, (rows, 3)).astype(np.float32), rng.uniform(0, 0.9, rows).astype(np.float32))
     hair = Groom("Hair", 0.1 * rng.normal(size=(12, 3)), [4, 8])
-    cemyuksel.write(tmp_path / "hair.hair", hair, look=look)
+    write_hair(tmp_path / "hair.hair", hair, look=look)
     import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
     import_groom(tmp_path / "groom.usda", tmp_path / "again.usda")
     for name in ("groom.usda", "again.usda"):
@@ -133,7 +133,7 @@ def test_colors_of_a_hair_file_are_shown(tmp_path, rows, scope):
 
 
 def test_a_hair_file_without_colors_gets_none(tmp_path):
-    cemyuksel.write(tmp_path / "hair.hair", Groom("hair", 0.1 * np.eye(3), [3]))
+    write_hair(tmp_path / "hair.hair", Groom("hair", 0.1 * np.eye(3), [3]))
     import_groom(tmp_path / "hair.hair", tmp_path / "groom.usda")
     stage = Usd.Stage.Open(str(tmp_path / "groom.usda"))
     curves = UsdGeom.Gprim(stage.GetPrimAtPath("/Groom/hair"))

@@ -9,14 +9,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import torch
 
-from neuralocks_core.progress import Progress, silent
+from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend, muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
-from neuralocks_core.training.rig.energy import RigMaterial
 from neuralocks_core.training.rig.network import TinyNet
-from neuralocks_core.training.rig.report import static_report, within
+from neuralocks_core.training.rig.report import static_report
 
 _POOL = 512
 """Poses to draw from."""
