@@ -50,7 +50,7 @@ class _Log:
         if now - self._written <= LOG_EVERY:
             return
         self._written, gone = now, done - self._first
-        # The first frame of a bake takes as long as a hundred others: of one alone, hours were foretold.
+        # A bake's first frame takes as long as a hundred others; from it alone the estimate would be hours.
         left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if 100 * gone > total else ""
         print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
 
