@@ -3,7 +3,7 @@
 
     python benchmarks/bake_speed.py [MODEL] [--strands 120000] [--frames 36] [--pairs 5]
 
-The groom is grown on the shipped character. Bakes and posing alone take turns, as the speed of a shared machine changes
+The groom is grown on the shipped character. Bakes and posing alone take turns, as the speed of a machine changes
 while they run. Memory is the peak of the bake's own process above what it held once the shot was read; the number of
 frames is doubled at last to see whether it grows. Run it on an idle machine; on a busy one only the CPU times and the
 memory say something.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What others do to the points of live hair: applied transforms, a moved origin, applied modifiers. The points are not the
-hair's rest shape then, so what was done to them is done to that.
+"""Edits of live hair's points by others: applied transforms, a moved origin, applied modifiers. Live points are not the
+hair's rest shape, so what was done to them is done to that.
 """
 
 import zlib
@@ -39,8 +39,8 @@ class Written(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """What was done to points once, to be known again after an undo: that goes back to before it was done to their rest
-    shape, for Blender remembers each step before it tells of it.
+    """What was done to points once. An undo goes back to before it was done to their rest shape, because Blender remembers
+    each step before it tells of it; it is then known again by this.
 
     Attributes:
         of: the curves.
@@ -102,8 +102,8 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         gone = [f"'{modifier}' was applied to it" for modifier in before.modifiers if modifier not in hair.modifiers]
         hair.neuralocks_hair.live = False
         raise NeuralocksError(
-            f"{name}: {[*gone, 'its points were changed'][0]} while it was moved, and that is lost, for Live puts the "
-            "points back to rest; undo, and do it with Live off"
+            f"{name}: {[*gone, 'its points were changed'][0]} while it was moved; that is lost, because Live puts "
+            "the points back to rest; undo, and do it with Live off"
         )
     session.followed[:] = [*session.followed[-KEPT:], Followed(before.of, _checksum(data), now, change)]
     curves.move_rest(data, change)

@@ -30,7 +30,7 @@ def rig_toggled(armature, context) -> None:
 
 
 def loop_changed(armature, scene) -> None:
-    """The frame range of this character repeats from now on, or no longer."""
+    """The switch was used that lets the frame range of this character repeat."""
     sampled = session.rigs.get(armature.name_full)
     if sampled is not None:
         sampled.clip = replace(sampled.clip, loop=armature.neuralocks_character.loop)

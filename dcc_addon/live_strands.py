@@ -154,8 +154,8 @@ def _which(hair) -> tuple:
 
 
 def _let_go(of: tuple) -> None:
-    """Give curves their rest shape back that a live hair object had before it was given others, unless they are moved
-    by another one now.
+    """Give the curves that a live hair object had before it got others their rest shape back, unless another one moves
+    them.
     """
     for left in bpy.data.hair_curves:
         if identity(left) == of[0] and left not in _moved():
@@ -210,8 +210,8 @@ def material(settings) -> np.ndarray:
 
 
 def typed(settings, name: str) -> float:
-    """A slider's value as somebody would type it, and not as single precision has it: a bake made elsewhere with the
-    number that is shown is then the same.
+    """A slider's value as somebody would type it, not as single precision has it, so that a bake made elsewhere with the
+    number shown is the same.
     """
     return round(getattr(settings, name), 6)
 
@@ -229,7 +229,7 @@ def rest(hair) -> None:
 
 
 def show_rest_left(things) -> None:
-    """Give curves among these objects their rest shape back that nothing live moves: live hair was joined to them, say."""
+    """Give those of these curves that nothing live moves their rest shape back: live hair was joined to them, say."""
     for thing in things:
         if thing.type != "CURVES" or thing.neuralocks_hair.live:
             continue

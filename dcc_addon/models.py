@@ -25,7 +25,7 @@ def load_model(found: str) -> StrandModel:
 
 
 def stamp(found: str) -> tuple | None:
-    """What tells whether the file of an absolute path is another one; None where there is none."""
+    """A stamp that changes when the file of an absolute path is another one; None where there is none."""
     try:
         status = os.stat(found)
     except OSError:

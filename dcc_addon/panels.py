@@ -26,7 +26,7 @@ class _Panel:
 
 
 class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
-    """Who carries the hair"""
+    """The character that carries the hair"""
 
     bl_label = "Character"
 
@@ -97,7 +97,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         if hair is None:
             return
         if hair.type != "CURVES":
-            words(layout, f"{hair.name_full} is no hair Curves object any more; choose another one", "ERROR")
+            words(layout, f"{hair.name_full} is no longer a hair Curves object; choose another one", "ERROR")
             return
         own = hair.neuralocks_hair
         if own.armature is None or own.armature != settings.armature:

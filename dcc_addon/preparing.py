@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is being prepared beside Blender: a large groom takes a second, which nobody should have to wait for."""
+"""Preparing hair beside Blender: a large groom takes a second, and nobody should have to wait for it."""
 
 import bpy
 

@@ -154,7 +154,7 @@ class HairSettings(bpy.types.PropertyGroup):
     )
     resolve: BoolProperty(
         name="Keep out of Body",
-        description="Push hair that the motion has brought into the body out of it, live and in bakes",
+        description="Push hair out of the body where the motion has brought it in, live and in bakes",
         default=True,
         update=_look_changed,
         **SETTING,
@@ -254,7 +254,7 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     train_minutes: FloatProperty(
         name="Minutes",
-        description="How long a training may take; hair begins with what the shipped model has learned, so that five are worth it",
+        description="How long a training may take; it begins with what the shipped model has learned, so five minutes are worth it",
         default=15.0,
         min=0.05,
         max=720.0,

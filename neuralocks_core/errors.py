@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user can get wrong, in one line."""
+"""The error for whatever a user can get wrong, in one line."""
 
 
 class NeuralocksError(ValueError):

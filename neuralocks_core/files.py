@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are under their name whole or not at all."""
+"""Files that appear under their name whole or not at all."""
 
 import errno
 import os
@@ -15,8 +15,8 @@ from neuralocks_core.errors import NeuralocksError
 def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     """A path to write to beside `path`, which takes its place when the block ends without an error.
 
-    It has the same name in a hidden folder of its own, since writers choose a format by the ending. What is missing of
-    the way to `path` is made. Entered before long work, a folder that cannot be written is known before it.
+    It has the same name in a hidden folder of its own, since writers choose a format by the ending. Missing folders on
+    the way to `path` are made. Enter it before long work, to learn in time that a folder cannot be written.
 
     Raises:
         NeuralocksError: for every OSError in the block; nothing is left of it, and what was under `path` stays.
@@ -37,7 +37,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def make_way(path: Path) -> list[Path]:
-    """Make what is missing of the way to a file; the folders made, the innermost first."""
+    """Make the missing folders on the way to a file; returns them, the innermost first."""
     missing = [folder for folder in path.parents if not os.path.exists(folder)]
     path.parent.mkdir(parents=True, exist_ok=True)
     return missing
@@ -67,6 +67,6 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> NeuralocksError:
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return NeuralocksError(f"{path}: no space left on the disk; free some, or choose another folder")
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
-        return NeuralocksError(f"{path}: on the way there is a file, not a folder; choose another folder")
+        return NeuralocksError(f"{path}: there is a file, not a folder, on the way; choose another folder")
     fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
     return NeuralocksError(f"{path}: cannot be written ({fact}); choose a folder you can write to")

@@ -61,7 +61,7 @@ def _taken(path: Path):
         return None
     try:
         _lock(lock)
-        # Who opens the file before it is removed, and locks it after, holds what others no longer see.
+        # Whoever opens the file before it is removed, and locks it after, holds a file that others cannot see.
         if os.path.samestat(os.fstat(lock.fileno()), os.stat(path)):
             return lock
     except FileNotFoundError:

@@ -109,7 +109,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
             graphs = {name: _entry(archive, entries[name], path) for name in KINDS[meta["kind"]]}
     except FileNotFoundError:
         raise NeuralocksError(
-            f"{path}: no such model file; check the path, or name none where the shipped one will do"
+            f"{path}: no such model file; check the path, or leave it out for the shipped one"
         ) from None
     except IsADirectoryError:
         raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it") from None
@@ -164,7 +164,7 @@ def _check(meta, path: Path, kind: str | None) -> None:
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}
         raise NeuralocksError(
-            f"{path}: it is a model for {names[meta['kind']]}, not for {names[kind]}; give such a one"
+            f"{path}: it is a model for {names[meta['kind']]}, not for {names[kind]}; give one that is"
         )
 
 

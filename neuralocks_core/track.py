@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way of a few joints through a clip, smooth between its samples and known before and after it."""
+"""The path of a few joints through a clip, smooth between its samples and defined before and after it."""
 
 import numpy as np
 

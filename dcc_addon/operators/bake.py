@@ -133,7 +133,7 @@ def _look(hair) -> _Look:
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
-    """Bake the moving hair of this character to a USD layer, equal to what is shown live, over its shot, which is written beside it as NAME_shot.usdc"""
+    """Bake this character's moving hair to a USD layer, equal to the live view. Its shot is written beside it as NAME_shot.usdc"""
 
     bl_idname = "neuralocks.bake"
     bl_label = "Bake to USD"

@@ -21,7 +21,7 @@ _running: list["Stepwise"] = []
 
 
 def stop() -> None:
-    """End what is at work, for the add-on goes: Blender takes the operator away and does not tell it."""
+    """End what is at work when the add-on is disabled: Blender removes the operator without telling it."""
     if _running:
         _running[0].cancel(bpy.context)
 
@@ -189,7 +189,7 @@ def shown_hair(context, armature=None):
         raise NeuralocksError("Strands: no hair chosen; choose a hair Curves object, or convert a particle system")
     if hair.type != "CURVES":
         raise NeuralocksError(
-            f"{hair.name_full}: it is no hair Curves object any more; choose another one in the panel"
+            f"{hair.name_full}: it is no longer a hair Curves object; choose another one in the panel"
         )
     carrier = hair.neuralocks_hair.armature
     if armature is not None and carrier != armature:

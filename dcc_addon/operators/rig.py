@@ -48,7 +48,7 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
-    """Key the hair bones, and nothing else, in an action of their own on an NLA track; muted, the bones do as before"""
+    """Key the hair bones, and nothing else, in an action of its own on an NLA track; mute it to have the old motion back"""
 
     bl_idname = "neuralocks.bake_keys"
     bl_label = "Bake Hair Bones to Keyframes"
@@ -94,7 +94,7 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
-    """Write the rig with moving hair bones as a USD skeleton animation, over its shot, which is written beside it as NAME_shot.usdc"""
+    """Write the rig with moving hair bones as a USD skeleton animation. Its shot is written beside it as NAME_shot.usdc"""
 
     bl_idname = "neuralocks.export_skel"
     bl_label = "Export USD Animation"

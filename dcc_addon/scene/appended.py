@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths of objects that are appended from another file: Blender remakes its own that begin with //, and not those of
-add-ons.
+"""Paths of objects that are appended from another file: Blender remakes its own paths that begin with //, but not those
+of add-ons.
 """
 
 import os

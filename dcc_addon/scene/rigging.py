@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How what moves a rig is put together: strips, drivers, constraints, parents, the rest pose. Where one of these is edited
-Blender says only that the object has changed, as it does when a bone is posed; of keys it names the action.
+"""How a rig's motion is put together: strips, drivers, constraints, parents, the rest pose. When one of these is edited,
+Blender says only that the object has changed, as it does when a bone is posed; for keys it names the action.
 """
 
 import zlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths when a file is saved in another folder: Blender remakes its own that begin with //, and not those of add-ons."""
+"""Paths when a file is saved in another folder: Blender remakes its own that begin with //, but not those of add-ons."""
 
 import os
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that are not keyed yet: animators move several bones, or turn a lamp up, before they set a key, and stepping
-through frames, which happens by itself in the background, evaluates the animation over them.
+"""Poses without keys: animators move several bones, or turn a lamp up, before they set a key. Stepping through frames,
+which happens by itself in the background, evaluates the animation over them.
 """
 
 import bpy

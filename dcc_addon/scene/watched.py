@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that are hidden, whose places and shape keys Blender leaves as they were in whatever frame it showed them last."""
+"""Hidden objects: Blender leaves their places and shape keys as in the frame that showed them last."""
 
 from contextlib import contextmanager
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are written over: only such as were made here, for a panel asks nobody before."""
+"""Files may be written over only if they were made here: a panel asks nobody before."""
 
 import os
 

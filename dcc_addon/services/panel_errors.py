@@ -8,7 +8,7 @@ WORDS = (
     ),
     (" (neuralocks rig train)", " (Train for This Character)"),
     ("see neuralocks inspect for their names", "look at the armature for their names"),
-    ("name none where the shipped one will do", "leave Model empty for the shipped one"),
+    ("leave it out for the shipped one", "leave Model empty for the shipped one"),
     ("or give --model", "or choose another model"),
     ("name it with --head JOINT", "choose it as Head bone"),
     ("name the joint that carries the hair with --head JOINT", "choose the bone that carries the hair as Head bone"),

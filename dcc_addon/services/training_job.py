@@ -13,7 +13,7 @@ from pathlib import Path
 
 CHILD = Path(__file__).with_name("training_child.py")
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
-"""Of what is said by a child, and to it: in the code page of Windows, a letter that is not in it would end who listens."""
+"""For a child's input and output. In a code page of Windows, a letter that it lacks would end the reader."""
 
 
 def problem(python: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way is up in a bind pose: what of the turn of a character's parents is axes, and what is pose."""
+"""Which way is up in a bind pose: how much of the parents' turn is axes, and how much is pose."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cuts in a clip: where a character is put elsewhere from one sample to the next, and its hair must not feel the way."""
+"""Cuts in a clip: a character is put elsewhere between two samples, and its hair must not feel the jump."""
 
 import numpy as np
 

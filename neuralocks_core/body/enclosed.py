@@ -16,7 +16,7 @@ _AT_ONCE = 2_000_000
 
 
 def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them, what seems deepest inside proven.
+    """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them, but proven where they seem deepest.
 
     Points in free air that `Collider` takes for inside seem deeper than those that are. So the deepest few are proven, and
     the next few as long as one of them turns out to be outside.

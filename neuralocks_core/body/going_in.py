@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How deep strands lie where nothing is known of the body: below the skin that moves, it is known for some way only."""
+"""How deep strands lie where the body is unknown: below moving skin it is known only to some depth."""
 
 import numpy as np
 

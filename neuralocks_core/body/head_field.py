@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signed distance to what stands still against the hair, the head: a grid, made once."""
+"""Signed distance to the head, which stands still against the hair: a grid, made once."""
 
 import hashlib
 from dataclasses import dataclass, field

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clumping in inference: how far the hairs of a lock part from the way of their lock."""
+"""Clumping in inference: how far the hairs of a lock stray from the motion of their lock."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ CANTILEVER = 12.36
 
 @dataclass(frozen=True, eq=False)
 class Locks:
-    """The locks of a groom as strands of their own, and the way from their motion to that of their hairs.
+    """The locks of a groom as strands of their own, and how their motion moves their hairs.
 
-    The network knows of a hair what it and its lock look like, not where its neighbours are, and learns nothing of
-    ties between them. So it is asked for the locks' own strands too, in each frame, and hairs are drawn to where their
-    lock goes, or let loose from it. Nothing is done, and nothing computed, at the default.
+    The network knows what a hair and its lock look like, but not where its neighbours are, so it learns nothing of ties
+    between them. In each frame it is therefore asked for the locks' own strands, too, and hairs are drawn to where their
+    lock goes, or let loose from it. At the default nothing is computed.
     """
 
     strands: StrandSet
@@ -34,9 +34,9 @@ class Locks:
     lock: np.ndarray
     """(S,) each hair's lock."""
     rod: np.ndarray
-    """(S,) what bending stiffness holds each hair with, a clamped rod: 12.36 / L^4 [1/m^4]."""
+    """(S,) how firmly bending stiffness holds each hair, as a clamped rod: 12.36 / L^4 [1/m^4]."""
     pendulum: np.ndarray
-    """(S,) what its weight holds it with, a pendulum: g / L [1/s^2]."""
+    """(S,) how firmly its weight holds it, as a pendulum: g / L [1/s^2]."""
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carrying along what lies off the network's polyline, the turns of a coil, say, by the turns of its segments."""
+"""Carrying what lies off the network's polyline, such as the turns of a coil, by the turns of its segments."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bake is worth: the report card, energies, and the comparison with the solver."""
+"""How good a bake is: the report card, energies, and the comparison with the solver."""

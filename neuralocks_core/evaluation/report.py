@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report card: what hair was measured at, as text, numbers and curves."""
+"""The report card: measurements of hair as text, numbers and curves."""
 
 import io
 import json

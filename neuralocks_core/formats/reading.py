@@ -123,7 +123,7 @@ def _reader(path: Path, content: bytes):
         return counted.read_ct2hair
     if suffix == ".hair":
         raise bad_file(str(path), "does not begin with HAIR", "give a file in Cem Yuksel's format")
-    raise bad_file(str(path), "is no groom file that is known by its content or name", f"give {' '.join(EXTENSIONS)}")
+    raise bad_file(str(path), "is not a known groom file, by content or by name", f"give {' '.join(EXTENSIONS)}")
 
 
 def _check_finite(points: np.ndarray, path: Path) -> None:

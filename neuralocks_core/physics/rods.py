@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a strand at rest gives its potentials: lengths, masses, edges and the force that holds it."""
+"""What the potentials need of a strand at rest: lengths, masses, edges and the force that holds it."""
 
 from __future__ import annotations
 

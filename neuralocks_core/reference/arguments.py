@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the simulators are given, checked: a wrong shape or number is named before anything is computed."""
+"""Checks of the simulators' arguments: a wrong shape or number is named before anything is computed."""
 
 from dataclasses import asdict
 from typing import Any

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a rod at rest gives its solver: lengths, masses, curvature in the twist-free frame, support."""
+"""What the solver needs of a rod at rest: lengths, masses, curvature in the twist-free frame, support."""
 
 from dataclasses import dataclass
 

@@ -21,7 +21,7 @@ SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 
 @dataclass(frozen=True)
 class Rollout:
-    """What T frames of S strands became; canonical space, so the head's own motion is out of it."""
+    """T frames of S simulated strands, in canonical space, which leaves out the head's own motion."""
 
     points: np.ndarray
     """(T, S, K, 3) float32 [m]."""

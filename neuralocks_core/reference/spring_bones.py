@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""VRM spring bones, as specified (VRM 1.0 VRMC_springBone): what avatars' hair moves by today.
+"""VRM spring bones, as specified (VRM 1.0 VRMC_springBone): the usual way to move avatars' hair.
 
     next = tail + (tail - previous tail) (1 - drag) + parent rotation * rest axis * stiffness dt
         + gravity direction * gravity power dt

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One time step after the other on a device: what `rods.simulate` is made of."""
+"""The time steps of `rods.simulate`, one after the other on a device."""
 
 from collections.abc import Sequence
 

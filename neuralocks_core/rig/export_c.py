@@ -106,7 +106,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
 
 
 def _digest(model: RigModel) -> str:
-    """By which a compiler tells two models apart."""
+    """The digest by which a compiler tells two models apart."""
     digest = hashlib.sha256(repr(model.chains.names).encode("utf-8", "replace"))
     for array in (model.limits, *(each for layer in model.layers for each in layer)):
         digest.update(array.tobytes())

@@ -43,7 +43,7 @@ class Beginning:
         return list(self._meta.get("credits", []))
 
     def card(self) -> dict:
-        """How the model came about, for the card of what begins with it."""
+        """How the model was made, for the card of a training that begins with it."""
         training = self._meta.get("training", {})
         return {
             name: training[name]

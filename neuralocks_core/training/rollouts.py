@@ -91,7 +91,7 @@ class Rollout:
 
 @dataclass(frozen=True)
 class Draw:
-    """What chance decides of a rollout.
+    """The random choices of a rollout.
 
     Attributes:
         groom: index into the scene's grooms.
@@ -169,7 +169,7 @@ class RolloutMaker:
         return replace(rollout, vectors=vectors, bind=bind)
 
     def draw(self, index: int) -> Draw:
-        """All chance of a rollout, in one place and order."""
+        """Make all random choices of a rollout, in one place and order."""
         rng = np.random.default_rng([self.scene.seed, self.scene.held_out, index])
         which = int(rng.integers(len(self.scene.grooms)))
         strands = self._locks(which, rng)

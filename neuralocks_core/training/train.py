@@ -184,7 +184,7 @@ class _Run:
             NeuralocksError: a process of the solver failed.
         """
         options, meta = self._options, self.meta
-        # Against today's budget: a finished run goes on when it is given more time.
+        # Against this run's budget: a finished run goes on when it is given more time.
         spent = meta["step"] / options.steps if options.steps else meta["seconds"] / (60 * options.minutes)
         began, last = time.monotonic() - meta["seconds"], time.monotonic()
         gauge = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The folder beside a model in which its training keeps what it goes on from after a kill."""
+"""The folder beside a model where its training keeps what it needs to go on after a kill."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ INPUTS = "inputs.json"
 
 
 def work_folder(out: str | Path, resume: bool) -> Path:
-    """Where a training keeps what it goes on from: asked for before anything is read.
+    """The folder of a training, checked before anything is read.
 
     Raises:
         NeuralocksError: `out` is no name for a model, or there is nothing to resume.
@@ -55,7 +55,7 @@ def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | N
 
 
 def keep_beginning(model_file: Path, work: Path) -> None:
-    """A copy of the model that is begun with: the training can be resumed whatever happens to the file."""
+    """Copy the model that a training begins with, so that it can be resumed whatever happens to the file."""
     with atomic_write(work / BEGINNING) as part:
         shutil.copyfile(model_file, part)
 
@@ -75,7 +75,7 @@ def claimed(work: Path) -> Iterator[None]:
 
 
 def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
-    """Note what simulations are made of; go on with those of the same scene only, whose strands and motion they tell of.
+    """Note what simulations are made of, and refuse to go on with those of another scene.
 
     Raises:
         NeuralocksError: those in the folder were made of something else.

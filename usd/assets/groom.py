@@ -34,7 +34,7 @@ OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
 
 @dataclass(frozen=True)
 class Authored:
-    """A groom with what the curves that it was read from say besides.
+    """A groom, with further attributes of the curves that it was read from.
 
     Attributes:
         groom: the strands.

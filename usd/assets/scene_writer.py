@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write an animated character with hair as a shot, from arrays: what an application without a USD exporter of its own
-hands over.
-"""
+"""Write an animated character with hair as a shot, from arrays, for applications without a USD exporter of their own."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -97,7 +97,7 @@ class OverrideWriter:
 
 
 def over_prim(layer: Sdf.Layer, prim: Usd.Prim) -> Sdf.PrimSpec:
-    """The over of a shot's prim; instances that it lies in are so no longer, for what is inside of them cannot be overridden."""
+    """The over of a shot's prim. Instances around it become plain prims: nothing inside an instance can be overridden."""
     for above in prim.GetPath().GetPrefixes():
         if prim.GetStage().GetPrimAtPath(above).IsInstance():
             _over(layer, above).instanceable = False

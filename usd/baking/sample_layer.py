@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new crate file that is written sample by sample: what is held of it does not grow with their number."""
+"""A new crate file that is written sample by sample: its memory does not grow with their number."""
 
 from pathlib import Path
 

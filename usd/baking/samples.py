@@ -83,7 +83,7 @@ def write_samples(
 
 
 def _carried(item: StageGroom) -> list:
-    """What its samples depend on of how a groom was read: by which joints of what, from where, and with which cuts."""
+    """How a groom was read, as far as its samples depend on it: which joints of which skeleton, from where, which cuts."""
     found, character = item.attachment, item.attachment.character
     joints = {name: int(joint) for name, joint in character.humanoid.items()}
     return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]

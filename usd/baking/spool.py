@@ -102,7 +102,7 @@ class Spool:
             self.discard()
 
     def discard(self) -> None:
-        """Remove the folder, and what was made on the way to an output that did not come."""
+        """Remove the folder, and the folders made for an output that was not written."""
         self._lock.release(remove=True)
         remove_empty(self._made)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ctrl-C, or a farm's SIGTERM, ends a command whatever it meets: USD, while it loads its modules, swallows it or makes an
-error of it, and VTK may crash.
+"""Ctrl-C, or a farm's SIGTERM, ends a command at any time. While USD loads its modules, it swallows the signal or turns it
+into an error, and VTK may crash.
 """
 
 import signal

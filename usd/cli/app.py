@@ -114,7 +114,7 @@ def evaluate_command(
     joint: Joints = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="With --reference: whose answer to each pose as if held is shown, too."),
+        typer.Option("--model", help="With --reference: also show this model's answer to each pose as if held."),
     ] = None,
     material: Materials = None,
     plot: Annotated[
@@ -173,7 +173,7 @@ def export_command(
         Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
     ] = None,
     shot: Annotated[
-        Path | None, typer.Option(help="USD stage: also write what no frame changes of each of its grooms.")
+        Path | None, typer.Option(help="USD stage: also write the data of its grooms that no frame changes.")
     ] = None,
     groom: Grooms = None,
     skeleton: Skeleton = None,

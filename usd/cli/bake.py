@@ -72,7 +72,7 @@ def join_command(
     out: Out,
     as_json: AsJson = False,
 ) -> None:
-    """Make one bake out of those of parts of a shot's range, as the machines of a farm write them.
+    """Join the bakes of parts of a shot's range, as the machines of a farm write them, into one.
 
     The file is the same, byte for byte, as if all frames had been baked at once.
     """

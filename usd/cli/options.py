@@ -14,7 +14,7 @@ Grooms = Annotated[
     list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All hair if left out.")
 ]
 Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
-Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair for which no binding says so.")]
+Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair without a binding.")]
 Joints = Annotated[
     list[str] | None,
     typer.Option(
@@ -37,13 +37,14 @@ Materials = Annotated[
 Cuts = Annotated[
     list[str] | None,
     typer.Option(
-        "--cuts", help="First frames after cuts, such as 25,49: all hair starts anew; found if left out, or 'none'."
+        "--cuts",
+        help="First frames after cuts, such as 25,49, where all hair starts anew, or 'none'; found if left out.",
     ),
 ]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of everything random.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Seed of everything random.")]
 Jobs = Annotated[
-    int | None, typer.Option("--jobs", help="Threads; a core each, eight at most, if left out. The result is the same.")
+    int | None, typer.Option("--jobs", help="Threads; if left out one per core, at most eight. The result is the same.")
 ]
 
 

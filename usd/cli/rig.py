@@ -28,8 +28,8 @@ def train(
     dynamic: Annotated[
         bool, typer.Option("--dynamic/--quasi-static", help="Learn lag, swing and settling, or held poses only.")
     ] = True,
-    seconds: Annotated[float | None, typer.Option(help="Seconds to descend; 120, and 75 quasi-static.")] = None,
-    steps: Annotated[int | None, typer.Option(help="Train this many steps instead: repeatable.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Seconds to train; 120, and 75 quasi-static.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Train this many steps instead; repeatable.")] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
@@ -92,7 +92,7 @@ def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict)
     if clips is not None and not 2 <= clips <= 10000:
         raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
     if not dynamic and (clips is not None or material["damping"] is not None):
-        raise NeuralocksError("--clips, --damping: nothing for them to do in held poses; leave out --quasi-static")
+        raise NeuralocksError("--clips, --damping: have no effect on held poses; leave out --quasi-static")
     for name, value in material.items():
         if value is not None and not 1e-6 < value < 1e4:
             raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
@@ -104,7 +104,7 @@ def bake(
     out: Annotated[Path, typer.Option("-o", "--out", help="Override layer to write.")],
     model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
     frames: Annotated[
-        str | None, typer.Option(help="A:B[:STEP] of samples beside the animation's own; the shot's range if left out.")
+        str | None, typer.Option(help="A:B[:STEP] to sample besides the animation's own; the shot's range if left out.")
     ] = None,
     subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
     loop: Annotated[

@@ -203,7 +203,7 @@ def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarr
 
 
 def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
-    """What to say of hair that one joint cannot carry: fur all over a body."""
+    """The note on hair that one joint cannot carry: fur all over a body."""
     names = [leaf(name) for name in rig.source.names]
     # What hangs below a head is its face; what hangs below a spine is everything.
     own = (

@@ -61,7 +61,7 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
 
 
 def moment(prim: Usd.Prim) -> float | None:
-    """Time code of which the points taken for those at rest are, where they are one sample of a moving cache."""
+    """Time code of the points at rest, where they are taken from one sample of a moving cache."""
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
     if points.Get(Usd.TimeCode.Default()) is not None or not points.ValueMightBeTimeVarying():
         return None
@@ -69,7 +69,7 @@ def moment(prim: Usd.Prim) -> float | None:
 
 
 def left_as_they_are(prim: Usd.Prim) -> list[str]:
-    """What to say of values that belong to the points at rest and that a bake does not carry."""
+    """The notes on values that belong to the points at rest, which a bake does not carry along."""
     notes = []
     if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
         notes.append(

@@ -13,7 +13,7 @@ from .notes import another_carries, few, no_points, too_far
 
 
 class HairSearch:
-    """Tells hair from other curves; what is left out is told in the notes.
+    """Tells hair from other curves; the notes name what is left out.
 
     Args:
         rigs: skeletons that may carry hair; not empty where `attachment` is asked.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bake tells of itself, on each groom: the material and the options that it was made with."""
+"""What a bake records on each groom: the material and the options that it was made with."""
 
 from pxr import Sdf, Usd, Vt
 
@@ -26,27 +26,27 @@ def recorded(prim: Usd.Prim) -> dict:
 
 
 def cut_facts(cuts: list[float] | None) -> dict:
-    """What a bake tells of the cuts, by time code, that its user gave; nothing where they were found."""
+    """The record of the cuts, by time code, that the user gave; empty where they were found."""
     return {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
 
 
 def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
-    """The cuts that a groom's bake tells of; None where they were found, and will be again."""
+    """The cuts recorded with a groom's bake; None where they were found, and will be again."""
     told = recorded(prim).get("cuts")
     return told if isinstance(told, list) else None
 
 
 def recorded_joint(prim: Usd.Prim) -> str | None:
-    """Path of the joint that a groom's bake was carried by, None where it is not told."""
+    """Path of the joint that carried a groom in its bake, None where it is not recorded."""
     told = recorded(prim).get("joint")
     return told if isinstance(told, str) else None
 
 
 def recorded_material(prim: Usd.Prim) -> Material | None:
-    """The material of a bake, None where it is not told.
+    """The material of a bake, None where it is not recorded.
 
     Raises:
-        NeuralocksError: what is told is no material.
+        NeuralocksError: what is recorded is no material.
     """
     values = recorded(prim).get("material")
     if values is None:

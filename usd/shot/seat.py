@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where curves that nothing binds lie in a rig's bind pose, and on which skin.
 
-A file does not say of what their place in the stage is the place: of the bind pose, of a skin elsewhere in the stage,
-or of the pose at one moment. That of curves that move with the head or are a moving cache is of a moment; of the rest
-it is where their roots lie on skin.
+A file does not say what the place of such curves in the stage belongs to: the bind pose, a skin elsewhere in the stage,
+or the pose at one moment. For curves that move with the head or are a moving cache it is a moment; for the rest, the
+place at which their roots lie on skin.
 """
 
 from collections.abc import Callable

@@ -16,7 +16,7 @@ MOVES = 0.002
 
 
 def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
-    """What to say of hair that nothing binds and that lies off the skin of what carries it."""
+    """The note on hair without a binding that lies off the skin of its carrier."""
     seat = find_seat(prim, rig, placement)
     if seat is None:
         return []
@@ -28,7 +28,7 @@ def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[s
 
 
 def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:
-    """What to say of strands whose last points lie on skin, and whose first ones do not."""
+    """The note on strands whose last points lie on skin while their first ones do not."""
     if not rig.skins:
         return []
 
@@ -46,7 +46,7 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
 
 
 def moved_away(path: str, rig: StageRig, roots: np.ndarray) -> list[str]:
-    """What to say of a groom whose skin a blend shape moves during the shot; its roots (n, 3) in bind world [m]."""
+    """The note on a groom whose skin a blend shape moves during the shot; its roots (n, 3) in bind world [m]."""
     body, spans = rig.character.body, np.ptp(rig.clip.shape, axis=0)
     if body is None or not spans.any():
         return []

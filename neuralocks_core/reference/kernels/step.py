@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What surrounds a Newton solve in a time step: prediction, forces, neighbours, body contact. Arrays are (K, S)."""
+"""The parts of a time step around the Newton solve: prediction, forces, neighbours, body contact. Arrays are (K, S)."""
 
 import warp as wp
 

@@ -97,6 +97,6 @@ def converted(_folder: Path) -> None:
         operators.reset_look,
         operators.assign,
     ):
-        refused(refuse, "Hair: it is no hair Curves object any more")
+        refused(refuse, "Hair: it is no longer a hair Curves object")
     strands.neuralocks_hair.live = False
     strands.neuralocks_hair.live = True
