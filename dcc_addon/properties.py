@@ -238,8 +238,8 @@ class SceneSettings(bpy.types.PropertyGroup):
     frame_start: IntProperty(name="Start", description="First frame of the bake", default=1, update=_range_changed)
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
-        name="Samples per Frame",
-        description="More than one for motion blur, as --subframes on the command line; a shutter that is open before the "
+        name="Samples",
+        description="Samples per frame: more than one for motion blur, as --subframes on the command line; a shutter that is open before the "
         "first frame, or after the last, needs a bake that is a frame longer there",
         default=1,
         min=1,

@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import blender_shot
 import bpy
+import numpy as np
 from mathutils import Vector
 
 RATE = 12
@@ -116,7 +117,11 @@ def clip(folder: Path, pictures: list[str]) -> Path:
     except ImportError:
         return folder
     out = folder / "clip.gif"
-    first, *rest = (Image.open(p).convert("RGB").quantize(256, dither=Image.Dither.NONE) for p in pictures)
+    frames = [Image.open(picture).convert("RGB") for picture in pictures]
+    # One palette for all, and no dithering: what stands still stays still, and takes no room.
+    some = Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames[:: len(frames) // 6 + 1]]))
+    palette = some.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3)
+    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first.save(out, save_all=True, append_images=rest, duration=round(1000 / RATE), loop=0, optimize=True)
     return out
 
