@@ -5,45 +5,56 @@ from __future__ import annotations
 
 import numpy as np
 
-STRANDS_A_LOCK = 8
-"""A lock holds at least about this many strands, or its mean code says nothing."""
+STRANDS_A_LOCK = 6
+"""Locks hold so many strands in the mean at least, or their mean codes say nothing."""
 
 LOCK_SPACING = 0.012
 """Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands,
 so that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
 
+COARSER = 2**0.25
+"""Locks are farther apart by so much, and again, until they hold strands enough."""
+
 MATES, MATE_RADIUS = 5, 0.02
 """So many strands at most are tied to each, within so many metres."""
 
-_SAMPLE = 20_000
-_ITERATIONS = 12
 
+def lock_of_roots(roots: np.ndarray) -> np.ndarray:
+    """Strands of a lock have their roots by the same point of a lattice; the paper (section 3.3) leaves the clustering open.
 
-def lock_of_roots(roots: np.ndarray, locks: int | None = None) -> np.ndarray:
-    """Cluster strands by their roots (k-means; the paper, section 3.3, leaves the clustering open).
+    Clusters that begin at random would all be others with one strand more, in another unit, or after an edit elsewhere.
 
     Args:
         roots: (S, 3) [m].
-        locks: how many; if left out, by the size of the scalp and the number of strands.
 
     Returns:
-        (S,) int32 lock of each strand, numbered without gaps from 0; always the same for the same roots.
+        (S,) int32 lock of each strand, numbered without gaps from 0.
     """
     roots = np.asarray(roots, dtype=np.float64)
-    if locks is None:
-        cells = len(np.unique(np.floor(roots / LOCK_SPACING).astype(np.int64), axis=0))
-        locks = min(cells, -(-len(roots) // STRANDS_A_LOCK))
-    random = np.random.default_rng(0)
-    sample = roots if len(roots) <= _SAMPLE else roots[random.choice(len(roots), _SAMPLE, replace=False)]
-    distinct = np.unique(sample, axis=0)  # a hair tie may hold many strands in one point
-    centres = random.choice(distinct, min(max(locks, 1), len(distinct)), replace=False)
-    for _ in range(_ITERATIONS):
-        nearest = _tree(centres).query(sample)[1]
-        size = np.bincount(nearest, minlength=len(centres))
-        total = np.stack([np.bincount(nearest, sample[:, axis], len(centres)) for axis in range(3)], axis=1)
-        centres = np.where(size[:, None] > 0, total / np.maximum(size, 1)[:, None], centres)
-    lock = _tree(centres).query(roots)[1]
+    spacing = LOCK_SPACING
+    while True:
+        point, size = _lattice_points(roots, spacing)
+        if len(size) == 1 or len(roots) >= STRANDS_A_LOCK * len(size):
+            break
+        spacing *= COARSER
+    middle = np.stack([np.bincount(point, column) / size for column in roots.T], axis=1)
+    # The scalp only grazes some cells: their few strands go with the others around them.
+    lock = _tree(middle[3 * size * len(size) >= len(roots)]).query(roots)[1]
     return np.unique(lock, return_inverse=True)[1].astype(np.int32).ravel()
+
+
+def _lattice_points(places: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Which point of a face-centred cubic lattice (S,) is nearest to each place (S, 3) [m], and how many have each point."""
+    exact = places * (np.sqrt(2) / spacing)
+    whole = np.round(
+        exact
+    )  # the lattice has those of even sum: the others move along the axis where they were rounded most
+    odd = np.flatnonzero(whole.sum(axis=1) % 2)
+    off = exact[odd] - whole[odd]
+    axis = np.abs(off).argmax(axis=1)
+    whole[odd, axis] += np.where(np.take_along_axis(off, axis[:, None], 1)[:, 0] < 0, -1, 1)
+    _, point, size = np.unique(whole, axis=0, return_inverse=True, return_counts=True)
+    return point.ravel(), size
 
 
 def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:

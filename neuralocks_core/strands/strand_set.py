@@ -69,16 +69,15 @@ class StrandSet:
         )
 
 
-def strands_on(character: Character, groom: Groom, *, locks: int | None = None) -> StrandSet:
+def strands_on(character: Character, groom: Groom) -> StrandSet:
     """The groom as the network sees it on a character's head: `strand_set` with where that lies.
 
     Args:
         character: whose head carries the hair.
         groom: in bind-world metres.
-        locks: number of locks; chosen from the distribution of the roots if left out.
     """
     origin = character.canonical_to_bind[:3, 3]
-    return strand_set(groom, origin, character.head_centre, character.facing, locks=locks)
+    return strand_set(groom, origin, character.head_centre, character.facing)
 
 
 def strand_set(
@@ -86,8 +85,6 @@ def strand_set(
     head_origin: np.ndarray,
     head_centre: np.ndarray,
     facing: np.ndarray | None = None,
-    *,
-    locks: int | None = None,
 ) -> StrandSet:
     """The groom resampled to K vertices a strand, with what else the network reads of it.
 
@@ -96,7 +93,6 @@ def strand_set(
         head_origin: (3,) [m], bind-world position of the head joint.
         head_centre: (3,) [m], middle of the skull in canonical space.
         facing: (3, 3) rotation from bind-world axes to canonical axes (Y up, +Z face); identity if left out.
-        locks: number of locks; chosen from the distribution of the roots if left out.
     """
     facing = np.eye(3) if facing is None else np.asarray(facing, dtype=np.float64)
     head_origin = np.asarray(head_origin, dtype=np.float64)
@@ -115,7 +111,7 @@ def strand_set(
         valid=valid,
         uv=root_uv(rest[:, 0], head_centre),
         root_frame=root_frames(normal).astype(np.float32),
-        lock=lock_of_roots(rest[:, 0], locks),
+        lock=lock_of_roots(rest[:, 0]),
         length=np.linalg.norm(np.diff(rest, axis=1), axis=2).sum(axis=1).astype(np.float32),
         head_origin=head_origin,
         head_centre=head_centre,

@@ -126,7 +126,7 @@ def _strands(parts: list[Groom], character: Character) -> StrandSet:
     """What `strands_on` gives for the whole groom, made part by part."""
     if len(parts) == 1:
         return strands_on(character, parts[0])
-    sets = [strands_on(character, part, locks=1) for part in parts]
+    sets = [strands_on(character, part) for part in parts]
     fields = ("rest", "valid", "uv", "root_frame", "length")
     joined = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
     return replace(sets[0], lock=lock_of_roots(joined["rest"][:, 0]), **joined)

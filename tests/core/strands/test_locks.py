@@ -32,6 +32,24 @@ def test_lock_size_does_not_follow_the_strand_count():
     assert spread(many, lock_of_roots(many)) == pytest.approx(spread(few, lock_of_roots(few)), rel=0.25)
 
 
+def test_a_trifle_leaves_locks_as_they_are():
+    """One strand less, or a rounding, also along the middle; of what is trimmed only the neighbourhood changes."""
+    roots = scalp(3000)
+    roots[:200, 0] = 1e-9 * np.random.default_rng(1).normal(size=200)
+    lock = lock_of_roots(roots)
+    for changed, kept in ((roots[:-1], slice(0, -1)), (roots + 1e-8, slice(None)), (roots - 1e-8, slice(None))):
+        assert shared(lock[kept], lock_of_roots(changed)) > 0.99
+    trimmed = np.linalg.norm(roots - roots[500], axis=1) > 0.02
+    far = np.linalg.norm(roots[trimmed] - roots[500], axis=1) > 0.05
+    assert shared(lock[trimmed][far], lock_of_roots(roots[trimmed])[far]) > 0.99
+
+
+def shared(one, other):
+    """Mean share of a strand's lock, in either, that is its lock in both."""
+    one, other = one[:, None] == one, other[:, None] == other
+    return ((one & other).sum(axis=1) / (one | other).sum(axis=1)).mean()
+
+
 @pytest.mark.parametrize("roots", [np.zeros((1, 3)), np.zeros((500, 3)), scalp(2), scalp(7)])
 def test_few_or_equal_roots_make_one_lock(roots):
     np.testing.assert_array_equal(lock_of_roots(roots), 0)
