@@ -39,7 +39,7 @@ from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
 SEED = 7001
-STRANDS = 48
+STRANDS = 120
 DT = 1 / 30
 
 
