@@ -6,7 +6,8 @@ import numpy as np
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
-from neuralocks_core.rig.network import feature_columns, input_limits
+from neuralocks_core.rig.network import feature_columns, held_features, input_limits
+from neuralocks_core.rotation import from_quaternion
 
 
 def character(extra=(), turn=None) -> Character:
@@ -61,3 +62,22 @@ def random_model(joints=(4, 4, 4, 4), hidden=16, seed=0, spec: BoundarySpec | No
         layers.append((rng.normal(0, 1 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
         size = out
     return RigModel(chains, spec, tuple(layers), input_limits(spec))
+
+
+def model_of(kind) -> RigModel:
+    """Random weights, or the shipped model's; "odd" sizes fill no vector unit."""
+    if kind == "shipped":
+        return RigModel.load()
+    if kind == "odd":
+        return random_model((1, 2, 4, 6), 13, 0, rig_spec(True))
+    return random_model((4,) * 4, 16 + 16 * (kind == "dynamic"), 0, rig_spec(kind == "dynamic"))
+
+
+def random_features(model, count, seed=1):
+    """Features of random held poses, and a random history."""
+    rng = np.random.default_rng(seed)
+    relative = from_quaternion(rng.normal(size=(count, 2, 4)))
+    gravity = rng.normal(size=(count, 3))
+    features = held_features(model.spec, relative, gravity / np.linalg.norm(gravity, axis=1, keepdims=True))
+    features[:, 15:] = rng.normal(0, 0.5, features[:, 15:].shape)
+    return features

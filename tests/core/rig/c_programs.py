@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs round an exported header, built by every compiler that there is and fed with float32 rows."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+FLAGS = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
+COMPILERS = [("gcc", "c", "c99"), ("g++", "c++", "c++11"), ("clang", "c", "c99"), ("clang++", "c++", "c++11")]
+
+
+def compiled(folder, source, options=("-O2",), compiler=("gcc", "c", "c99")):
+    """Build a program beside the header; skips where there is no such compiler."""
+    if shutil.which(compiler[0]) is None:
+        pytest.skip(f"no {compiler[0]} to compile the header with")
+    (folder / "main.src").write_text(source)
+    name, lang, std = compiler
+    command = [name, "-x", lang, f"-std={std}", *FLAGS, *options, "main.src", "-lm", "-o", "main"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder / "main"
+
+
+def run_c(program, inputs, width):
+    """Feed float32 rows, read float32 rows."""
+    done = subprocess.run([program], input=np.asarray(inputs, "<f4").tobytes(), capture_output=True, check=True)
+    return np.frombuffer(done.stdout, "<f4").reshape(-1, width)

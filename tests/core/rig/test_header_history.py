@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The header's history of the head: that of a bake at any frame rate, and nothing damaged stays in it."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import RigSampler, rig_spec
+from neuralocks_core.rig.export_c import export_c
+from neuralocks_core.rotation import from_vector, to_quaternion
+from tests.core.rig.builders import character, random_model
+from tests.core.rig.c_programs import COMPILERS, compiled, run_c
+
+HISTORY_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_history history;
+  static float row[8], out[6 * NL_HAIR_BINS];
+  const float down[3] = {0.0f, -1.0f, 0.0f};
+  nl_hair_history_reset(&history);
+  while (fread(row, sizeof row, 1, stdin) == 1) {
+    nl_hair_history_push(&history, (double)row[0], row + 1, row + 4);
+    nl_hair_history_read(&history, down, out);
+    fwrite(out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("rate", [30, 60, 47, 144])
+def test_the_headers_history_is_that_of_the_bake(tmp_path, rate):
+    """A nodding, swaying head, pushed at any frame rate: entries of fast frames must reach as far back."""
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    who = character()
+    t = np.arange(0, 4, 1 / rate)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.6 * np.sin(4 * t) * np.minimum(t, 1), [1, 0.4, 0]))
+    joints[:, who.head, 0, 3] += 0.15 * np.sin(5 * t) * np.minimum(t, 1)
+    wanted = RigSampler(model.spec, who, Clip(t, joints)).features(t)[:, 15:]
+    quaternions = to_quaternion(joints[:, who.head, :3, :3])
+    rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
+    ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, wanted.shape[1])
+    late = t > 2
+    error = np.sqrt(np.square(ours - wanted)[late].mean() / np.square(wanted[late]).mean())
+    assert error < 0.03, error
+
+
+@pytest.mark.parametrize(
+    ("compiler", "options"),
+    [(COMPILERS[0], ()), (COMPILERS[0], ("-ffast-math",)), (COMPILERS[2], ("-ffast-math",))],
+    ids=["gcc", "gcc fast", "clang fast"],
+)
+def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, options):
+    """A position beyond any world, or none at all, is felt as a jump and forgotten when the history has passed, also where
+    the compiler was told that there are no infinities; a damaged time is not heard."""
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    program = compiled(tmp_path, HISTORY_HARNESS, ("-O2", *options), compiler)
+    for damaged in (1e30, -3.4e38, np.inf, np.nan):
+        rows = np.zeros((240, 8), np.float32)
+        rows[:, 0], rows[:, 4] = np.arange(240) / 60, 1
+        rows[60, 1:4] = damaged
+        felt = run_c(program, rows, 6 * len(rig_spec(True).bins))
+        assert np.isfinite(felt).all() and 0.1 < np.abs(felt[61:70]).max() < 7, damaged
+        assert np.abs(felt[200:]).max() < 1e-5, damaged
+        rows[60], rows[60, 0] = rows[59], damaged
+        assert np.abs(run_c(program, rows, felt.shape[1])).max() < 1e-5, damaged
+        rows[60], rows[60, 4:] = rows[59], damaged  # a rotation, taken for another turn at most
+        rows[60, 0] += 1 / 60
+        assert np.isfinite(felt := run_c(program, rows, felt.shape[1])).all(), damaged
+        assert np.abs(felt[200:]).max() < 1e-5, damaged
