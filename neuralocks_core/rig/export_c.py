@@ -9,7 +9,9 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
+from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import RigModel, rig_spec
+from neuralocks_core.rotation import rotation_part, to_quaternion
 
 _TEXTS = Path(__file__).parent
 _AT_ONCE = 4
@@ -86,6 +88,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "FEATURES": model.inputs,
         "NAMES": ", ".join(f'"{_c_text(n)}"' for n in chains.names),
         "PARENTS": ", ".join(str(int(p)) for p in chains.parents),
+        "BINDS": ", ".join("{" + ", ".join(_float(v) for v in q) + "}" for q in _binds(chains)),
         "CHAINS": _plain(", ".join(chains.chain_name(c) for c in range(len(chains.roots)))),
         "READS": _reads(model),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
@@ -103,6 +106,15 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         **_network(layers),
     }
     return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _binds(chains: HairChains) -> np.ndarray:
+    """Bind axes of the joints as quaternions (N, 4) wxyz.
+
+    Raises:
+        NeuralocksError: some are mirrored or flat, as no training has them.
+    """
+    return to_quaternion(rotation_part(chains.axes, "model: bind axes of its joints"))
 
 
 def _digest(model: RigModel) -> str:

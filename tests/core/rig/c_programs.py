@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 
-FLAGS = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
+FLAGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-pedantic"]
 COMPILERS = [("gcc", "c", "c99"), ("g++", "c++", "c++11"), ("clang", "c", "c99"), ("clang++", "c++", "c++11")]
 
 

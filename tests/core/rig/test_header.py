@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rig import rig_spec
+from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.export_c import export_c
 from neuralocks_core.rig.network import held_features
-from neuralocks_core.rotation import from_quaternion
-from tests.core.rig.builders import model_of, random_features, random_model
+from neuralocks_core.rotation import from_quaternion, from_vector
+from tests.core.rig.builders import character, model_of, random_features, random_model, tail
 from tests.core.rig.c_programs import COMPILERS, compiled, run_c
 
 HARNESS = """#include "hair.h"
@@ -161,3 +161,29 @@ int main(void) {
     assert printed.split("|")[:-1] == names
     header = (tmp_path / "hair.h").read_text(encoding="utf-8")
     assert "as they are named in its rig: head __ int y_ __, neck 首\n" in header
+
+
+BIND_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  int i;
+  for (i = -1; i <= NL_HAIR_JOINTS; ++i) fwrite(nl_hair_joint_bind(i), sizeof(float), 4, stdout);
+  return 0;
+}
+"""
+
+
+def test_turns_in_other_joint_axes(tmp_path):
+    """An engine whose importer gave joints other axes gets from the header's what a bake writes for such a rig."""
+    rows = tail("hair", 4)
+    ours, theirs = (find_chains(character(rows, turn=from_vector(np.array(v)))) for v in ([0.3, -1, 0.6], [2.0, 1, 0]))
+    model = replace(random_model((3,)), chains=ours)
+    export_c(model, tmp_path / "hair.h")
+    binds = run_c(compiled(tmp_path, BIND_HARNESS), [], 4)
+    assert (binds[[0, -1]] == [1, 0, 0, 0]).all()  # of joints that are not there
+    np.testing.assert_allclose(from_quaternion(binds[1:-1]), ours.axes, atol=1e-6)
+    turns = model.evaluate(random_features(model, 20))
+    change = np.swapaxes(theirs.axes, -1, -2) @ from_quaternion(binds[1:-1])  # inverse(J) * B
+    wanted = from_quaternion(ours.turns_on(theirs, turns))
+    np.testing.assert_allclose(change @ from_quaternion(turns) @ np.swapaxes(change, -1, -2), wanted, atol=1e-6)
+    assert np.abs(from_quaternion(turns) - wanted).max() > 0.1
