@@ -70,3 +70,35 @@ def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, opti
         rows[60, 0] += 1 / 60
         assert np.isfinite(felt := run_c(program, rows, felt.shape[1])).all(), damaged
         assert np.abs(felt[200:]).max() < 1e-5, damaged
+
+
+CLOCK_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_history history;
+  static float out[6 * NL_HAIR_BINS];
+  const float head[4] = {1.0f, 0.0f, 0.0f, 0.0f}, down[3] = {0.0f, -1.0f, 0.0f};
+  int frame;
+  nl_hair_history_reset(&history);
+  for (frame = 0; frame < 200; ++frame) {
+    const double time = 36000.0 + (double)frame / 60.0;
+    const float place[3] = {0.0f, 1.6f, 5.0f * (float)frame / 60.0f};
+    nl_hair_history_push(&history, @CLOCK@, place, head);
+    nl_hair_history_read(&history, down, out);
+    if (frame > 100) fwrite(out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+
+
+def test_a_clock_in_double_is_still_exact_after_hours(tmp_path):
+    """Somebody runs at 5 m/s: nothing is felt. A clock in float is too coarse; the example shows none."""
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    felt = []
+    for clock in ("time", "(double)(float)time"):
+        program = compiled(tmp_path, CLOCK_HARNESS.replace("@CLOCK@", clock))
+        felt.append(np.abs(run_c(program, [], 6 * len(rig_spec(True).bins))).max())
+    assert felt[0] < 1e-3 and felt[1] > 0.1
+    example = (tmp_path / "hair_example.c").read_text()
+    assert "double time" in example and "(double)time" not in example
