@@ -143,17 +143,31 @@ class Character:
         return np.linalg.inv(self.skeleton.bind)
 
     @cached_property
-    def facing(self) -> np.ndarray:
-        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
+    def sides(self) -> tuple[int, int] | None:
+        """The left and the right joint by which it is told which way the bind pose faces, if there are such."""
         bind = self.skeleton.bind[:, :3, 3]
         for part in ("upper_arm", "shoulder", "upper_leg", "eye"):
             left, right = self.humanoid.get(f"left_{part}"), self.humanoid.get(f"right_{part}")
             if left is not None and right is not None and left != right:
                 x, _, z = bind[left] - bind[right]
                 if np.hypot(x, z) > 1e-4:
-                    c, s = np.array([x, z]) / np.hypot(x, z)
-                    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-        return np.eye(3)
+                    return left, right
+        return None
+
+    @cached_property
+    def facing(self) -> np.ndarray:
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
+        if self.sides is None:
+            return np.eye(3)
+        left, right = self.skeleton.bind[list(self.sides), :3, 3]
+        x, _, z = left - right
+        c, s = np.array([x, z]) / np.hypot(x, z)
+        return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+    @property
+    def facing_angle(self) -> float:
+        """By how much `facing` turns about +Y [degrees], more than -180 and at most 180."""
+        return float(np.degrees(np.arctan2(self.facing[0, 2], self.facing[0, 0])))
 
     @cached_property
     def canonical_to_bind(self) -> np.ndarray:

@@ -91,6 +91,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "BINDS": ", ".join("{" + ", ".join(_float(v) for v in q) + "}" for q in _binds(chains)),
         "CHAINS": _plain(", ".join(chains.chain_name(c) for c in range(len(chains.roots)))),
         "READS": _reads(model),
+        "FACING": _facing(model),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
         "ROWS": len(layers[0][0]),
         "WIDTH": layers[-1][0].shape[1] // 3,
@@ -209,6 +210,19 @@ def _reads(model: RigModel) -> str:
         return ""
     named = ", ".join(f"{part.replace('_', ' ')} {name}" for part, name in reads.items())
     return f" *   the joints that it reads, as they are named in its rig: {_plain(named)}\n"
+
+
+def _facing(model: RigModel) -> str:
+    """Lines of the header's comment on which way the model's rig faces in its own file, if the model file says so."""
+    angle = model.training.get("facing")
+    if not isinstance(angle, int | float) or not -180 <= angle <= 180:
+        return ""
+    if abs(angle) < 0.05:
+        return " *               (in the file of the rig that the model was trained for, with Y up, it does)\n"
+    return (
+        " *               (in the file of the rig that the model was trained for, with Y up, the bind pose must be turned by\n"
+        f" *               {angle:.1f} degrees about +Y for that)\n"
+    )
 
 
 def _plain(text: str) -> str:

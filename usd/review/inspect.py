@@ -18,6 +18,7 @@ from ..assets.groom import USD
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.units import Border, open_stage
+from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.curves import find_curves, read_groom
@@ -145,7 +146,7 @@ def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
-    spoils += weight_notes(rig)
+    spoils += weight_notes(rig) + facing_notes(rig)
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
     ]

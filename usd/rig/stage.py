@@ -22,6 +22,7 @@ from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import another_head, unfound, unlikely_head
 from ..skel.source import StageRig, find_skeletons, read_rig
 from ..skel.surface import find_skins, rest_primvar
+from .facing import facing_notes
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
@@ -129,7 +130,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
         pose_joints: semantic joints that the network reads beside the head.
     """
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source)]
-    return [*source.notes, *weight_notes(source), *found]
+    return [*source.notes, *weight_notes(source), *facing_notes(source), *found]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

@@ -83,6 +83,7 @@ def train_rig(
     model.training["character"] = character.name
     who = hair.source.character
     read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
+    model.training["facing"] = round(who.facing_angle, 3)
     model.training["reads"] = {name: leaf(path) for name, path in read.items()}
     model.save(out)
     return model

@@ -9,11 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rig import find_chains, rig_spec
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import RigSampler, find_chains, rig_spec
 from neuralocks_core.rig.export_c import export_c
 from neuralocks_core.rig.network import held_features
-from neuralocks_core.rotation import from_quaternion, from_vector
+from neuralocks_core.rotation import from_quaternion, from_vector, to_quaternion
 from tests.core.rig.builders import character, model_of, random_features, random_model, tail
 from tests.core.rig.c_programs import COMPILERS, compiled, run_c
 
@@ -187,3 +189,29 @@ def test_turns_in_other_joint_axes(tmp_path):
     wanted = from_quaternion(ours.turns_on(theirs, turns))
     np.testing.assert_allclose(change @ from_quaternion(turns) @ np.swapaxes(change, -1, -2), wanted, atol=1e-6)
     assert np.abs(from_quaternion(turns) - wanted).max() > 0.1
+
+
+def test_the_header_says_which_way_its_rig_faces(tmp_path):
+    """Axes go by the upper arms: an engine whose character is bound askew feeds what a bake reads once it turns by that angle."""
+    rows = character(tail("hair", 4)).skeleton
+    bind = rows.bind.copy()
+    bind[rows.names.index("hips/chest/left_upper_arm"), 2, 3] += 0.1
+    who = Character(Skeleton(rows.names, rows.parents, bind))
+    trained = replace(random_model((3,)), chains=find_chains(who), training={"facing": round(who.facing_angle, 3)})
+    export_c(trained, tmp_path / "hair.h")
+    angle = float(re.search(r"turned by\s[ *]+(\S+) degrees about \+Y", (tmp_path / "hair.h").read_text())[1])
+    assert 10 < angle < 20
+    rng = np.random.default_rng(0)
+    joints = np.tile(bind, (50, 1, 1, 1))
+    read = [rows.names.index(f"hips/chest{name}") for name in ("/neck/head", "/neck", "")]
+    joints[:, read, :3, :3] = from_vector(rng.normal(0, 0.5, (50, 3, 3)))
+    t = np.zeros(1)
+    sampler = [RigSampler(trained.spec, who, Clip(t, pose[None])).features(t)[0] for pose in joints]
+    axes = from_vector(np.radians([0, angle, 0]))
+    q = to_quaternion(axes @ joints[:, read, :3, :3] @ axes.T)
+    rows = np.concatenate([q.reshape(50, 12), np.tile([0.0, -1.0, 0.0], (50, 1))], axis=1)
+    assert np.abs(run_c(compiled(tmp_path, INPUT_HARNESS), rows, 15) - sampler).max() < 1e-3
+    for facing, words in ((0.0, "it does)"), (None, "")):
+        export_c(replace(trained, training={"facing": facing}), tmp_path / "hair.h")
+        text = (tmp_path / "hair.h").read_text()
+        assert "degrees about +Y" not in text and words in text
