@@ -119,7 +119,10 @@ def bake(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write the hair joints' animation as an override layer of the shot."""
+    """Write the hair joints' animation as an override layer of the shot.
+
+    Of several characters bake one with --skeleton, then the next from that bake: the last layer moves them all.
+    """
     from ..rig.bake import bake_rig
 
     with progress_bar("baking") as progress:

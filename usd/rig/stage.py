@@ -103,7 +103,10 @@ def read_rigged_hair(
         found = [min(found, key=lambda hair: not _is_baked(hair.source))]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
-        raise NeuralocksError(f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM")
+        raise NeuralocksError(
+            f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM; to bake them "
+            "all, bake the next from the bake of the one before"
+        )
     check_orients(found[0].source, found[0].rig.chains)
     return found[0]
 

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several characters with hair on joints in one shot."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from usd.rig.bake import bake_rig
+from usd.rig.stage import BAKED, read_rigged_hair
+
+from ..rig_shots import hair_turns, model_for, small_shot
+
+
+def test_the_next_is_baked_from_the_bake_of_the_one_before(tmp_path):
+    """As the message says that refuses to guess: the last layer moves all of them."""
+    one = small_shot(tmp_path / "one.usda")
+    model = model_for(read_rigged_hair(one))
+    bake_rig(one, tmp_path / "alone.usda", model)
+    layer = Sdf.Layer.FindOrOpen(str(one))
+    both = Sdf.Layer.CreateNew(str(tmp_path / "both.usda"))
+    both.TransferContent(layer)
+    Sdf.CopySpec(layer, "/Who", both, "/Else")
+    both.Save()
+    with pytest.raises(
+        NeuralocksError, match="--skeleton PRIM; to bake them all, bake the next from the bake of the one"
+    ):
+        bake_rig(both.realPath, tmp_path / "out.usda", model)
+    bake_rig(both.realPath, tmp_path / "first.usda", model, skeleton="/Who/Rig")
+    bake_rig(tmp_path / "first.usda", tmp_path / "second.usda", model, skeleton="/Else/Rig")
+    stage, wanted = Usd.Stage.Open(str(tmp_path / "second.usda")), hair_turns(tmp_path / "alone.usda", [1, 7, 20])
+    for who in ("Who", "Else"):
+        source = UsdSkel.BindingAPI(stage.GetPrimAtPath(f"/{who}/Rig")).GetInheritedAnimationSource()
+        assert str(source.GetPath()) == f"/{who}/Rig/{BAKED}"
+        rotations = UsdSkel.Animation(source).GetRotationsAttr()
+        turns = [[(q.GetReal(), *q.GetImaginary()) for q in list(rotations.Get(code))[2:5]] for code in (1, 7, 20)]
+        np.testing.assert_array_equal(turns, wanted)
