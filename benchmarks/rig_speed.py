@@ -193,7 +193,7 @@ def _best(work, runs: int = 15) -> float:
 def _spring(model: RigModel) -> str:
     chains = model.chains
     first = np.array([np.flatnonzero(chains.bone_joint == j)[0] for j in range(len(chains))])
-    way = chains.origins - np.where((chains.parents >= 0)[:, None], chains.origins[chains.parents], 0)
+    way = chains.ways
 
     def rows(values):
         return ", ".join("{" + ", ".join(f"{v:.7f}f" for v in row) + "}" for row in values)

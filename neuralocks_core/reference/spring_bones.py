@@ -46,7 +46,7 @@ def spring_bones(
     clips, frames = heads.shape[:2]
     first = np.array([np.flatnonzero(chains.bone_joint == j)[0] for j in range(len(chains))])
     bones, lengths = chains.bones[first], chains.lengths[first]
-    way = chains.origins - np.where((chains.parents >= 0)[:, None], chains.origins[chains.parents], 0)
+    way = chains.ways
     rest_tail = chains.origins + bones
     tail = np.einsum("cij,nj->cni", heads[:, 0, :3, :3], rest_tail) + heads[:, 0, None, :3, 3]
     previous = tail.copy()

@@ -14,6 +14,9 @@ from neuralocks_core.errors import NeuralocksError
 
 SAME_AXES = 1e-5
 """Axes that differ by less are the same: one rig read in two programs."""
+SIZES = (0.7, 1.4)
+"""So many times as large a character may be as the one that a model was trained for: turns do not depend on size, but how
+fast gravity swings hair does, by its square root."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,11 @@ class HairChains:
         return np.linalg.norm(self.bones, axis=1)
 
     @property
+    def ways(self) -> np.ndarray:
+        """From each joint's carrier, the head's origin for the first ones, to it, (N, 3) [m]."""
+        return self.origins - np.where((self.parents >= 0)[:, None], self.origins[self.parents], 0)
+
+    @property
     def roots(self) -> np.ndarray:
         """First joint of every chain, (chains,)."""
         return np.flatnonzero(self.parents < 0)
@@ -141,12 +149,15 @@ class HairChains:
             )
         return np.array([places[name][0] for name in self.names], int)
 
-    def check_same(self, other: "HairChains") -> None:
-        """Refuse a model that was trained for chains of another shape: bones off by more than 2 % or a
+    def check_same(self, other: "HairChains") -> float:
+        """Refuse a model that was trained for chains of another shape: bones off by more than 2 %, all sizes alike, or a
         hierarchy that differs.
 
+        Returns:
+            how many times as large the other chains are: 1 where they are the same size within 2 %, else within `SIZES`.
+
         Raises:
-            NeuralocksError: names the joint.
+            NeuralocksError: names the joint, or says by how much the size is another.
         """
         order = {name: index for index, name in enumerate(other.names)}
         for index, name in enumerate(self.names):
@@ -160,13 +171,26 @@ class HairChains:
                 raise NeuralocksError(
                     f"model: joint '{name}' hangs from another joint here; train a model for this rig"
                 )
-            way = self.origins[index] - (self.origins[parent] if parent >= 0 else 0)
-            way_there = other.origins[there] - (other.origins[parent_there] if parent_there >= 0 else 0)
-            if np.linalg.norm(way - way_there) > 0.02 * np.linalg.norm(way) + 1e-4:
-                raise NeuralocksError(
-                    f"model: joint '{name}' lies {1e3 * np.linalg.norm(way - way_there):.1f} mm elsewhere than in the rig "
-                    "that the model was trained for; train a model for this rig"
-                )
+        ways, ways_there = self.ways, other.ways[[order[name] for name in self.names]]
+        lengths = np.linalg.norm(ways, axis=1)
+        told = lengths > 1e-3  # a joint may lie in its carrier
+        ratio = float(np.median(np.linalg.norm(ways_there, axis=1)[told] / lengths[told])) if told.any() else 1.0
+        for size in (1.0, ratio):
+            off = np.linalg.norm(size * ways - ways_there, axis=1)
+            wrong = np.flatnonzero(off > size * (0.02 * lengths + 1e-4))
+            if not len(wrong):
+                break
+        if len(wrong):
+            raise NeuralocksError(
+                f"model: joint '{self.names[wrong[0]]}' lies {1e3 * off[wrong[0]]:.1f} mm elsewhere than in the rig "
+                "that the model was trained for; train a model for this rig"
+            )
+        if not SIZES[0] <= size <= SIZES[1]:
+            raise NeuralocksError(
+                f"model: the character is {size:.3g} times as large as the one that the model was trained for; check "
+                "metersPerUnit and the character's scale, or train a model for this rig"
+            )
+        return size
 
     def turns_on(self, other: "HairChains", turns: np.ndarray) -> np.ndarray:
         """Turns of these joints in the bind axes that they have in `other`, a rig that `check_same` let pass: the same

@@ -25,10 +25,10 @@ def model_for(hair, dynamic=False) -> RigModel:
 
 
 def small_shot(
-    path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None
+    path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None, step=0.07
 ) -> Path:
     """A head with one tail of three joints and an end, nodding; in any unit and up axis, with the hair's axes turned by
-    `orient` (3, 3).
+    `orient` (3, 3), its joints `step` [m] below each other.
     """
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)
@@ -41,7 +41,7 @@ def small_shot(
     places = [(0, 1, 0), (0, 1.5, 0)]
     for i in range(4):
         joints.append(f"{joints[-1]}/hair_{i}")
-        places.append((0, 1.55 - 0.07 * i, -0.1 - 0.02 * i))
+        places.append((0, 1.55 - step * i, -0.1 - 0.02 * i))
     turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) if z_up else np.eye(3)
     world = [np.block([[turn, (scale * turn @ np.array(p))[:, None]], [np.zeros(3), 1]]) for p in places]
     for hair in world[2:]:

@@ -94,7 +94,7 @@ def bake_rig(
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     cuts = given_cuts(cuts, loop)
     trained = model.chains
-    hair, model, moved = _read(shot, skeleton, head, model, cuts, joints)
+    hair, model, moved, size = _read(shot, skeleton, head, model, cuts, joints)
     source = hair.source.source
     check_not_input(out, hair.stage)
     wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
@@ -104,6 +104,7 @@ def bake_rig(
     turns = _turns(hair, model, clip, sampler, codes, strength, progress)
     notes = [
         *_renamed(trained, model.chains),
+        *_resized(source.path, size),
         *rigged_notes(hair.source, model.spec.pose_joints),
         *_name_notes(source),
         *_held(hair, turns),
@@ -116,8 +117,10 @@ def bake_rig(
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 
-def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHair, RigModel, np.ndarray]:
-    """The shot, the model with the shot's names of its joints, and where these are in the skeleton (N,)."""
+def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHair, RigModel, np.ndarray, float]:
+    """The shot, the model with the shot's names of its joints, where these are in the skeleton (N,), and how many times as
+    large as the model's rig it is.
+    """
     given = {"skeleton": skeleton, "head": head, "joints": joints, "cuts": cuts}
     # The model knows its joints: no guess is made about which ones are hair.
     try:
@@ -133,9 +136,9 @@ def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHa
         hair = read_rigged_hair(shot, chains=chains.tops, **given)
     character = hair.source.character
     moved = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
-    model.chains.check_same(hair.rig.chains)
+    size = model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
-    return hair, model, moved
+    return hair, model, moved, size
 
 
 def _named_otherwise(shot, chains: HairChains, given: dict) -> HairChains | None:
@@ -174,6 +177,16 @@ def _renamed(trained: HairChains, here: HairChains) -> list[str]:
     if here is trained:
         return []
     return [f"model: its joints have other names here, '{here.names[0]}' for '{trained.names[0]}'"]
+
+
+def _resized(path: str, size: float) -> list[str]:
+    """The note on a character of another size than the model's."""
+    if size == 1:
+        return []
+    return [
+        f"{path}: is {size:.2f} times as large as the character that the model was trained for; its hair swings as fast as that "
+        "one's"
+    ]
 
 
 def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:

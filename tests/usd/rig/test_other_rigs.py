@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model on other rigs than the one that it was trained for: copies of it in other names, axes and sizes, and strangers."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import from_vector
+from usd.rig.bake import bake_rig
+from usd.rig.stage import read_rigged_hair
+
+from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
+
+
+def test_a_model_of_another_rig_is_named_as_such(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    shot.write_text(shot.read_text().replace("hair_", "tuft"))
+    with pytest.raises(NeuralocksError, match=r"1 hair chains \(hair_0, ...\).*a model trained for this rig"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+
+
+def test_a_model_for_another_rig_is_refused(tmp_path):
+    """By name, before anything is written."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(EXAMPLE / "character.usda"))
+    with pytest.raises(NeuralocksError, match="rig train"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+
+
+@pytest.mark.parametrize("prefix", ["Anna_hair_", "tuft_"])
+def test_joints_that_only_begin_otherwise_are_the_models(tmp_path, prefix):
+    """Exporters put namespaces before names; bones elsewhere than the model's are refused all the same."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    plain = bake_rig(shot, tmp_path / "plain.usda", model)
+    text = shot.read_text()
+    shot.write_text(text.replace("hair_", prefix))
+    result = bake_rig(shot, tmp_path / "out.usda", model)
+    codes = range(1, 26)
+    np.testing.assert_array_equal(hair_turns(result.path, codes), hair_turns(plain.path, codes))
+    assert any(f"'{prefix}0' for 'hair_0'" in note for note in result.notes)
+    small_shot(tmp_path / "long.usda", step=0.09)
+    (other := tmp_path / "long_named.usda").write_text((tmp_path / "long.usda").read_text().replace("hair_", prefix))
+    with pytest.raises(NeuralocksError, match="elsewhere than in the rig"):
+        bake_rig(other, tmp_path / "long_out.usda", model)
+
+
+def test_joint_orients_cancel(tmp_path):
+    """A rig that went through another exporter has other axes; a model of the first moves its hair the same in space."""
+    plain = small_shot(tmp_path / "plain.usda")
+    orient = from_vector(np.array([1.2, -0.4, 2.0]))
+    other = small_shot(tmp_path / "other.usda", orient=orient)
+    model = model_for(read_rigged_hair(plain))
+    since = []
+    for shot in (plain, other):
+        bake_rig(shot, tmp_path / f"out_{shot.name}", model)
+        source = read_rigged_hair(tmp_path / f"out_{shot.name}").source.source
+        posed = source.posed([1, 7, 13, 20])[:, 2:5, :3, :3]
+        since.append(posed @ np.swapaxes(source.bind[2:5, :3, :3], -1, -2))
+    assert np.abs(since[0] - since[1]).max() < 1e-5 and np.abs(since[0] - np.eye(3)).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("size", "told"), [(1.015, None), (1.03, "1.03 times as large"), (0.75, "0.75 times as large")]
+)
+def test_a_character_of_another_size_moves_its_hair_alike(tmp_path, size, told):
+    """Turns do not depend on size."""
+    plain = small_shot(tmp_path / "plain.usda")
+    model = model_for(read_rigged_hair(plain), dynamic=True)
+    bake_rig(plain, tmp_path / "plain_out.usda", model)
+    result = bake_rig(_sized(tmp_path, size), tmp_path / "out.usda", model)
+    codes = range(1, 26)
+    assert np.abs(hair_turns(result.path, codes) - hair_turns(tmp_path / "plain_out.usda", codes)).max() < 1e-5
+    notes = [note for note in result.notes if "as large" in note]
+    assert len(notes) == bool(told) and all(told in note for note in notes)
+
+
+@pytest.mark.parametrize(("size", "told"), [(100, "100 times"), (0.01, "0.01 times"), (1.5, "1.5 times")])
+def test_another_unit_is_told_as_such(tmp_path, size, told):
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda")))
+    with pytest.raises(NeuralocksError, match=f"{told} as large as the one .* check metersPerUnit"):
+        bake_rig(_sized(tmp_path, size), tmp_path / "out.usda", model)
+
+
+def _sized(folder, size):
+    """The small shot in a stage whose unit makes it so many times as large."""
+    shot = small_shot(folder / "sized.usda", scale=100.0)
+    stage = Usd.Stage.Open(str(shot))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01 * size)
+    stage.GetRootLayer().Save()
+    return shot
