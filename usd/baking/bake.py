@@ -108,7 +108,7 @@ def bake(
     facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
     resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
-    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes()]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
     if cuts is None and strand_model.spec.bins:
         notes += [text for rig in shot.rigs for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)

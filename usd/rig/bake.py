@@ -110,7 +110,7 @@ def bake_rig(
         *_held(hair, turns),
     ]
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
-    notes += hair.source.loop_notes(moved) if loop else []
+    notes += hair.source.loop_notes(wanted, moved) if loop else []
     if cuts is None and model.dynamic:
         notes += hair.source.cut_notes()
     notes += written_notes(hair.stage, [hair.source], out, wanted)

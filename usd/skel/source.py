@@ -60,21 +60,32 @@ class StageRig:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
 
-    def loop_notes(self, replaced=()) -> list[str]:
-        """What is wrong with the motion as a loop: its last sample must show the pose of its first; joints that a bake
-        replaces are left out.
+    def loop_notes(self, codes=(), replaced=()) -> list[str]:
+        """What is wrong with the motion as a loop, whose last sample must show the pose of its first, and with time codes at
+        which it is to be baked.
+
+        Args:
+            codes: ascending time codes that were asked for.
+            replaced: joints that a bake replaces; how these move does not matter.
         """
         ends = self.clip.joints[[0, -1], :, :3, :3]
         first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
         turn = np.degrees(angle_between(first, last))
         turn[list(replaced)] = 0
-        if turn.max() <= LOOP_GAP:
-            return []
-        name, (start, end) = self.source.names[int(turn.argmax())], self.time_codes[[0, -1]]
-        return [
-            f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
-            "a loop ends with the pose that it begins with"
-        ]
+        start, end = self.time_codes[[0, -1]]
+        notes = []
+        if turn.max() > LOOP_GAP:
+            name = self.source.names[int(turn.argmax())]
+            notes.append(
+                f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
+                "a loop ends with the pose that it begins with"
+            )
+        if len(codes) and (codes[0] < start or codes[-1] > end):
+            notes.append(
+                f"{self.path}: its animation goes from {start:g} to {end:g}; outside of that its hair moves on as the loop "
+                "does while the body stands, so bake one round and repeat it"
+            )
+        return notes
 
     def cut_notes(self) -> list[str]:
         """Where the hair starts anew, if it does anywhere."""

@@ -103,9 +103,12 @@ def test_a_loop_is_seamless(tmp_path):
     """With --loop the last sample of a dynamic bake is the first one."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot), dynamic=True)
-    bake_rig(shot, tmp_path / "out.usda", model, loop=True)
+    result = bake_rig(shot, tmp_path / "out.usda", model, loop=True)
+    assert not any("loop" in note for note in result.notes)
     first, last = hair_turns(tmp_path / "out.usda", [1, 25])
     assert np.abs(first - last).max() < 2e-4
+    longer = bake_rig(shot, tmp_path / "longer.usda", model, loop=True, frames="1:60").notes
+    assert sum("goes from 1 to 25; outside of that its hair moves on as the loop does" in note for note in longer) == 1
     bake_rig(shot, tmp_path / "open.usda", model)
     first, last = hair_turns(tmp_path / "open.usda", [1, 25])
     assert np.abs(first - last).max() > 1e-3
