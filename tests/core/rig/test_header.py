@@ -175,20 +175,53 @@ int main(void) {
 """
 
 
-def test_turns_in_other_joint_axes(tmp_path):
-    """An engine whose importer gave joints other axes gets from the header's what a bake writes for such a rig."""
+UNITY, UNREAL = np.diag([-1.0, 1, 1]), np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
+"""From an engine's axes to the header's."""
+
+
+def into(axes, quaternions):
+    """What the header's text makes of rotations: (w, det(E) E v)."""
+    return np.concatenate([quaternions[..., :1], np.linalg.det(axes) * quaternions[..., 1:] @ axes.T], axis=-1)
+
+
+@pytest.mark.parametrize("engine", [np.eye(3), from_vector(np.array([0.3, 2, 1])), UNITY, UNREAL], ids=str)
+def test_turns_in_other_joint_axes(tmp_path, engine):
+    """An engine of any axes, whose importer gave joints others, gets what a bake writes for such a rig."""
     rows = tail("hair", 4)
     ours, theirs = (find_chains(character(rows, turn=from_vector(np.array(v)))) for v in ([0.3, -1, 0.6], [2.0, 1, 0]))
     model = replace(random_model((3,)), chains=ours)
     export_c(model, tmp_path / "hair.h")
     binds = run_c(compiled(tmp_path, BIND_HARNESS), [], 4)
     assert (binds[[0, -1]] == [1, 0, 0, 0]).all()  # of joints that are not there
-    np.testing.assert_allclose(from_quaternion(binds[1:-1]), ours.axes, atol=1e-6)
     turns = model.evaluate(random_features(model, 20))
-    change = np.swapaxes(theirs.axes, -1, -2) @ from_quaternion(binds[1:-1])  # inverse(J) * B
     wanted = from_quaternion(ours.turns_on(theirs, turns))
-    np.testing.assert_allclose(change @ from_quaternion(turns) @ np.swapaxes(change, -1, -2), wanted, atol=1e-6)
     assert np.abs(from_quaternion(turns) - wanted).max() > 0.1
+    # A left-handed engine mirrors each joint's own axes, too: x here.
+    mirror = UNITY if np.linalg.det(engine) < 0 else np.eye(3)
+    for joint, bind in enumerate(from_quaternion(binds[1:-1])):
+        own = engine.T @ theirs.axes[joint] @ mirror
+        change = own.T @ engine.T @ bind
+        there = from_quaternion(into(change, turns[:, joint]))
+        np.testing.assert_allclose(there, mirror @ wanted[:, joint] @ mirror, atol=1e-6)
+    text = (tmp_path / "hair.h").read_text()
+    assert "turns become (w, x, -y, -z) and (w, -x, y, -z)" in text
+    for engine, mirror, signs in ((UNITY, UNITY, [1, 1, -1, -1]), (UNREAL, np.diag([1, -1, 1]), [1, -1, 1, -1])):
+        own = engine.T @ ours.axes[0] @ mirror  # as it was but for the mirror
+        np.testing.assert_allclose(into(own.T @ engine.T @ ours.axes[0], turns[:, 0]), signs * turns[:, 0], atol=1e-6)
+
+
+def test_rotations_of_other_axes(tmp_path):
+    """The formula and the lines for two engines are what turning and mirroring everything is."""
+    export_c(random_model(), tmp_path / "hair.h")
+    text = (tmp_path / "hair.h").read_text()
+    q = np.random.default_rng(0).normal(size=(20, 4))
+    for name, axes in (("Unity", UNITY), ("Unreal", UNREAL)):
+        np.testing.assert_allclose(from_quaternion(into(axes, q)), axes @ from_quaternion(q) @ axes.T, atol=1e-9)
+        place, turn = re.search(rf"{name}, .*position \(([^)]*)\).*\(w, ([^)]*)\)", text).groups()
+        for words, matrix in ((place, axes), (turn, np.linalg.det(axes) * axes)):
+            values = dict(zip("xyz", q[0, 1:]))
+            said = [values[word[-1]] * (-1 if word[0] == "-" else 1) for word in words.split(", ")]
+            np.testing.assert_allclose(said, matrix @ q[0, 1:], atol=1e-12)
 
 
 def test_the_header_says_which_way_its_rig_faces(tmp_path):
