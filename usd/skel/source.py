@@ -75,7 +75,8 @@ class StageRig:
         start, end = self.time_codes[[0, -1]]
         notes = []
         if turn.max() > LOOP_GAP:
-            name = self.source.names[int(turn.argmax())]
+            # What hangs from a joint turns with it, up to rounding: the first of them is the one that does.
+            name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
             notes.append(
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
                 "a loop ends with the pose that it begins with"

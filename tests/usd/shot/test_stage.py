@@ -13,6 +13,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import resample
 from usd.border.units import Border
@@ -181,6 +182,11 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     assert not closed.loop_notes()
     (note,) = rig.loop_notes()
     assert "/Hero/Rig" in note and "time codes 1 and 9" in note
+    turned = rig.clip.joints[[0, 0]]
+    turned[1] = np.block([[from_vector(np.array([0, 1.0, 0])), np.zeros((3, 1))], [np.zeros(3), 1]]) @ turned[0]
+    turned[1, -1, :3, :3] = from_vector(np.array([0, 1e-4, 0])) @ turned[1, -1, :3, :3]
+    (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
+    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
 
 
 @given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
