@@ -17,6 +17,8 @@ from .damage import first_line, named
 from .stopping import check
 
 LAYERS = (".usd", ".usda", ".usdc")
+OTHERS = (".fbx", ".vrm", ".glb", ".gltf")
+"""Characters in other formats, which USD reads with plug-ins alone."""
 SLOWEST, FASTEST = 12.0, 600.0
 """Time codes per second between which one time code is a frame, of a slow-motion camera too; other stages count
 seconds, or milliseconds."""
@@ -120,10 +122,17 @@ def open_stage(path) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        raise NeuralocksError(f"{path}: not a readable USD file ({first_line(error)}); export it again") from None
+        raise NeuralocksError(f"{path}: not a readable USD file ({first_line(error)}); {_remedy(path)}") from None
     if stage is None:
-        raise NeuralocksError(f"{path}: not a readable USD file; export it again")
+        raise NeuralocksError(f"{path}: not a readable USD file; {_remedy(path)}")
     return stage
+
+
+def _remedy(path: Path) -> str:
+    if path.suffix.lower() not in OTHERS:
+        return "export it again"
+    by = " (examples/vrm_to_usd.py does)" if path.suffix.lower() != ".fbx" else ""
+    return f"import it into Blender and export USD there{by}"
 
 
 def used_files(stage: Usd.Stage) -> list[str]:

@@ -17,7 +17,7 @@ from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 from ..assets.groom import USD
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.units import Border, open_stage
+from ..border.units import OTHERS, Border, open_stage
 from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from ..shot.attach import rig_joint
@@ -59,7 +59,7 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     """
     path = as_path(path, "path")
     kind = path.suffix.lower()
-    if kind in USD:
+    if kind in (*USD, *OTHERS):
         return {"file": str(path), "kind": "stage", **_stage(path, head, joints)}
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; name the file in it")

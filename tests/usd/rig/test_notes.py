@@ -128,3 +128,16 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
     assert np.isfinite(model.evaluate(np.full(15, 1e300))).all()
     with pytest.raises(NeuralocksError, match="times: hold NaN"):
         RigSampler(model.spec, hair.source.character, hair.source.clip).features([0.0, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("ending", "how"), [("fbx", "USD there$"), ("vrm", r"vrm_to_usd.py does\)$"), ("glb", "vrm_to_usd")]
+)
+def test_a_character_in_another_format_is_told_the_way_to_usd(tmp_path, ending, how):
+    path = tmp_path / f"who.{ending}"
+    path.write_bytes(b"anything")
+    for use in (read_rigged_hair, inspect):
+        with pytest.raises(
+            NeuralocksError, match=f"who.{ending}: not a readable USD file .*import it into Blender .*{how}"
+        ):
+            use(path)
