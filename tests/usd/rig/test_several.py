@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several characters with hair on joints in one shot."""
+"""Several characters with hair on joints, in one shot or as rows of one batch."""
+
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.rig.bake import bake_rig
 from usd.rig.stage import BAKED, read_rigged_hair
 
-from ..rig_shots import hair_turns, model_for, small_shot
+from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 
 def test_the_next_is_baked_from_the_bake_of_the_one_before(tmp_path):
@@ -35,3 +37,12 @@ def test_the_next_is_baked_from_the_bake_of_the_one_before(tmp_path):
         rotations = UsdSkel.Animation(source).GetRotationsAttr()
         turns = [[(q.GetReal(), *q.GetImaginary()) for q in list(rotations.Get(code))[2:5]] for code in (1, 7, 20)]
         np.testing.assert_array_equal(turns, wanted)
+
+
+def test_the_documents_show_how_python_turns_one_or_many():
+    text = (EXAMPLE.parents[1] / "docs/architecture.md").read_text("utf-8")
+    (example,) = re.findall(r"```python\n(from neuralocks_core\.rig.*?)```", text, re.S)
+    names = {}
+    exec(example.replace('"examples/mesh_hair', f'"{EXAMPLE.as_posix()}'), names)
+    assert names["turns"].shape == (3, *names["one"].shape) and names["one"].shape == (32, 4)
+    np.testing.assert_allclose(names["turns"][0], names["one"], atol=1e-6)
