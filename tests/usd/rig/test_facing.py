@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel, Vt
 
+from neuralocks_core.rig import RigModel
 from usd.review.inspect import inspect
 from usd.rig.stage import read_rigged_hair, rigged_notes
+from usd.rig.train import train_rig
 
-from ..rig_shots import EXAMPLE
+from ..rig_shots import EXAMPLE, model_for
 
 
 @pytest.fixture
@@ -62,3 +64,15 @@ def test_a_bind_pose_that_faces_otherwise_is_told(edited, change, words):
     shot = edited(change)
     for notes in (rigged_notes(read_rigged_hair(shot).source), inspect(shot)["spoils"]):
         assert sum(bool(re.search(words or "faces", note)) for note in notes) == (words is not None), notes
+
+
+def test_a_trained_model_knows_which_way_its_rig_faces(edited, tmp_path, monkeypatch):
+    """The header says it; whoever trains is told before."""
+    pytest.importorskip("torch")
+    shot, told = edited(_askew), []
+    hair = read_rigged_hair(shot)
+    monkeypatch.setattr("neuralocks_core.training.rig.train.train_static", lambda *_, **__: model_for(hair))
+    train_rig(shot, tmp_path / "m.neuralocks", dynamic=False, tell=told.extend)
+    kept = RigModel.load(tmp_path / "m.neuralocks").training["facing"]
+    assert kept == pytest.approx(hair.source.character.facing_angle, abs=1e-3) and abs(kept) > 2
+    assert any("off the stage's nearest axis" in note for note in told)
