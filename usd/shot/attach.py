@@ -19,7 +19,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
-from .curves import moment, rest_points
+from .curves import ends, moment, rest_points
 from .seat import NEAR, Seat, find_seat, kinship, some_ends, ways
 from .seat_notes import lies_off_skin, moved_away, upside_down
 
@@ -185,8 +185,13 @@ def _trunk(rig: StageRig) -> float:
 
 
 def _by_own_binding(prim: Usd.Prim, rig: StageRig) -> tuple[int, str, np.ndarray]:
-    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in it."""
-    shares = _shares(rig, *joint_influences(prim, len(rest_points(prim)), rig.source))
+    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in its roots.
+
+    What hangs farther down is weighted as a rigger would have it move without simulation, by the chest or an arm.
+    """
+    indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
+    roots = ends(prim)
+    shares = _shares(rig, indices[roots], weights[roots])
     return *_carrier(rig, shares, exact=True), shares
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Usd
 from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
@@ -18,8 +18,8 @@ from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
-from ..skel.surface import StageMesh, rest_value
-from .curves import moment, rest_points
+from ..skel.surface import StageMesh
+from .curves import ends, moment, rest_points
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
@@ -122,11 +122,8 @@ def some_ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
     Raises:
         NeuralocksError: none is finite.
     """
-    points = rest_points(prim)
-    counts = np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
-    ends = np.cumsum(counts) - (1 if last else counts)
-    ends = ends[(counts > 0) & (ends >= 0) & (ends < len(points))]
-    found = points[ends[:: max(1, len(ends) // SOME_ROOTS)]] if len(ends) else points[:1]
+    every = ends(prim, last=last)
+    found = rest_points(prim)[every[:: max(1, len(every) // SOME_ROOTS)]]
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):
         raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")

@@ -12,7 +12,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
-from ..shots import Recipe, strand_points, write_shot
+from ..shots import HEAD, Recipe, strand_points, write_shot
 
 
 @pytest.mark.parametrize(
@@ -198,6 +198,20 @@ def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
     notes = read_shot(stage.GetRootLayer().realPath).notes
     assert sum("will leave the skin" in note for note in notes) == 1
     assert any(note.startswith("/Hero/Fur: only 50%") and "(head)" in note for note in notes)
+
+
+def test_hair_bound_by_vertex_is_carried_by_what_carries_its_roots(tmp_path):
+    """However much of it is painted to move with the chest."""
+    path = write_shot(tmp_path)
+    plain = read_shot(path)
+    stage = Usd.Stage.Open(str(path))
+    binding = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair"))
+    strand = np.array([HEAD] + [1] * 11)
+    binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(np.tile(strand, 40).astype(np.int32)))
+    binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray([1.0] * 480))
+    stage.Save()
+    shot = read_shot(path)
+    assert shot.grooms[0].joint == plain.grooms[0].joint and shot.notes == plain.notes
 
 
 def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
