@@ -157,25 +157,36 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
 
     when = moment(prim)
-    far = [(min(away(rig, way) for way in ways(rig, None, placement, when)), rig) for rig in able]
+    places = {rig.path: ways(rig, None, placement, when) for rig in able}
+    if when is None and all(away(rig, way) > _reach(rig) for rig in able for way in places[rig.path]):
+        # Where no skin can tell, only what is on the head of a moment is hair: much else stands beside it.
+        for rig in (rig for rig in able if not rig.meshes):
+            posed = ways(rig, None, placement, likely=False)
+            places[rig.path] += [way for way in posed if away(rig, way) < _trunk(rig) / 2]
+    far = [(min(away(rig, way) for way in places[rig.path]), rig) for rig in able]
     # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
     least = min(distance for distance, _ in far)
     close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
     kin = max(kinship(prim, rig) for _, rig in close)
     close = [(distance, rig) for distance, rig in close if kinship(prim, rig) == kin]
     nearest, rig = close[0]
-    out_of_reach = nearest > max(REACH, _trunk(rig))
+    out_of_reach = nearest > _reach(rig)
     if len(close) > 1 and not out_of_reach:
         names = ", ".join(r.path for r in able[:5])
         raise NeuralocksError(
             f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
         )
-    to_bind = min(ways(rig, None, placement, when), key=lambda way: round(away(rig, way), 3))
+    to_bind = min(places[rig.path], key=lambda way: round(away(rig, way), 3))
     at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
     far = nearest if out_of_reach else 0.0
     return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
+
+
+def _reach(rig: StageRig) -> float:
+    """How far from the carrying joint what nothing else says to be hair may lie [m]."""
+    return max(REACH, _trunk(rig))
 
 
 def _trunk(rig: StageRig) -> float:

@@ -60,5 +60,6 @@ class HairSearch:
         if found.far and not self._named:
             self.far.append(too_far(prim, found))
             return None
+        self._notes += [too_far(prim, found, named=True)] if found.far else []
         self._notes += left_as_they_are(prim)
         return found

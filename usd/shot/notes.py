@@ -108,13 +108,15 @@ def another_carries(path: str, rig: StageRig) -> str:
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
-def too_far(prim: Usd.Prim, found: Attachment) -> str:
-    """The note on curves that are not taken for hair because they start too far from any head."""
-    return (
+def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
+    """The note on curves that start too far from any head to be taken for hair, unless their user named them."""
+    where = (
         f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(rig_joint(found))}' of {found.rig.path} "
-        f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}, so it is not taken for hair; "
-        "if it is, name it with --groom"
+        f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}"
     )
+    if named:
+        return f"{where}, and keeps that distance; put it where the head is in the bind pose or the shot's first frame"
+    return f"{where}, so it is not taken for hair; if it is, name it with --groom"
 
 
 def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:

@@ -6,6 +6,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 from scipy.spatial import cKDTree
 
+from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.border.placement import Placement
 from usd.review.baked import read_baked
@@ -103,6 +104,33 @@ def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_pa
     stage.Save()
     (said,) = (note for note in read_shot(path).notes if "from the skin" in note)
     assert 0.1 < float(said.split(" m from")[0].split()[-1]) < 0.3
+
+
+@pytest.mark.parametrize("bound", ["mesh", "none"])
+def test_hair_made_at_the_shots_first_frame_after_a_run_up(tmp_path, bound):
+    """And if it was made for a frame between, that is said, though its user named it."""
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    stage = Usd.Stage.Open(str(path))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetTranslationsAttr()
+    for code in range(1, 10):
+        motion.Set(Vt.Vec3fArray([v + Gf.Vec3f(0, 0, code * (i == 0)) for i, v in enumerate(motion.Get(code))]), code)
+    stage.SetStartTimeCode(START)
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.asarray(points.Get())
+    stage.Save()
+    (rig,) = read_rigs(path)
+    bind = np.linalg.inv(rig.character.skeleton.bind[HEAD])
+    points.Set(_rigid(rest, rig.joints_at(START)[HEAD] @ bind))
+    stage.Save()
+    shot = read_shot(path)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, rest, atol=1e-6)
+    assert not any("/Hero/Hair: " in note for note in shot.notes)
+    points.Set(_rigid(rest, rig.joints_at(START + 2)[HEAD] @ bind))
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="not taken for hair; if it is, name it with --groom"):
+        read_shot(path)
+    (said,) = (note for note in read_shot(path, ["/Hero/Hair"]).notes if "/Hero/Hair: " in note)
+    assert "m from joint 'head'" in said and "keeps that distance" in said
 
 
 @pytest.mark.parametrize("lifted", [0.0, 0.4], ids=["some_roots_far", "most_roots_far"])
