@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way is up in a bind pose: how much of the parents' turn is axes, and how much is pose."""
+"""Which way is up in a bind pose: how much of the parents' turn is axes, how much is pose, and whether a character lies."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,6 +17,8 @@ ASKEW = 10.0
 were built askew."""
 NEAR = 30.0
 """Where nothing tells what is up, the nearest quarter turn is meant if it is this near [degrees]."""
+LIES = 60.0
+"""Legs and trunk that are farther off the vertical [degrees] are those of a character that lies."""
 FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
 
 
@@ -43,7 +45,7 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     found = [axis for axis in (legs, trunk) if axis is not None]
 
     def tilt(turn: np.ndarray, axis: np.ndarray) -> float:
-        return np.degrees(np.arccos(np.clip(up @ turn @ axis, -1, 1)))
+        return _tilt(turn @ axis, up)
 
     quarters = sorted(Rotation.create_group("O").as_matrix().round(), key=lambda turn: -round(np.sum(turn * here), 9))
     turn = quarters[0]
@@ -56,6 +58,24 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     elif np.degrees(angle_between(turn, here)) > NEAR:
         return placed
     return placed if np.abs(turn - here).max() < SAME else turn @ here.T @ placed
+
+
+def lies(joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> tuple[bool, bool]:
+    """Whether a character lies in its bind pose, and whether that is sure: without known legs it may be on all fours.
+
+    Args:
+        joints: places (J, 3) in the bind pose.
+        humanoid: which of these are head, hips and feet.
+        up: the direction (3,) that is up there.
+    """
+    legs, trunk = _axes(joints, humanoid)
+    tilts = [_tilt(axis, up) for axis in (legs, trunk) if axis is not None]
+    return bool(tilts) and min(tilts) > LIES, legs is not None and trunk is not None
+
+
+def _tilt(axis: np.ndarray, up: np.ndarray) -> float:
+    """Angle [degrees] between two directions (3,)."""
+    return float(np.degrees(np.arccos(np.clip(up @ axis, -1, 1))))
 
 
 def _axes(joints: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray | None, np.ndarray | None]:

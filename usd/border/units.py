@@ -57,10 +57,10 @@ class Border:
         """Transform (4, 4) from metres, Y up, to stage world space."""
         return np.linalg.inv(self.to_core)
 
-    def foreign(self, attribute: Usd.Attribute) -> str:
+    def foreign(self, attribute: Usd.Attribute, *, axis_only: bool = False) -> str:
         """A remark where an attribute's layer counts in another unit or axis: references convert neither. '' if not."""
         for spec in attribute.GetPropertyStack(Usd.TimeCode.EarliestTime()):
-            if differs := self.differing(spec.layer):
+            if differs := self._other_axis(spec.layer) if axis_only else self.differing(spec.layer):
                 name = spec.layer.GetDisplayName()
                 return f" (its layer {name} {differs}: USD converts neither, the prim needs a transform)"
         return ""
@@ -71,9 +71,13 @@ class Border:
         unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else self.metres_per_unit
         if abs(unit / self.metres_per_unit - 1) > 1e-3:
             said.append(f"counts in {unit:g} m, the stage in {self.metres_per_unit:g} m")
-        if root.HasInfo("upAxis") and root.GetInfo("upAxis") != self.up_axis:
-            said.append(f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}")
-        return " and ".join(said)
+        return " and ".join([*said, *filter(None, [self._other_axis(layer)])])
+
+    def _other_axis(self, layer: Sdf.Layer) -> str:
+        root = layer.pseudoRoot
+        if not root.HasInfo("upAxis") or root.GetInfo("upAxis") == self.up_axis:
+            return ""
+        return f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}"
 
     def seconds(self, time_codes) -> np.ndarray:
         """Times [s] of time codes."""

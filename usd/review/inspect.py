@@ -21,6 +21,7 @@ from ..border.units import OTHERS, Border, open_stage
 from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from ..shot.attach import rig_joint
+from ..shot.character_notes import lies_down
 from ..shot.curves import find_curves, read_groom
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
@@ -83,8 +84,6 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     border = Border.of(stage)
     spoils = composition_notes(stage, path) + layer_notes(stage, path)
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
-    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
-        spoils.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
     rigs, errors = read_each_rig(stage, find_skeletons(stage), border, head, all_shapes=True, joints=joints)
     if rigs:
         spoils += [left_out(error) for error in errors]
@@ -98,7 +97,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig)
-        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + partial_body(rig, rigs)
+        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig) + partial_body(rig, rigs)
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:

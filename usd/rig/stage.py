@@ -18,6 +18,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
 from ..border.units import Border, open_stage
+from ..shot.character_notes import lies_down
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import another_head, unfound, unlikely_head
 from ..skel.source import StageRig, find_skeletons, read_rig
@@ -132,7 +133,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
         source: the character.
         pose_joints: semantic joints that the network reads beside the head.
     """
-    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source)]
+    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
     return [*source.notes, *weight_notes(source), *facing_notes(source), *found]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import POSE_JOINTS, joints_read
@@ -21,6 +21,7 @@ from .attach import Attachment, rig_joint
 
 SAME = 0.01
 """Joints of two skeletons at most so far apart [m] are one."""
+UNIT = UsdGeom.Tokens.metersPerUnit
 FEW = 3
 """Similar lines told one by one."""
 
@@ -31,14 +32,20 @@ def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
 
 
 def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them."""
-    border = Border.of(stage)
+    """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them; and where
+    no layer says the unit that counts.
+    """
+    border, notes = Border.of(stage), []
     for layer in stage.GetLayerStack(includeSessionLayers=False)[1:]:
         if differs := border.differing(layer):
-            return [
+            notes.append(
                 f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
-            ]
-    return []
+            )
+            break
+    units = [root.GetInfo(UNIT) for root in (layer.pseudoRoot for layer in stage.GetUsedLayers()) if root.HasInfo(UNIT)]
+    if border.metres_per_unit not in units:
+        notes.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
+    return notes
 
 
 def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: list[float]) -> list[str]:
