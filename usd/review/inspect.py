@@ -21,7 +21,7 @@ from ..border.units import OTHERS, Border, open_stage
 from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
 from ..shot.attach import rig_joint
-from ..shot.character_notes import lies_down
+from ..shot.character_notes import lies_down, without_body
 from ..shot.curves import find_curves, read_groom
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
@@ -105,7 +105,9 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
     elif rigs:
         stops.append(not_animated(rigs[0]))
-    grooms = _grooms(curves, rigs, border, head, spoils, stops)
+    search = HairSearch(rigs, head, spoils)
+    grooms = _grooms(search, curves, border, spoils, stops)
+    spoils += without_body(search.carriers, rigs)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:
@@ -157,12 +159,12 @@ def _height(rig: StageRig) -> float | None:
     return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
 
 
-def _grooms(curves, rigs, border: Border, head: str | None, spoils: list[str], stops: list[str]) -> list[dict]:
+def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops: list[str]) -> list[dict]:
     """Facts about the curves that are hair; what stops one of them does not keep the others from being told."""
-    search, grooms = HairSearch(rigs, head, spoils), []
+    grooms = []
     for prim in search.filled(curves):
         try:
-            groom = _groom(prim, search if rigs else None, border, spoils, stops)
+            groom = _groom(prim, search if search.rigs else None, border, spoils, stops)
             grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))

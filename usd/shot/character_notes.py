@@ -1,12 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a character as it was bound: whether it stands."""
+"""Notes on a character as it was bound: whether it stands, and whether it has a body."""
+
+from collections.abc import Sequence
 
 import numpy as np
-from pxr import UsdGeom
+from pxr import Gf, Usd, UsdGeom
 
 from neuralocks_core.anatomy.standing import lies
+from neuralocks_core.rotation import transformed
 
+from ..border.arrays import column_matrix
 from ..skel.source import StageRig
+from ..skel.surface import bound_skeleton, drawn
+from .notes import partial_body
+from .seat import beginnings
+
+AROUND = 0.25
+"""A mesh with some points this near to a head's joint [m] is the head's, or on it."""
+SOME = 20
 
 
 def lies_down(rig: StageRig) -> list[str]:
@@ -20,3 +31,65 @@ def lies_down(rig: StageRig) -> list[str]:
     up = rig.border.up_axis
     guess = f"the stage has no upAxis, so {up} is up: author it" if unsaid else f"if it stands, check upAxis ({up})"
     return [f"{rig.path}: lies down in its bind pose, so its hair is taken to hang sideways{foreign or f'; {guess}'}"]
+
+
+def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[str]:
+    """The notes on characters that move no mesh of which hair could be kept out, and on the meshes that may be meant.
+
+    Args:
+        rigs: skeletons that carry hair.
+        others: all of the stage; what is told of a character in several skeletons is not told here.
+    """
+    bare = [rig for rig in rigs if rig.character.body is None and not partial_body(rig, others)]
+    if not bare:
+        return []
+    hidden, loose = _unused_meshes(bare[0].source.prim.GetStage())
+    return [
+        f"{rig.path}: moves no visible mesh, so hair is kept out of no body; "
+        f"{_meant(hidden.get(rig.path, []), loose, rig) or 'bind its mesh to it'}"
+        for rig in bare
+    ]
+
+
+def _unused_meshes(stage: Usd.Stage) -> tuple[dict[str, list[Usd.Prim]], list[Usd.Prim]]:
+    """Meshes that a skeleton moves unseen, by its path, and those that are seen and that none moves."""
+    hidden, loose = {}, []
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdGeom.Mesh):
+            seen, skeleton = drawn(prim), bound_skeleton(prim)
+            if seen and skeleton is None:
+                loose.append(prim)
+            elif not seen and skeleton is not None:
+                hidden.setdefault(skeleton, []).append(prim)
+    return hidden, loose
+
+
+def _meant(hidden: list[Usd.Prim], loose: list[Usd.Prim], rig: StageRig) -> str:
+    """Which meshes may be its body, and what to do; '' where none is found."""
+    if hidden:
+        return f"{_named(hidden)}, bound to it, {_is(hidden)} not drawn: show the body"
+    when = beginnings(rig)[-1]
+    head = transformed(rig.joints_at(when)[rig.character.head, :3, 3], rig.border.from_core)
+    near = AROUND / rig.border.metres_per_unit
+    around = []
+    boxes = UsdGeom.BBoxCache(when, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
+    places = UsdGeom.XformCache(when)
+    for prim in loose:
+        box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
+        if not box.IsEmpty() and box.GetDistanceSquared(Gf.Vec3d(*head)) < near**2:
+            points = np.asarray(UsdGeom.Mesh(prim).GetPointsAttr().Get(when) or [], float).reshape(-1, 3)
+            with np.errstate(invalid="ignore", over="ignore"):  # a mesh that nothing else reads may be broken
+                world = transformed(points, column_matrix(places.GetLocalToWorldTransform(prim)))
+                if np.sum(np.linalg.norm(world - head, axis=1) < near) >= SOME:
+                    around.append(prim)
+    if not around:
+        return ""
+    return f"{_named(around)}, around its head, {_is(around)} not bound to it: export the body with its weights"
+
+
+def _named(prims: list[Usd.Prim]) -> str:
+    return ", ".join(str(prim.GetPath()) for prim in prims[:3])
+
+
+def _is(prims: list[Usd.Prim]) -> str:
+    return "is" if len(prims) == 1 else "are"

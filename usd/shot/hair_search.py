@@ -25,6 +25,8 @@ class HairSearch:
     Attributes:
         far: why curves were too far from every head to be hair, one line each. A note where other hair was found, the
             error where none was.
+        rigs: as given.
+        carriers: skeletons that carry what was found.
     """
 
     def __init__(
@@ -36,9 +38,10 @@ class HairSearch:
         named: bool = False,
         others: Sequence[StageRig] = (),
     ):
-        self._rigs, self._head, self._notes = rigs, head, notes
+        self.rigs, self._head, self._notes = rigs, head, notes
         self._named, self._others = named, list(others)
         self.far: list[str] = []
+        self.carriers: list[StageRig] = []
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others."""
@@ -53,13 +56,15 @@ class HairSearch:
             NeuralocksError: as `attach`.
         """
         path = str(prim.GetPath())
-        if self._others and (other := of_another(prim, self._rigs, self._others, placement, self._head)):
+        if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
             self._notes.append(another_carries(path, other))
             return None
-        found = attach(prim, self._rigs, placement, self._head, self._notes)
+        found = attach(prim, self.rigs, placement, self._head, self._notes)
         if found.far and not self._named:
             self.far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
         self._notes += left_as_they_are(prim)
+        if found.rig not in self.carriers:
+            self.carriers.append(found.rig)
         return found

@@ -103,12 +103,19 @@ def ways(
         return [_posed(rig, placement, when)] if likely else still
     if not placement.samples or _steady(placement, rig.source.placement.at):
         # Or it was made where the character stands when its motion begins, or the shot.
-        return still if likely else [_posed(rig, placement, code) for code in _beginnings(rig)]
+        return still if likely else [_posed(rig, placement, code) for code in beginnings(rig)]
     # A prim that is moved along by its parents: where it stood against the head when that motion began.
     posed = [_posed(rig, placement, placement.samples[0])]
     if _steady(placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core):
         return posed if likely else still
     return posed + still if likely else []
+
+
+def beginnings(rig: StageRig) -> list[float]:
+    """Time codes at which the motion begins, and the shot, where that is after a run-up."""
+    (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.source.prim.GetStage()
+    start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else first
+    return [first, start] if first < start <= last else [first]
 
 
 def kinship(prim: Usd.Prim, rig: StageRig) -> int:
@@ -128,13 +135,6 @@ def some_ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
     if not len(found):
         raise NeuralocksError(f"{prim.GetPath()}: its points are not finite; repair the groom")
     return found
-
-
-def _beginnings(rig: StageRig) -> list[float]:
-    """Time codes at which the motion begins, and the shot, where that is after a run-up."""
-    (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.source.prim.GetStage()
-    start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else first
-    return [first, start] if first < start <= last else [first]
 
 
 def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:

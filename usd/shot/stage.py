@@ -17,7 +17,7 @@ from ..border.prim_paths import prim_path
 from ..border.units import Border, open_stage
 from ..skel.source import StageRig, find_skeletons
 from .attach import Attachment, rig_joint
-from .character_notes import lies_down
+from .character_notes import lies_down, without_body
 from .curves import find_curves, read_groom
 from .hair_search import HairSearch
 from .lacking import no_groom, nothing_found
@@ -126,6 +126,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     for rig in used:
         _check_animated([rig])
         notes += rig.notes + lies_down(rig) + partial_body(rig, every)
+    notes += without_body(used, every)
     for item in found:
         carrying = replace(item.attachment.rig, character=item.attachment.character)
         if stops := without_turn(carrying):

@@ -66,8 +66,14 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
     Raises:
         NeuralocksError: a mesh's arrays do not fit each other or are not finite.
     """
-    read = (_read(prim, source, notes) for prim in skins.get(source.path, ()) if _drawn(prim))
+    read = (_read(prim, source, notes) for prim in skins.get(source.path, ()) if drawn(prim))
     return [mesh for mesh in read if mesh is not None]
+
+
+def drawn(prim: Usd.Prim) -> bool:
+    """Whether a renderer shows the prim, at any time."""
+    imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+    return imageable.ComputePurpose() not in unseen and _ever_visible(prim)
 
 
 def bound_skeleton(prim: Usd.Prim) -> str | None:
@@ -184,11 +190,6 @@ def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | N
         np.concatenate([np.pad(m.weights, p) for m, p in zip(meshes, pad)]),
         shapes,
     )
-
-
-def _drawn(prim: Usd.Prim) -> bool:
-    imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
-    return imageable.ComputePurpose() not in unseen and _ever_visible(prim)
 
 
 def _ever_visible(prim: Usd.Prim) -> bool:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of a character that lies in its bind pose, and of a stage that says neither axis nor unit."""
+"""What is said of a character that lies in its bind pose or has no body, and of a stage that says neither axis nor unit."""
 
+import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
@@ -58,3 +59,48 @@ def test_a_unit_that_no_layer_says_is_told(tmp_path):
     shot.Save()
     assert not _said(tmp_path / "shot.usda", "metersPerUnit"), "the one that counts is the one that is meant"
     assert len(_said(_without(path, "metersPerUnit"), "no metersPerUnit, so a unit counts as a centimetre")) == 1
+
+
+NO_BODY = "/Hero/Rig: moves no visible mesh, so hair is kept out of no body; "
+
+
+@pytest.mark.parametrize("bound", ["own", "none"])
+def test_a_character_without_a_body_is_told(tmp_path, bound):
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    if bound == "none":
+        assert _said(path, "no body") == [NO_BODY + "bind its mesh to it"]
+        return
+    assert not _said(path, "no body")
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.Imageable(stage.GetPrimAtPath("/Hero/Skin")).MakeInvisible()
+    stage.Save()
+    assert _said(path, "no body") == [NO_BODY + "/Hero/Skin, bound to it, is not drawn: show the body"]
+
+
+@pytest.mark.parametrize("up, unit", [("Y", 1.0), ("Z", 0.01)])
+def test_a_body_that_is_a_point_cache_is_told_and_nothing_beside_it(tmp_path, up, unit):
+    """As it is exported beside the skeleton that moved it."""
+    path = write_shot(tmp_path, Recipe(up=up, unit=unit))
+    stage = Usd.Stage.Open(str(path))
+    skin = stage.GetPrimAtPath("/Hero/Skin")
+    points, copy = UsdGeom.Mesh(skin).GetPointsAttr(), UsdGeom.Mesh.Define(stage, "/Set/Statue")
+    UsdGeom.Xformable(copy).AddTranslateOp().Set((2 / unit, 0, 0))
+    for code in range(1, 10):
+        points.Set(Vt.Vec3fArray.FromNumpy(np.asarray(points.Get()) + np.float32(0.01 * (code - 1) / unit)), code)
+    for mesh, name in ((copy, "points"), (copy, "faceVertexCounts"), (copy, "faceVertexIndices")):
+        mesh.GetPrim().GetAttribute(name).Set(skin.GetAttribute(name).Get())
+    for name in ("skel:skeleton", "primvars:skel:jointIndices", "primvars:skel:jointWeights"):
+        skin.RemoveProperty(name)
+    stage.Save()
+    said = NO_BODY + "/Hero/Skin, around its head, is not bound to it: export the body with its weights"
+    assert _said(path, "no body") == [said]
+
+
+def test_a_head_whose_body_is_another_skeletons_is_told_once(tmp_path):
+    layer = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path)))
+    Sdf.CopySpec(layer, "/Hero", layer, "/Coat")  # the binding is copied with its targets
+    stage = Usd.Stage.Open(layer)
+    stage.RemovePrim("/Coat/Hair")
+    stage.RemovePrim("/Hero/Skin")
+    layer.Save()
+    assert len(_said(layer.realPath, "same character")) == 1 and not _said(layer.realPath, "no body")
