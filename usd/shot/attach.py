@@ -93,8 +93,10 @@ def attach(
             found = _by_name(prim, rigs, placement, head)
             notes += [] if found.far else lies_off_skin(prim, found.rig, placement)
     name = rig_joint(found)
-    if head and leaf(name) != leaf(head):
-        notes.append(f"{path}: --head {head} is not used, the groom is carried by {found.how}")
+    asked = found.rig.by_hand.get("head")
+    if asked and leaf(name) != leaf(asked):
+        option = "--head " if head else "--joint head="
+        notes.append(f"{path}: {option}{asked} is not used, the groom is carried by {found.how}")
     return found
 
 

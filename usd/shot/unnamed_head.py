@@ -74,4 +74,5 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
 def _explained(rig: StageRig, why: str) -> StageRig:
     humanoid = rig.character.humanoid
     humanoid = replace(humanoid, reasons={**humanoid.reasons, "head": why})
-    return replace(rig, character=replace(rig.character, humanoid=humanoid))
+    by_hand = {name: joint for name, joint in rig.by_hand.items() if name != "head"}
+    return replace(rig, character=replace(rig.character, humanoid=humanoid), by_hand=by_hand)

@@ -33,6 +33,9 @@ def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
     assert bound.grooms[0].joint == "hips/spine/neck/head"
     said = set(bound.notes) - set(read_shot(path).notes)
     assert len(said) == 1 and "--head neck is not used" in said.pop(), "nor is what it would have spoiled a matter"
+    for joints, count in (({"head": "neck"}, 1), ({"head": "head"}, 0)):
+        notes = read_shot(path, joints=joints).notes
+        assert sum("--joint head=neck is not used, the groom is carried by" in note for note in notes) == count
 
 
 def _without_a_head_by_name(path):
@@ -50,6 +53,18 @@ def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
     assert np.array_equal(found.groom.points, named.groom.points)
     (skeleton,) = inspect(path)["skeletons"]
     assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found by"]
+    stage = Usd.Stage.Open(str(path))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Ruff")
+    ruff = UsdSkel.BindingAPI.Apply(stage.GetPrimAtPath("/Hero/Ruff"))
+    ruff.CreateSkeletonRel().SetTargets(["/Hero/Rig"])
+    ruff.CreateJointIndicesPrimvar(True, 1).Set([1])
+    ruff.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    UsdGeom.BasisCurves(ruff).GetCurveVertexCountsAttr().Set([6] * 10)
+    UsdGeom.BasisCurves(ruff).GetPointsAttr().Set([(0, 1.4, 0.01 * i) for i in range(60)])
+    stage.Save()
+    shot = read_shot(path)
+    assert [item.joint for item in shot.grooms] == [found.joint, "hips/spine"]
+    assert not any("is not used" in note for note in shot.notes), "the head was not named by hand"
 
 
 def test_a_hat_takes_no_hair_from_the_head_under_it(tmp_path):
