@@ -175,8 +175,10 @@ def check_cuts(cuts, rigs) -> None:
     for cut in () if isinstance(cuts, dict) else cuts or ():
         if not any(rig.time_codes[0] < cut <= rig.time_codes[-1] for rig in rigs):
             known = rigs[0].time_codes
+            begins = any(cut == rig.time_codes[0] for rig in rigs)
+            fact = "begins the animation" if begins else "lies outside the animation"
             raise NeuralocksError(
-                f"--cuts {cut:g}: lies outside the animation, which goes from {known[0]:g} to {known[-1]:g}; "
+                f"--cuts {cut:g}: {fact}, which goes from {known[0]:g} to {known[-1]:g}; "
                 "give the first time code after each cut"
             )
 

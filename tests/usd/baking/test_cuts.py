@@ -128,6 +128,7 @@ def test_what_no_cut_can_be_is_refused(shots, tmp_path, model):
     out = tmp_path / "bad.usdc"
     for options, words in (
         ({"cuts": [99]}, "--cuts 99: lies outside"),
+        ({"cuts": [1]}, "--cuts 1: begins the animation, which goes from 1 to"),
         ({"cuts": [5], "loop": True}, "leave out --loop"),
     ):
         with pytest.raises(NeuralocksError, match=words):
