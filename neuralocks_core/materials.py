@@ -95,6 +95,10 @@ class Material:
             if name not in RANGES:
                 known = ", ".join([*ALIASES, *RANGES])
                 raise NeuralocksError(f"material '{setting}': unknown name; use {known} as NAME=VALUE")
+            if "=" in text.lstrip("="):
+                raise NeuralocksError(
+                    f"material '{setting}': more than one NAME=VALUE; give each by itself (--material)"
+                )
             try:
                 factor = getattr(cls(), name) if text.endswith("x") else 1.0
                 value = float(text.removesuffix("x")) * factor

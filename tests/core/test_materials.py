@@ -35,6 +35,12 @@ def test_what_is_no_number_is_refused_in_words(value):
         Material(bend=value)
 
 
+@pytest.mark.parametrize("setting", ["weight=1 damping=4", "weight=1,damping=4"])
+def test_several_in_one_word_are_told_apart(setting):
+    with pytest.raises(NeuralocksError, match="more than one NAME=VALUE; give each by itself"):
+        Material.parse([setting])
+
+
 @pytest.mark.parametrize("setting", ["stiffness=0", "stiffness = 100x", "stiffness=soft"])
 def test_words_are_told_as_they_were_said(setting):
     with pytest.raises(NeuralocksError, match="stiffness") as caught:
