@@ -61,6 +61,18 @@ def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
     assert [path.name for path in tmp_path.iterdir()] == [shot.name]
 
 
+@pytest.mark.skipif(os.sep == "\\", reason="there it is a slash")
+@pytest.mark.parametrize("name", ["a\\b/hair.usdc", "a\\b.usdc"])
+def test_a_backslash_in_a_bakes_path_is_told(tmp_path, model, name):
+    """USD makes a slash of it, and would open the bake without its shot."""
+    out = tmp_path / name
+    out.parent.mkdir(exist_ok=True)
+    shot = write_shot(out.parent)
+    with pytest.raises(NeuralocksError, match="the backslash in its path .* rename it"):
+        bake(shot, out, model, frames="1:2")
+    assert [path.name for path in out.parent.iterdir()] == [shot.name]
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/null"), reason="Windows has none")
 def test_what_is_no_file_is_not_called_missing():
     with pytest.raises(NeuralocksError, match="/dev/null: is not a file"):

@@ -181,7 +181,7 @@ def _copy_header(source: Sdf.Layer, target: Sdf.Layer, out: Path, parts: list[_P
     begin, end = min(part.layer.startTimeCode for part in parts), max(part.layer.endTimeCode for part in parts)
     repeat_metadata(source, target, out, {"startTimeCode": begin, "endTimeCode": end})
     for shot in source.subLayerPaths:
-        target.subLayerPaths.append(relative(source.ComputeAbsolutePath(shot), out.parent))
+        target.subLayerPaths.append(relative(source.ComputeAbsolutePath(shot), out))
 
 
 def _copy_prim(prim: Sdf.PrimSpec, target: Sdf.Layer) -> None:

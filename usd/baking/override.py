@@ -124,7 +124,7 @@ def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path,
     if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
         facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
     repeat_metadata(stage.GetRootLayer(), layer, out, facts)
-    layer.subLayerPaths.append(relative(shot, out.parent))
+    layer.subLayerPaths.append(relative(shot, out))
 
 
 LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
@@ -141,20 +141,22 @@ def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict)
         layer.pseudoRoot.SetInfo(name, value)
 
     def placed(asset: str) -> str:
-        return relative(source.ComputeAbsolutePath(asset), out.parent) if asset.startswith(("./", "../")) else asset
+        return relative(source.ComputeAbsolutePath(asset), out) if asset.startswith(("./", "../")) else asset
 
     UsdUtils.ModifyAssetPaths(layer, placed)
 
 
-def relative(file, folder: Path) -> str:
-    """Path of a file relative to a folder, by the names it was given.
+def relative(file, out: Path) -> str:
+    """Path of a file relative to a layer's folder, by the names it was given.
 
     What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
     folder's own path has a link, `..` must lead to the file both from there and from behind the link.
     """
     if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
         raise NeuralocksError(f"{file}: its path holds a line break or the like, and no layer can name it; rename it")
-    behind = os.path.realpath(folder)
+    if os.sep == "/" and "\\" in os.path.abspath(out):
+        raise NeuralocksError(f"{out}: USD takes the backslash in its path for a slash and finds no shot; rename it")
+    folder, behind = out.parent, os.path.realpath(out.parent)
     try:
         ways = [
             os.path.relpath(os.path.abspath(file), os.path.abspath(folder)),
