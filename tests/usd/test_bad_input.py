@@ -127,6 +127,14 @@ def test_a_broken_stage_is_named_in_one_line(tmp_path, model, case):
         assert fact in str(error)
     else:
         assert any(fact in line for line in facts["stops"])
+        assert len(facts["stops"]) == len(set(facts["stops"])), "each is told once"
+
+
+@pytest.mark.parametrize("name", ["hair.tfx", "hair.HAIR"])
+def test_a_hair_file_in_place_of_a_stage_is_told_to_be_imported(tmp_path, model, name):
+    (tmp_path / name).write_bytes(b"HAIR")
+    with pytest.raises(NeuralocksError, match="is a hair file; make a USD groom of it with 'neuralocks import'"):
+        bake(tmp_path / name, tmp_path / "out.usdc", model)
 
 
 def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called(tmp_path):

@@ -12,6 +12,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.formats import EXTENSIONS
 
 from .damage import first_line, named
 from .stopping import check
@@ -122,6 +123,10 @@ def open_stage(path) -> Usd.Stage:
         raise NeuralocksError(f"{path}: no such file; check the path")
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    if path.suffix.lower() in EXTENSIONS:
+        raise NeuralocksError(
+            f"{path}: is a hair file; make a USD groom of it with 'neuralocks import' and add that to a shot"
+        )
     check()  # USD swallows Ctrl-C while it loads its modules
     try:
         stage = Usd.Stage.Open(str(path))

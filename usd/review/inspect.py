@@ -112,7 +112,8 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:
         stops.append(str(no_groom(stage, Path(path.name))))
-    return facts | {"skeletons": skeletons, "grooms": grooms, "stops": stops, "spoils": list(dict.fromkeys(spoils))}
+    lines = {"stops": list(dict.fromkeys(stops)), "spoils": list(dict.fromkeys(spoils))}
+    return facts | {"skeletons": skeletons, "grooms": grooms} | lines
 
 
 def _rig(rig: StageRig) -> dict:
