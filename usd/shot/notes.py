@@ -35,15 +35,15 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them; and where
     no layer says the unit that counts.
     """
-    border, notes = Border.of(stage), []
-    for layer in stage.GetLayerStack(includeSessionLayers=False)[1:]:
+    border, notes, layers = Border.of(stage), [], stage.GetLayerStack(includeSessionLayers=False)
+    for layer in layers[1:]:
         if differs := border.differing(layer):
             notes.append(
                 f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
             )
             break
-    units = [root.GetInfo(UNIT) for root in (layer.pseudoRoot for layer in stage.GetUsedLayers()) if root.HasInfo(UNIT)]
-    if border.metres_per_unit not in units:
+    units = [layer.pseudoRoot.GetInfo(UNIT) for layer in stage.GetUsedLayers() if layer.pseudoRoot.HasInfo(UNIT)]
+    if border.metres_per_unit not in units and not any(layer.pseudoRoot.HasInfo(UNIT) for layer in layers):
         notes.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
     return notes
 

@@ -59,6 +59,13 @@ def test_a_unit_that_no_layer_says_is_told(tmp_path):
     shot.GetRootLayer().subLayerPaths.append("./asset.usda")
     shot.Save()
     assert not _said(tmp_path / "shot.usda", "metersPerUnit"), "the one that counts is the one that is meant"
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.Save()
+    (said,) = _said(tmp_path / "shot.usda", "m, the stage in")
+    assert "asset.usda counts in 1 m, the stage in 0.01 m" in said and not _said(
+        tmp_path / "shot.usda", "no metersPerUnit"
+    )
     assert len(_said(_without(path, "metersPerUnit"), "no metersPerUnit, so a unit counts as a centimetre")) == 1
 
 
