@@ -88,8 +88,11 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
     def work(self, context):
         armature = shown_armature(context)
         check_own(armature)
-        if not actions.remove(armature):
+        if not actions.has_keys(armature):
             raise NeuralocksError(f"{armature.name_full}: it has no baked hair keys; bake them first")
+        show_rest(armature)  # what Live keeps was turned by the keys; it puts aside anew how the bones are without them
+        actions.remove(armature)
+        refresh(context.scene)
         return f"{armature.name_full}: baked hair keys removed"
 
 

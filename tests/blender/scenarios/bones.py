@@ -206,6 +206,44 @@ def keyed_anew(folder: Path) -> None:
     assert bone.rotation_mode == "XYZ" and apart(turns(5), still) < 1e-6
 
 
+def keys_under_live(folder: Path) -> None:
+    """Live switched on over baked keys, and the keys removed meanwhile: Live goes on, and in the end the hair bones are
+    turned as the artist had turned them.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    scene, own, bone = bpy.context.scene, rig.neuralocks_character, rig.pose.bones["hair.01"]
+    bone.rotation_euler = turned = (0.3, 0.1, 0.2)
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def at(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+
+    def as_before():
+        assert bone.rotation_mode == "XYZ" and apart(np.array(bone.rotation_euler), np.array(turned)) < 1e-6
+
+    own.rig_live = True
+    live = at(11)
+    own.rig_live = False
+    as_before()
+    for muted in (False, True):
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        rig.animation_data.nla_tracks["Neuralocks Hair"].mute = muted
+        at(9)
+        own.rig_live = True
+        at(11)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert apart(at(11), live) < SAME and not messages(), messages()
+        own.rig_live = False
+        as_before()
+        bpy.context.view_layer.update()
+        refused(bpy.ops.neuralocks.remove_keys, "no baked hair keys")
+    assert not own.rig_kept
+
+
 def renamed_bones(folder: Path) -> None:
     """A bone that gets another name is noticed as one more bone would be; it is turned as it was before it was live."""
     from dcc_addon import live
