@@ -16,7 +16,8 @@ from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
 from .scene.lookup import find, identity
-from .scene.placing import mute_deformers, unmute_deformers, world
+from .scene.muting import mute_deformers, unmute_deformers
+from .scene.placing import world
 from .scene.sampling import shown_frame
 from .scene.watched import evaluated_for_itself
 from .services import rig as rig_service

@@ -12,6 +12,7 @@ from neuralocks_core.motion import LOOP_GAP
 from .operators.training import job
 from .scene.actions import has_keys
 from .scene.attach import MODIFIER
+from .scene.muting import off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .session import session
@@ -114,6 +115,8 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             done = session.preparing[hair.name_full].done
             progress(layout, done, f"Preparing the hair {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
+        if off := off_meanwhile(hair):
+            words(layout, f"Off meanwhile, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             column.prop(own, name, slider=True)

@@ -7,7 +7,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from .placing import mute_deformers, unmute_deformers
+from .muting import mute_deformers, unmute_deformers
 
 MODIFIER = "Neuralocks Cache"
 REPLACED = "replaced"

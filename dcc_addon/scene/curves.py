@@ -11,6 +11,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
+from . import unbound
 from .nodes import geometry_nodes
 
 REST = "neuralocks_rest"
@@ -113,7 +114,8 @@ def move_rest(data, matrix: np.ndarray, part: slice = slice(None)) -> None:
 
 
 def restore_rest(data) -> bool:
-    """Put the points back to rest and forget the copy; whether there was one."""
+    """Put the points back to rest and forget the copy, and let them follow their surface as before; whether there was one."""
+    unbound.bind(data, "muted")
     if not has_rest(data):
         return False
     write(data, _rest(data))

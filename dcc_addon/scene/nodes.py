@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees of geometry nodes, made alike in every Blender."""
+"""Trees of geometry nodes, made alike in every Blender, and what a modifier gives them."""
 
 import bpy
 
@@ -14,3 +14,31 @@ def geometry_nodes(name: str) -> tuple:
         tree.inputs.new("NodeSocketGeometry", "Geometry")
         tree.outputs.new("NodeSocketGeometry", "Geometry")
     return tree, tree.nodes.new("NodeGroupInput").outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0]
+
+
+def inputs_of(tree) -> list[tuple[str, str]]:
+    """Names and identifiers of what a modifier can give a tree; none where there is no tree."""
+    if tree is None:
+        return []
+    if hasattr(tree, "interface"):
+        items = tree.interface.items_tree
+        sockets = [item for item in items if item.item_type == "SOCKET" and item.in_out == "INPUT"]
+    else:
+        sockets = tree.inputs
+    return [(socket.name, socket.identifier) for socket in sockets]
+
+
+def read_input(modifier, identifier: str):
+    """What a modifier gives its tree; None where it keeps nothing of this name."""
+    if hasattr(modifier, "properties"):  # since 5.2
+        return getattr(getattr(modifier.properties.inputs, identifier, None), "value", None)
+    return modifier.get(identifier)
+
+
+def write_input(modifier, identifier: str, value) -> None:
+    """Give its tree another value, where the modifier keeps one of this name. The caller tags the object."""
+    if hasattr(modifier, "properties"):
+        if read_input(modifier, identifier) is not None:
+            getattr(modifier.properties.inputs, identifier).value = value
+    elif identifier in modifier:
+        modifier[identifier] = value

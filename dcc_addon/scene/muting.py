@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Modifiers of hair that the live view, or a cache, already moves: what would move it a second time is off meanwhile, and
+what grows more hair beside it does so on the surface as it is posed. All is remembered with the hair, and given back.
+"""
+
+import json
+
+from . import unbound
+from .nodes import inputs_of, read_input, write_input
+
+SIMULATION, DEFORM = "GeometryNodeXPBDSolver", "GeometryNodeDeformCurvesOnSurface"
+"""Nodes at the heart of the modifiers that Blender puts on new hair: since 5.2 Hair Dynamics, before that Surface Deform."""
+PLAIN = {DEFORM, "NodeGroupInput", "NodeGroupOutput", "NodeReroute", "NodeFrame"}
+"""Nodes of a tree that does nothing else than let hair follow its surface."""
+RESTING = {"Surface Rest Position", "Resting Surface"}
+"""Inputs of Blender's hair assets that let them work on the surface at rest, for what deforms it comes later in the stack:
+as they are called up to 5.1, and since.
+"""
+
+
+def mute_deformers(hair, kept: str = "muted") -> None:
+    """Switch off, and remember in the setting `kept`, what makes the hair follow the surface or simulates it, and what takes
+    the surface as it is at rest: the live view, or a cache, gives hair that is posed already.
+    """
+    settings = hair.neuralocks_hair
+    text = getattr(settings, kept)
+    found, deforms = _remembered(text), False
+    for modifier in hair.modifiers:
+        shown = modifier.show_viewport or modifier.show_render
+        if _moves(modifier, hair):
+            if shown:
+                if modifier.name not in found:
+                    found[modifier.name] = _before(hair, modifier, found)
+                modifier.show_viewport = modifier.show_render = False
+            continue
+        deforms = deforms or (shown and _has(_tree(modifier), {DEFORM}))
+        if on := [name for name in _resting(modifier) if read_input(modifier, name)]:
+            found[modifier.name] = sorted({*on, *found.get(modifier.name, ())})
+            _write(hair, modifier, on, False)
+    if deforms:
+        unbound.unbind(hair.data, kept)
+    if found and (now := json.dumps(found)) != text:
+        setattr(settings, kept, now)
+
+
+def unmute_deformers(hair, kept: str = "muted") -> None:
+    """Switch them on again as they were."""
+    settings = hair.neuralocks_hair
+    if hair.type == "CURVES":  # else it was converted
+        unbound.bind(hair.data, kept)
+    if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
+        return
+    found = _remembered(getattr(settings, kept))
+    off, resting = iter(_renamed(hair, found)), iter(_renamed_resting(hair, found))
+    for name, before in found.items():
+        inputs = not before or isinstance(before[0], str)
+        modifier = hair.modifiers.get(name) or next(resting if inputs else off, None)
+        if modifier is None:
+            continue
+        if inputs:
+            _write(hair, modifier, before, True)
+        else:
+            modifier.show_viewport, modifier.show_render = before
+    setattr(settings, kept, "")
+
+
+def off_meanwhile(hair) -> list[str]:
+    """Names of the modifiers that are switched off as a whole while the hair is live, or plays a cache."""
+    own = hair.neuralocks_hair
+    found = [name for kept in (own.muted, own.replaced) for name, before in _remembered(kept).items() if True in before]
+    return [name for name in dict.fromkeys(found) if name in hair.modifiers]
+
+
+def _before(hair, modifier, found: dict) -> list[bool]:
+    """How to show a modifier again that is not among those remembered: as it is shown now; or, where it is one of those,
+    was renamed and then switched on by hand in one place, as that one.
+    """
+    gone = [name for name, before in found.items() if name not in hair.modifiers and isinstance(before[0], bool)]
+    if modifier.show_viewport != modifier.show_render and len(gone) > len(_renamed(hair, found)):
+        return found.pop(gone[-1])
+    return [modifier.show_viewport, modifier.show_render]
+
+
+def _renamed(hair, found: dict) -> list:
+    """Modifiers that are off and not among those remembered by name."""
+    off = [m for m in hair.modifiers if not (m.show_viewport or m.show_render or m.name in found)]
+    return [m for m in off if m.type == "MESH_SEQUENCE_CACHE" or _has(_tree(m), {SIMULATION, DEFORM})]
+
+
+def _renamed_resting(hair, found: dict) -> list:
+    """Modifiers that could take the surface at rest, do not, and are not among those remembered by name."""
+    inputs = [(m, _resting(m)) for m in hair.modifiers if m.name not in found]
+    return [m for m, names in inputs if names and not any(read_input(m, name) for name in names)]
+
+
+def _remembered(text: str) -> dict[str, list]:
+    """By modifier: whether it was shown in the viewport and in renders; or the names of its inputs that were on."""
+    try:
+        return json.loads(text or "{}")
+    except json.JSONDecodeError:
+        return {}
+
+
+def _write(hair, modifier, names, value: bool) -> None:
+    for name in names:
+        write_input(modifier, name, value)
+    hair.update_tag()
+
+
+def _moves(modifier, hair) -> bool:
+    """Whether all that a modifier does to the hair has been done already."""
+    tree = _tree(modifier)
+    if modifier.type == "MESH_SEQUENCE_CACHE" or _has(tree, {SIMULATION}):
+        return True
+    return _has(tree, {DEFORM}) and (_is_plain(tree) or not unbound.possible(hair.data))
+
+
+def _tree(modifier):
+    return modifier.node_group if modifier.type == "NODES" else None
+
+
+def _resting(modifier) -> list[str]:
+    """Identifiers of the inputs that let a modifier work on the surface at rest."""
+    return [identifier for name, identifier in inputs_of(_tree(modifier)) if name in RESTING]
+
+
+def _is_plain(tree) -> bool:
+    return all(node.bl_idname in PLAIN for node in tree.nodes)
+
+
+def _has(tree, kinds: set[str], depth: int = 0) -> bool:
+    """Whether a tree, or a group in it, has a node of one of these kinds."""
+    if tree is None or depth > 8:
+        return False
+    for node in tree.nodes:
+        if node.bl_idname in kinds:
+            return True
+        if node.bl_idname == "GeometryNodeGroup" and _has(node.node_tree, kinds, depth + 1):
+            return True
+    return False

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that *Deform Curves on Surface* leaves where it is, for the rest of a tree must go on: that node lets pass what names
+no UV map. The name lies in a property of the Curves meanwhile, so it is saved, appended and undone with the hair.
+"""
+
+
+def possible(data) -> bool:
+    """Whether these Curves can be changed, and those of no other object with them."""
+    if data.library is not None or data.override_library is not None or data.users - data.use_fake_user > 1:
+        return False
+    return hasattr(data, "surface_uv_map")
+
+
+def unbind(data, kept: str) -> None:
+    """Take the UV map's name away, and remember it under the name `kept`."""
+    if possible(data) and data.surface_uv_map:
+        data[_key(kept)] = data.surface_uv_map
+        data.surface_uv_map = ""
+
+
+def bind(data, kept: str) -> None:
+    """Put the name back, unless another one was given meanwhile."""
+    if data.library is None and _key(kept) in data:
+        data.surface_uv_map = data.surface_uv_map or data[_key(kept)]
+        del data[_key(kept)]
+
+
+def _key(kept: str) -> str:
+    return f"neuralocks_uv_map_{kept}"
