@@ -3,6 +3,8 @@
 which happens by itself in the background, evaluates the animation over them.
 """
 
+import re
+
 import bpy
 import numpy as np
 
@@ -11,6 +13,8 @@ from .lookup import find
 
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
+_CHANNEL = re.compile(rf'(pose\.bones\["(\\.|[^"\\])*"\]\.)?({"|".join(PLACE)})')
+"""Paths of these: what else is called so, a modifier's scale say, is kept by itself."""
 
 
 class Unkeyed:
@@ -24,7 +28,7 @@ class Unkeyed:
             for thing in getattr(bpy.data, kind)
             if thing.library is None
             for within in (False, True)
-            for path, value in _written(_owner(thing, within))
+            for path, value in _written(_owner(thing, within), kind == "objects")
         ]
 
     def put_back(self) -> None:
@@ -69,12 +73,12 @@ def _owner(thing, within: bool):
     return getattr(thing, "node_tree", None) if within else thing
 
 
-def _written(owner) -> list[tuple[str, object]]:
-    """Paths that animation writes, those of PLACE left out, and their values."""
+def _written(owner, placed: bool) -> list[tuple[str, object]]:
+    """Paths that animation writes, and their values; without those of PLACE where these are `placed`, as objects are."""
     data = getattr(owner, "animation_data", None)
     if data is None or not (data.action is not None or len(data.nla_tracks)):
         return []
-    paths = [path for path in animated(data) if path.rpartition(".")[2] not in PLACE]
+    paths = [path for path in animated(data) if not (placed and _CHANNEL.fullmatch(path))]
     return [(path, value) for path in paths if (value := value_of(owner, path)) is not None]
 
 

@@ -131,7 +131,13 @@ def not_keyed(_folder: Path) -> None:
         owner["value"] = 1.0
         assert owner.keyframe_insert('["value"]', frame=1)
         owner["value"] = 2.0
+    camera, warp = lists.cameras["Own"], skin.modifiers.new("Warp", "UV_WARP")
+    called_so = [(camera.background_images.new(), "scale"), (warp, "scale"), (rig.pose.bones["head"], "scale")]
+    for owner, name in called_so:
+        assert owner.keyframe_insert(name, frame=1)
+        setattr(owner, name, 3.0 if owner not in (warp, rig.pose.bones["head"]) else (3.0,) * len(getattr(owner, name)))
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert all(np.all(np.array(getattr(owner, name)) == 3.0) for owner, name in called_so)
     assert not (lost := [owner for owner in owners if owner["value"] != 2.0]), lost
 
 
