@@ -34,7 +34,7 @@ def counts(data) -> np.ndarray:
 
 def points(data) -> np.ndarray:
     """Points at rest, (P, 3) float32 in the object's space, whether the hair is live or not."""
-    return _rest(data) if has_rest(data) else _read(data, "position") + 0.0
+    return _rest(data) if has_rest(data) else _unmarked(_read(data, "position"))
 
 
 def shown(data) -> np.ndarray:
@@ -210,14 +210,20 @@ def _rest(data) -> np.ndarray:
     bare = _without_rest(values)
     if bare.any():
         values[bare] = _read(data, "position")[bare]
-    return values + 0.0
+    return _unmarked(values)
 
 
 def _keep(data, values: np.ndarray) -> None:
-    """Write the rest shape. A point at the origin gets negative zeros, which tell it from one that has no rest yet."""
+    """Write the rest shape. A point at the origin gets a negative zero first, which tells it from one that has no rest yet."""
     values = np.array(values, np.float32)
-    values[~values.any(axis=1)] = -0.0
+    values[~values.any(axis=1), 0] = -0.0
     data.attributes[REST].data.foreach_set("vector", values.ravel())
+
+
+def _unmarked(values: np.ndarray) -> np.ndarray:
+    """The same array, where points at the origin begin with a plain zero."""
+    values[~values.any(axis=1), 0] = 0.0
+    return values
 
 
 def _without_rest(values: np.ndarray) -> np.ndarray:
