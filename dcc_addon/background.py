@@ -9,7 +9,8 @@ import bpy
 
 from .live import carriers, needs_sampling, refresh
 from .scene.redraw import redraw
-from .scene.sampling import notice, sample, stepping
+from .scene.sampling import sample, stepping
+from .scene.up_to_date import notice
 from .session import session
 
 SLICE = 0.05

@@ -14,9 +14,9 @@ from .scene import blur
 from .scene.appended import remake
 from .scene.carried import bodies_of
 from .scene.layers import working_in
-from .scene.sampling import ensure
 from .scene.save_as import Remade
 from .scene.together import drawn_with
+from .scene.up_to_date import ensure
 from .session import session
 
 
@@ -123,7 +123,7 @@ def _make_ready(scene) -> None:
     live.refresh(scene, wait=True, moved=True)
     for armature in live.carriers(scene):
         try:
-            ensure(bpy.context, armature)
+            ensure(bpy.context, armature, looking=True)
         except NeuralocksError as error:
             session.messages[armature.name_full] = str(error)
     live.refresh(scene, wait=True)

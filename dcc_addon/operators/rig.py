@@ -17,7 +17,7 @@ from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, named
 from ..scene.paths import FILE, absolute
-from ..scene.sampling import ensure
+from ..scene.up_to_date import ensure
 from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.overwriting import check_ours

@@ -15,6 +15,18 @@ REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, 
 IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
 LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axis in "xyz")
 """Settings of bones that posing does not change."""
+CURVE = (
+    "dimensions",
+    "resolution_u",
+    "twist_mode",
+    "twist_smooth",
+    "use_path",
+    "use_path_clamp",
+    "path_duration",
+    "eval_time",
+)
+POINT = ("co", "handle_left", "handle_right", "tilt", "radius")
+"""What moves along a curve of this shape reads of it."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 """What adds to an object's own channels, PLACE."""
 NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
@@ -69,9 +81,15 @@ def _object(thing) -> list:
     found += [_numbers(thing, "", moving), *(_animated_by(data) for data in _animation(thing))]
     if thing.pose is not None:
         found += [_channels(thing.data.bones, REST), _channels(thing.pose.bones, dict.fromkeys((*IK, *LIMITED), 1))]
+        found.append(thing.pose.ik_solver)
         for bone in thing.pose.bones:
             start = f'pose.bones["{_quoted(bone)}"]'
-            found += [bone.name, bone.parent and bone.parent.name, _numbers(bone, start, moving)]
+            found += [
+                bone.name,
+                bone.bone.inherit_scale,
+                bone.parent and bone.parent.name,
+                _numbers(bone, start, moving),
+            ]
             found += [_constraint(c, f'{start}.constraints["{_quoted(c)}"].', moving) for c in bone.constraints]
     return found
 
@@ -79,9 +97,10 @@ def _object(thing) -> list:
 def _held(thing, live: dict[str, dict[str, list]]) -> list:
     moving = animated(thing.animation_data)
     found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
-    found += [_lists(thing), *(_read(data) for data in _animation(thing))]
+    found += [_mode(thing, "", moving), _lists(thing), *(_read(data) for data in _animation(thing))]
     if thing.pose is not None:
         bones = thing.pose.bones
+        found.append(thing.data.pose_position)
         starts = [f'pose.bones["{_quoted(bone)}"].' for bone in bones]
         for name, size in PLACE.items():
             values = np.empty((len(bones), size), np.float32)
@@ -92,10 +111,34 @@ def _held(thing, live: dict[str, dict[str, list]]) -> list:
                 elif bone.name in live:
                     values[row] = live[bone.name].get(name, values[row])
             found.append(zlib.crc32(values))
-        found += [_lists(bone) for bone in bones]
+        for bone, start in zip(bones, starts, strict=True):
+            found += [_mode(bone, start, moving, live.get(bone.name, {})), _lists(bone)]
     if thing.type == "CURVE":
-        found += [[point.co[:] for point in (*spline.points, *spline.bezier_points)] for spline in thing.data.splines]
+        found += _shape(thing.data)
     return found
+
+
+def _mode(owner, start: str, moving: set[str], live=()) -> str:
+    """How an object or a bone turns; as in `live`, where it is there."""
+    if f"{start}rotation_mode" in moving:
+        return ""
+    return live["rotation_mode"] if "rotation_mode" in live else owner.rotation_mode
+
+
+def _shape(curve) -> list:
+    """The shape of a curve, but for what animation writes of it."""
+    moving = animated(curve.animation_data)
+    found = _values(curve, [name for name in CURVE if name not in moving])
+    if not any(path.startswith("splines") for path in moving):
+        for spline in curve.splines:
+            found += _values(spline, _settings(spline))
+            for point in (*spline.points, *spline.bezier_points):
+                found.append([tuple(value) if hasattr(value, "__len__") else value for value in _of(point)])
+    return found
+
+
+def _of(point) -> list:
+    return [getattr(point, name) for name in POINT if hasattr(point, name)]
 
 
 def _lists(owner) -> list:

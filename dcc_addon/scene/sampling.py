@@ -87,13 +87,6 @@ def posture_of(armature, scene) -> int:
     return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], own)
 
 
-def notice(armature, scene) -> None:
-    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints."""
-    sampled = session.rigs.get(armature.name_full)
-    if sampled is not None and not sampled.stale:
-        sampled.stale = sampled.rigging != rigging_of(armature, scene)
-
-
 def sample(context, armature) -> Iterator[tuple[int, int]]:
     """Step through the frames; yields (done, total) and puts the result into the session at the end.
 
@@ -108,6 +101,12 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
         recording.take(row)
         yield row + 1, total
     session.renew_motion(recording.name, recording.sampled(), recording.reader)
+
+
+def step(scene, frame: float) -> None:
+    """Show a frame, with its fraction."""
+    whole = int(np.floor(frame + 1e-6))
+    scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
 
 
 class _Recording:
@@ -142,7 +141,7 @@ class _Recording:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
         anew, since handlers may have changed them.
         """
-        self._step(self.frames[row])
+        step(self._scene, self.frames[row])
         armature = named(self.name)
         layer = layer_of(armature, self._scene)
         if layer is None:
@@ -150,16 +149,12 @@ class _Recording:
         tracked = [named(name) for name in self._tracked]
         with watched(self._scene, layer, tracked) as any_hidden:
             if any_hidden:  # shape keys among these are still those of another frame
-                self._step(self.frames[row])
+                step(self._scene, self.frames[row])
                 armature = named(self.name)
             with working_in(self._scene, layer):
                 self._read(row, armature)
         if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
             self._store(row - row % BLOCK, row + 1)
-
-    def _step(self, frame: float) -> None:
-        whole = int(np.floor(frame + 1e-6))
-        self._scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
 
     def _read(self, row: int, armature) -> None:
         """Read the frame that the scene shows."""
@@ -264,16 +259,3 @@ class stepping:
                     rotations.give_back(armature, turned)
         finally:
             session.paused -= 1
-
-
-def ensure(context, armature) -> SampledRig:
-    """The sampled motion, sampled now if there is none, it is stale, or what is not keyed was posed since."""
-    notice(armature, context.scene)
-    found = session.rigs.get(armature.name_full)
-    known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
-    if not known or found.posture != posture_of(armature, context.scene):
-        with stepping(context.scene):
-            for _ in sample(context, armature):
-                pass
-        found = session.rigs[armature.name_full]
-    return found

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a sampled motion is still what Blender shows, and sampling it anew where it is not."""
+
+import numpy as np
+
+from ..services.motion import TOLERANCE
+from ..session import SampledRig, session
+from .layers import layer_of, working_in
+from .lookup import named
+from .sampling import key_of, posture_of, rigging_of, sample, step, stepping
+
+
+def ensure(context, armature, looking: bool = False) -> SampledRig:
+    """The sampled motion, sampled now if there is none, it is stale, or what is not keyed was posed since; `looking`, also
+    where some of its frames are not as they were.
+    """
+    notice(armature, context.scene)
+    found = session.rigs.get(armature.name_full)
+    known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
+    known = known and found.posture == posture_of(armature, context.scene)
+    if not known or (looking and not _as_sampled(context, armature, found)):
+        with stepping(context.scene):
+            for _ in sample(context, armature):
+                pass
+        found = session.rigs[armature.name_full]
+    return found
+
+
+def _as_sampled(context, armature, sampled: SampledRig) -> bool:
+    """Whether the first frame, the last one and one between show the armature as it was sampled: much of what moves a rig
+    Blender does not tell of, and no list of it is whole.
+    """
+    scene, name, frames = context.scene, armature.name_full, sampled.motion.frames
+    read = sorted(set(sampled.character.humanoid.values()))
+    with stepping(scene):
+        for row in {0, len(frames) // 2, len(frames) - 1}:
+            step(scene, frames[row])
+            layer, reader = layer_of(named(name), scene), session.readers.get(name)
+            if layer is None or reader is None:  # that is told where hair is moved
+                return True
+            with working_in(scene, layer):
+                evaluated = named(name).evaluated_get(context.evaluated_depsgraph_get())
+                drawn = (reader.world(evaluated) @ sampled.trim)[read]
+            if np.abs(drawn - sampled.drawn[row, read]).max() >= TOLERANCE:
+                return False
+    return True
+
+
+def notice(armature, scene) -> None:
+    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints."""
+    sampled = session.rigs.get(armature.name_full)
+    if sampled is not None and not sampled.stale:
+        sampled.stale = sampled.rigging != rigging_of(armature, scene)
