@@ -17,6 +17,7 @@ from ..scene import attach
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
+from ..scene.muting import on_top
 from ..scene.paths import FILE, absolute
 from ..services.names import identifier
 from ..services.overwriting import check_ours
@@ -133,7 +134,7 @@ def _look(hair) -> _Look:
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
-    """Bake this character's moving hair to a USD layer, equal to the live view. Its shot is written beside it as NAME_shot.usdc"""
+    """Bake this character's moving hair to a USD layer, equal to the live view without modifiers. Its shot is written beside it as NAME_shot.usdc"""
 
     bl_idname = "neuralocks.bake"
     bl_label = "Bake to USD"
@@ -145,7 +146,9 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
         armature = shown_armature(context)
         path = self.filepath or context.scene.neuralocks.output
         baked = yield from bake_steps(context, armature, hairs_of(armature, context.scene), path)
-        return f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}"
+        left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
+        more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""
+        return f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}"
 
 
 class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):

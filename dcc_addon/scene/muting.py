@@ -71,6 +71,11 @@ def off_meanwhile(hair) -> list[str]:
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
 
+def on_top(hair) -> list[str]:
+    """Names of the modifiers that do more than to move the hair, and are not switched off: a cache plays below them."""
+    return [m.name for m in hair.modifiers if (m.show_viewport or m.show_render) and not _only_moves(m)]
+
+
 def _before(hair, modifier, found: dict) -> list[bool]:
     """How to show a modifier again that is not among those remembered: as it is shown now; or, where it is one of those,
     was renamed and then switched on by hand in one place, as that one.
@@ -109,10 +114,15 @@ def _write(hair, modifier, names, value: bool) -> None:
 
 def _moves(modifier, hair) -> bool:
     """Whether all that a modifier does to the hair has been done already."""
+    return _only_moves(modifier) or (_has(_tree(modifier), {DEFORM}) and not unbound.possible(hair.data))
+
+
+def _only_moves(modifier) -> bool:
+    """Whether a modifier moves the hair, and does nothing else."""
     tree = _tree(modifier)
     if modifier.type == "MESH_SEQUENCE_CACHE" or _has(tree, {SIMULATION}):
         return True
-    return _has(tree, {DEFORM}) and (_is_plain(tree) or not unbound.possible(hair.data))
+    return _has(tree, {DEFORM}) and all(node.bl_idname in PLAIN for node in tree.nodes)
 
 
 def _tree(modifier):
@@ -122,10 +132,6 @@ def _tree(modifier):
 def _resting(modifier) -> list[str]:
     """Identifiers of the inputs that let a modifier work on the surface at rest."""
     return [identifier for name, identifier in inputs_of(_tree(modifier)) if name in RESTING]
-
-
-def _is_plain(tree) -> bool:
-    return all(node.bl_idname in PLAIN for node in tree.nodes)
 
 
 def _has(tree, kinds: set[str], depth: int = 0) -> bool:

@@ -144,6 +144,34 @@ def deform_among_others(folder: Path) -> None:
     assert not messages() and off_meanwhile(strands) == [plain.name] and modifier.show_viewport
 
 
+def left_out_of_the_file(folder: Path) -> None:
+    """A bake tells which modifiers are not in its file: those that would play on top of an attached cache, and no others."""
+    from types import SimpleNamespace
+
+    from dcc_addon.operators.bake import NEURALOCKS_OT_bake
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    make_live(rig, strands)
+
+    def said() -> str:
+        steps = NEURALOCKS_OT_bake.steps(SimpleNamespace(filepath=str(folder / "bake.usdc")), bpy.context)
+        try:
+            while True:
+                next(steps)
+        except StopIteration as end:
+            return end.value
+
+    scenes.surface_deform(strands)
+    assert said() == f"Baked to {folder / 'bake.usdc'}"
+    for name, shown in (("Frizz", True), ("Curl", True), ("Old", False)):
+        modifier = strands.modifiers.new(name, "NODES")
+        modifier.node_group = geometry_nodes(name)[0]
+        modifier.show_viewport = modifier.show_render = shown
+    assert said().endswith("; not in the file: modifiers 'Frizz', 'Curl' (Bake and Attach plays below them)"), said()
+
+
 def grown_by_assets(_folder: Path) -> None:
     """Children from Blender's own hair assets grow on the skin that moves, live as without, before what deforms the hair in
     the stack.
