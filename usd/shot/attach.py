@@ -20,7 +20,7 @@ from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .curves import ends, moment, rest_points
-from .seat import NEAR, Seat, find_seat, kinship, some_ends, ways
+from .seat import CLEARLY, NEAR, Seat, find_seat, kinship, some_ends, ways
 from .seat_notes import lies_off_skin, moved_away, upside_down
 
 REACH = 1.0
@@ -178,7 +178,7 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         raise NeuralocksError(
             f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
         )
-    to_bind = min(places[rig.path], key=lambda way: round(away(rig, way), 3))
+    to_bind = next(way for way in places[rig.path] if away(rig, way) <= max(CLEARLY * nearest, 1e-3))
     at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"

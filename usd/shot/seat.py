@@ -23,6 +23,10 @@ from .curves import ends, moment, rest_points
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
+CLEARLY = 2
+"""So many times nearer must hair be by another way than by a likelier one for the other to be believed: what hovers over
+skin may come a little nearer to it by a wrong one, as by one that counts a parent's scale twice.
+"""
 SOME_ROOTS, SOME_TIMES = 1000, 16
 """How many of a groom's roots and of a prim's samples are looked at, about: all are too many."""
 
@@ -63,7 +67,8 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float
         # In a crowd nearly all skins are far, and to find the nearest point of a far one takes a hundred times as long
         # as to find that none is near. A median within the bound is of distances of which none is twice as large.
         middle = float(np.median(tree.query(placed, distance_upper_bound=2 * within)[0]))
-        better = middle <= within and (best is None or middle < best.distance - 1e-4)
+        clear = CLEARLY if best is not None and way > best.way else 1
+        better = middle <= within and (best is None or clear * middle < best.distance - 1e-4)
         return Seat(middle, rig, mesh, to_bind, way, placed, tree) if better else best
 
     for likely in (True, False):

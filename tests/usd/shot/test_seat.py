@@ -15,7 +15,7 @@ from usd.shot.stage import read_rigs, read_shot
 from usd.skel import source as rig_source
 from usd.skel import surface
 
-from ..shots import HEAD, Recipe, write_shot
+from ..shots import HEAD, Recipe, world_points, write_shot
 
 START = 4
 """Time code at which a character that turns its head from the first frame on is seen first."""
@@ -167,3 +167,21 @@ def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
     monkeypatch.setattr(surface, "bound_skeleton", lambda prim: asked.append(prim.GetPath()) or bound(prim))
     assert len(read_shot(stage.GetRootLayer().realPath).grooms) == 4
     assert len(sorted_) == len(asked) == 4
+
+
+@pytest.mark.parametrize("size", [(0.99, 0.99, 0.99), (1, 0.99, 1), (1.1, 0.97, 0.9)], ids=str)
+@pytest.mark.parametrize("bound, lift", [("mesh", 0.02), ("none", 0.0)])
+def test_below_a_scaled_parent_hair_that_hovers_over_the_skin_stays_where_it_is_seen(
+    tmp_path, still_model, bound, lift, size
+):
+    """Scaled once more, it would be nearer to the skin, or to the joint."""
+    path = write_shot(tmp_path, Recipe(bound=bound, place=np.diag([*size, 1.0])))
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    points.Set(Vt.Vec3fArray.FromNumpy((np.asarray(points.Get()) + [0, lift, 0]).astype(np.float32)))
+    stage.Save()
+    seen = world_points(path, 1)
+    shot = read_shot(path)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, seen, atol=1e-6)
+    out = bake(shot, tmp_path / "hair.usdc", still_model).path
+    np.testing.assert_allclose(world_points(out, 1), seen, atol=1e-5)
