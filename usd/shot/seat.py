@@ -65,10 +65,10 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float
     def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
         # In a crowd nearly all skins are far, and to find the nearest point of a far one takes a hundred times as long
-        # as to find that none is near. A median within the bound is of distances of which none is twice as large.
-        middle = float(np.median(tree.query(placed, distance_upper_bound=2 * within)[0]))
+        # as to find that none is near. Twice the bound, for what is nearer by another way must be so CLEARLY.
+        middle = float(np.median(tree.query(placed, distance_upper_bound=CLEARLY * within)[0]))
         clear = CLEARLY if best is not None and way > best.way else 1
-        better = middle <= within and (best is None or clear * middle < best.distance - 1e-4)
+        better = np.isfinite(middle) and (best is None or clear * middle < best.distance - 1e-4)
         return Seat(middle, rig, mesh, to_bind, way, placed, tree) if better else best
 
     for likely in (True, False):
@@ -77,7 +77,7 @@ def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float
                 best = nearest(best, mesh, tree, (not likely, place), to_bind)
         if best is not None and best.distance <= NEAR:
             break
-    return best
+    return best if best is not None and best.distance <= within else None
 
 
 def ways(
