@@ -8,7 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 from .scene.binding import hidden
 from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
-from .services.motion import TOLERANCE, similar
+from .services.motion import TOLERANCE, as_carried
 from .session import session
 
 
@@ -36,5 +36,5 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
             sampled.stale = session.wanting = True
     drawn = to_core(sampled.motion.metres_per_unit) @ world
     head = sampled.character.head
-    drawn[head] = similar(drawn[head], armature.name_full)
+    drawn[head] = as_carried(drawn[head], armature.name_full)
     return drawn

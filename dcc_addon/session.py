@@ -39,6 +39,8 @@ class SampledRig:
     """Metres of one unit of the bind pose: the scene's unit scale, times the size at which the motion shows the head."""
     drawn: np.ndarray = None
     """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
+    own: np.ndarray = None
+    """What the bones' own channels turn and scale, without constraints, (T, J, 3, 3) float32."""
     rigging: int = 0
     """How what moves the rig was put together; see `scene.sampling.rigging_of`."""
     posture: int = 0

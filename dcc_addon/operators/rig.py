@@ -70,7 +70,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
             refresh(scene)
         frames = frame_numbers(first, last, 1)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
-        own = own_turns(sampled.rig, sampled.motion, bones.joints, frames)
+        own = own_turns(sampled.own, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.
         stretched = frames * (scene.render.frame_map_old / scene.render.frame_map_new)
         armature.neuralocks_character.rig_live = False

@@ -52,3 +52,8 @@ class PoseReader:
         evaluated.pose.bones.foreach_get("matrix", self._buffer.ravel())
         local = self._buffer.astype(float).swapaxes(1, 2)[self._order]
         return matrix(evaluated.matrix_world) @ local
+
+    def own(self, evaluated) -> np.ndarray:
+        """What the bones' own channels turn and scale, without constraints, (J, 3, 3) in their rest axes."""
+        evaluated.pose.bones.foreach_get("matrix_basis", self._buffer.ravel())
+        return self._buffer.swapaxes(1, 2)[self._order, :3, :3]

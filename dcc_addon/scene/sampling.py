@@ -132,6 +132,7 @@ class _Recording:
         count, bones = len(self.frames), len(self._rig.bones)
         self._joints, self._parts = np.empty((BLOCK, bones, 4, 4)), []
         self._drawn, self._world = np.empty((count, bones, 4, 4), np.float32), np.empty((count, bones, 4, 4))
+        self._own = np.empty((count, bones, 3, 3), np.float32)
         self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
         self._places = {name: np.empty((count, 4, 4)) for name in ["", *self._tracked]}
         self._shapes = []
@@ -174,7 +175,7 @@ class _Recording:
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        self._joints[row % BLOCK] = self.reader.world(evaluated)
+        self._joints[row % BLOCK], self._own[row] = self.reader.world(evaluated), self.reader.own(evaluated)
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in self._tracked:
             self._places[other][row] = world(named(other), graph)
@@ -195,6 +196,7 @@ class _Recording:
             shape=np.array(self._shapes[rows]),
             places={},
             subject=self.name,
+            head=self._head,
         )
         world = part.world()
         self._parts.append(part)
@@ -227,6 +229,7 @@ class _Recording:
             binds,
             bind_metres=metres,
             drawn=self._drawn,
+            own=self._own,
             rigging=self._rigging,
             posture=self._posture,
         )

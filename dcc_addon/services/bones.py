@@ -9,8 +9,9 @@ from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.network import RigSampler
-from neuralocks_core.rotation import quaternion_product, rotation_part, to_quaternion
+from neuralocks_core.rotation import rotation_part, to_quaternion
 
+from .hidden import FLAT
 from .motion import Motion
 from .rig import RigArrays
 
@@ -26,11 +27,14 @@ def chains_of(character: Character, patterns: str = "") -> HairChains:
     return find_chains(character, _meshes(character), wanted or None)
 
 
-def own_turns(rig: RigArrays, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Rotations (T, N, 4) wxyz that joints (N,) were sampled with at frames (T,), in their own rest axes."""
-    rest = np.linalg.inv(rig.rest[rig.parents[joints]]) @ rig.rest[joints]
-    turned = motion.rotation[[motion.row(frame) for frame in frames]][:, joints]
-    return quaternion_product(to_quaternion(rotation_part(rest, rig.name)) * [1, -1, -1, -1], turned)
+def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Rotations (T, N, 4) wxyz that the bones' own channels gave joints (N,) at frames (T,), in their own rest axes; `own` as
+    in `SampledRig`. What is flat has none.
+    """
+    linear = own[[motion.row(frame) for frame in frames]][:, joints]
+    flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < FLAT
+    turned = np.where(flat[..., None, None], np.eye(3), linear)
+    return to_quaternion(rotation_part(turned, "hair bones"))
 
 
 def _meshes(character: Character) -> list[SkinnedMesh] | None:

@@ -12,15 +12,17 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import Mirrored, from_quaternion, rotation_part, sizes, to_quaternion
 
+from .uneven import carriable, undone, uneven
+
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
 
 
 def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
-    """Transforms (..., 4, 4) with rotation, translation and one scale each: what a chain of joints can carry.
+    """Transforms (..., 4, 4) with rotation, translation and one scale each, the mean of theirs along the axes.
 
-    Stretched bones (IK stretch, squash) have a different scale along each axis, which relative to a parent is shear;
-    hair does not need it.
+    Raises:
+        NeuralocksError: a transform is mirrored, flat or not finite; `subject` names it.
     """
     joints = np.asarray(joints, float)
     try:
@@ -35,15 +37,23 @@ def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
     return result
 
 
+def as_carried(head: np.ndarray, subject: str = "armature") -> np.ndarray:
+    """A world transform (4, 4) of the head as hair is carried by it: as it is where it is scaled unevenly."""
+    even = similar(head, subject)
+    return head if uneven(head, even) else even
+
+
 def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
-    """Per joint, the scale (J, 4, 4) that makes its bind transform a plain rotation and translation.
+    """Per joint, what (J, 4, 4) makes its bind transform a plain rotation and translation.
 
     Applied to bind and posed transforms alike it cancels; it keeps the scale of an object out of channels of half
     precision.
     """
-    size = sizes(similar(bind, subject))
+    even = similar(bind, subject)
+    size, some = sizes(even), uneven(bind, even)
     trim = np.zeros((len(bind), 4, 4))
     trim[:, [0, 1, 2], [0, 1, 2]] = 1 / size[:, None]
+    trim[some, :3, :3] = undone(bind[some])[:, :3, :3] @ (even[some, :3, :3] / size[some, None, None])
     trim[:, 3, 3] = 1
     return trim
 
@@ -64,7 +74,7 @@ def _levels(parents: np.ndarray) -> list[np.ndarray]:
     return [np.flatnonzero(depth == level) for level in range(depth.max(initial=-1) + 1)]
 
 
-def _undone(similar: np.ndarray) -> np.ndarray:
+def _turned_back(similar: np.ndarray) -> np.ndarray:
     """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS
     threads for each 4x4, in Blender's Python a quarter of the time that playing the frames takes.
     """
@@ -74,6 +84,28 @@ def _undone(similar: np.ndarray) -> np.ndarray:
     result[..., :3, 3:] = -result[..., :3, :3] @ similar[..., :3, 3:]
     result[..., 3, 3] = 1
     return result
+
+
+def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, evenly: bool = True) -> None:
+    """Write translation, rotation and scale of some rows (T,) from world transforms (t, J, 4, 4), each relative to the
+    parent as stored; all with one scale each, or not.
+    """
+    stored = np.empty_like(joints)
+    for level in _levels(parents):
+        local, above = joints[:, level], parents[level]
+        if above[0] >= 0:
+            local = (_turned_back if evenly else undone)(stored[:, above]) @ local
+        if evenly:
+            size = sizes(local)[..., None]
+            turn = local[..., :3, :3] / size[..., None]
+        else:
+            size, turn = np.linalg.norm(local[..., :3, :3], axis=-2), rotation_part(local)
+        size = np.broadcast_to(size, (*size.shape[:-1], 3)).astype(np.float16)  # a SkelAnimation's have half precision
+        own = [each.astype(np.float32) for each in (local[..., :3, 3], to_quaternion(turn), size)]
+        for channel, values in zip(channels, own, strict=True):
+            channel[np.ix_(rows, level)] = values
+        own = _matrices(*own)
+        stored[:, level] = own if above[0] < 0 else stored[:, above] @ own
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +134,7 @@ class Motion:
 
     @classmethod
     def from_world(
-        cls, frames, rate, metres_per_unit, parents, bind, joints, shape, places, subject="armature"
+        cls, frames, rate, metres_per_unit, parents, bind, joints, shape, places, subject="armature", head=None
     ) -> "Motion":
         """From world transforms.
 
@@ -117,25 +149,24 @@ class Motion:
             shape: blend shape weights (T, B).
             places: world transforms (T, 4, 4) of other objects, by name.
             subject: what messages call the armature.
+            head: the joint that carries the hair, whose own transform counts most where bones are scaled unevenly.
 
         Raises:
             NeuralocksError: a transform is mirrored, flat or not finite.
         """
-        trim = trim_of(bind, subject)
-        joints, parents = similar(joints, subject) @ trim, np.asarray(parents, int)
-        stored = np.empty_like(joints)
-        translation, scale = (np.empty((*joints.shape[:2], 3), np.float32) for _ in range(2))
-        rotation = np.empty((*joints.shape[:2], 4), np.float32)
-        for level in _levels(parents):
-            local, above = joints[:, level], parents[level]
-            if above[0] >= 0:
-                local = _undone(stored[:, above]) @ local
-            size = sizes(local)
-            translation[:, level] = local[..., :3, 3]
-            rotation[:, level] = to_quaternion(local[..., :3, :3] / size[..., None, None])
-            scale[:, level] = size.astype(np.float16)[..., None]  # scales of a SkelAnimation have half precision
-            own = _matrices(translation[:, level], rotation[:, level], scale[:, level])
-            stored[:, level] = own if above[0] < 0 else stored[:, above] @ own
+        trim, parents = trim_of(bind, subject), np.asarray(parents, int)
+        joints = np.asarray(joints, float)
+        whole = joints @ trim
+        even = (
+            similar(whole, subject) if uneven(bind, similar(bind, subject)).any() else similar(joints, subject) @ trim
+        )
+        some = uneven(whole, even).any(axis=1)
+        channels = [np.empty((*even.shape[:2], size), np.float32) for size in (3, 4, 3)]
+        if not some.all():
+            _store(channels, ~some, even[~some], parents)
+        if some.any():
+            _store(channels, some, carriable(whole[some], even[some], parents, _levels(parents), head), parents, False)
+        translation, rotation, scale = channels
         return cls(
             frames=np.asarray(frames, float),
             rate=float(rate),

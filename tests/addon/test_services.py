@@ -63,6 +63,50 @@ def test_stretched_bones_keep_place_and_rotation():
     np.testing.assert_allclose(result[..., :3, :3] / 1.7 ** (1 / 3), world[..., :3, :3], atol=1e-9)
 
 
+def _stretched(rng, apart=()):
+    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those of `apart` inherit no
+    scale.
+    """
+    turns, world = from_vector(rng.normal(size=(9, 6, 3)) * 0.4), np.zeros((9, 6, 4, 4))
+    for joint, parent in enumerate(PARENTS):
+        local = np.tile(np.eye(4), (9, 1, 1))
+        local[:, :3, :3] = turns[:, joint] * rng.uniform(0.7, 1.4, (9, 1, 3))
+        local[:, :3, 3] = PLACES[0] if parent < 0 else PLACES[joint] - PLACES[parent]
+        world[:, joint] = local if parent < 0 else world[:, parent] @ local
+        if joint in apart:
+            world[:, joint, :3, :3] = turns[:, joint] @ from_vector([0.5, 0.2, 0.1])
+    return world
+
+
+def test_channels_carry_what_is_stretched_along_a_chain():
+    world = _stretched(np.random.default_rng(5))
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, _rest(), world, np.zeros((9, 0)), {}, head=3)
+    assert np.abs(motion.world() - world).max() < 2e-3
+    parts = [
+        Motion.from_world(np.arange(9)[r], 24, 1.0, PARENTS, _rest(), world[r], np.zeros((9, 0))[r], {}, head=3)
+        for r in (slice(2), slice(2, 9))
+    ]
+    assert np.array_equal(Motion.joined(parts, {}).world(), motion.world())
+
+
+def test_a_head_that_inherits_no_stretch_is_exact():
+    """Below it joints have one scale, for a chain cannot carry both; all stay in place."""
+    world = _stretched(np.random.default_rng(6), apart=(3,))
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, _rest(), world, np.zeros((9, 0)), {}, head=3)
+    made = motion.world()
+    assert np.abs(made[:, 3] - world[:, 3]).max() < 1e-3
+    assert np.abs(made[..., :3, 3] - world[..., :3, 3]).max() < 1e-3
+    assert np.ptp(np.linalg.norm(made[:, :3, :3, :3], axis=-2), axis=-1).max() < 1e-3
+
+
+def test_an_unevenly_scaled_object_is_part_of_its_bind_pose():
+    """At rest its joints are where they were bound, without scale."""
+    place = np.diag([1.1, 1.0, 0.9, 1.0])
+    motion = Motion.from_world([0], 24, 1.0, PARENTS, place @ _rest(), (place @ _rest())[None], np.zeros((1, 0)), {})
+    arrays = rig.RigArrays("Rig", BONES, PARENTS, _rest())
+    assert np.abs(motion.world()[0] - rig.bind_world(arrays, place)).max() < 1e-6
+
+
 def test_mirrored_armature_is_refused_in_plain_words():
     with pytest.raises(NeuralocksError, match="Rig: it is mirrored .*apply its scale"):
         similar(np.diag([-1.0, 1, 1, 1])[None], "Rig")
