@@ -8,20 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.body.going_in import depths_along
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Body, Character
+from neuralocks_core.deformation.laying import CLAMPED, SLACK, clearance, resolved, rest_distance
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.strand_set import StrandSet
 
-MARGIN = 0.001
-"""Clearance that a pushed vertex gets [m]."""
-ROUNDS = 5
-"""Rounds of finding the planes under a strand and laying it over them."""
-SLACK = np.float32(1e-5)
-"""Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
-CLAMPED = 2
-"""Vertices at the root that never move."""
 STILL = 1e-3
 """Skin that moves by less than this against the head [m] stands still."""
 STEP, ROOM = 0.1, 0.1
@@ -32,8 +24,6 @@ BATCH = 2048
 """Strands looked at together."""
 PUSHED = 1024
 """Strands pushed together."""
-NEAR = 0.02
-"""A strand that is pushed keeps clear of the surface where it comes within this distance [m]."""
 
 
 class Resolver:
@@ -147,111 +137,6 @@ def _corners(points: np.ndarray) -> np.ndarray:
     # Along the strands first: rows of numbers are compared much faster than triples.
     rows = points.reshape(len(points), -1)
     return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
-
-
-def rest_distance(points: np.ndarray, body: PosedBody) -> np.ndarray:
-    """Signed distance (S, K) float32 [m] of strands (S, K, 3) at rest, measured as `resolved` does."""
-    return _measured(np.ascontiguousarray(points.transpose(1, 2, 0)), body)[0].T
-
-
-def clearance(rest_distance: np.ndarray) -> np.ndarray:
-    """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
-
-    Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
-    """
-    clear = np.minimum(rest_distance, MARGIN).astype(np.float32)
-    clear[:, :CLAMPED] = -np.inf
-    return clear
-
-
-def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
-    """Strands laid over the surface where they were inside it.
-
-    Strand by strand, from the root on and with every length kept, each segment goes as near to where it was wanted as
-    the planes under it let it, until nothing is inside any more. A strand depends on itself and on the body only:
-    neither the order of strands nor their division into chunks matters. Up to the first vertex that must give way, a
-    strand stays bit for bit.
-
-    Args:
-        points: deformed strands (S, K, 3) [m], in the body's space.
-        body: in this pose.
-        clear: distance [m] that each vertex must keep (S, K), -inf for those that never move.
-
-    Returns:
-        (S, K, 3) float32.
-    """
-    # Vertices first, strands last: what is done to one vertex of all strands is one contiguous array.
-    wanted = np.ascontiguousarray(np.asarray(points, float).transpose(1, 2, 0))
-    lengths = np.sqrt(np.square(np.diff(wanted, axis=0)).sum(axis=1))
-    keep = np.ascontiguousarray(clear.T, float)
-    now, todo = wanted, np.arange(len(points))
-    normal, height = np.zeros(wanted.shape), np.full(keep.shape, -np.inf)
-    # Strands that no round frees are left as they were least deep.
-    least, best = np.full(len(points), np.inf), wanted.copy()
-    for done in range(ROUNDS + 1):
-        here = now[CLAMPED:][:, :, todo]
-        distance, way = _measured(here, body)
-        # The first time a strand is given its margin; after that half of it is enough.
-        lack = (keep[CLAMPED:, todo] - distance).max(axis=0)
-        left = lack > (0.5 * MARGIN if done else SLACK)
-        todo, lack = todo[left], lack[left]
-        better = lack < least[todo]
-        least[todo[better]], best[:, :, todo[better]] = lack[better], now[:, :, todo[better]]
-        if not len(todo) or done == ROUNDS:
-            break
-        here, distance, way = here[:, :, left], distance[:, left], way[:, :, left]
-        surface = (here * way).sum(axis=1) - distance
-        normal[CLAMPED:, :, todo] = way
-        height[CLAMPED:, todo] = np.where(distance < NEAR, surface + keep[CLAMPED:, todo] + 4e-5, -np.inf)
-        # What is still inside was deep: from where it lies now the way out is clearer than from where it came.
-        now[:, :, todo] = _laid(now[:, :, todo], lengths[:, todo], normal[:, :, todo], height[:, todo])
-    now[:, :, todo] = best[:, :, todo]
-    return now.transpose(2, 0, 1).astype(np.float32)
-
-
-def _measured(points: np.ndarray, body: PosedBody) -> tuple[np.ndarray, np.ndarray]:
-    """Signed distance (K, n) [m] of strands (K, 3, n) and its direction (K, 3, n), deep in the body too."""
-    distance, way = body.distance(points.transpose(0, 2, 1).astype(np.float32))
-    distance, way = distance.astype(float), way.transpose(0, 2, 1).astype(float)
-    depths_along(points, distance, way)
-    return distance, way
-
-
-def _laid(wanted: np.ndarray, lengths: np.ndarray, normal: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Strands (K, 3, n) as near to where they are wanted as their lengths (K - 1, n) and the planes under them let them.
-
-    From the root on, each segment aims at its wanted end. If that is under its plane, it takes the direction nearest to
-    that which ends on the plane; straight away from the body if not even that reaches.
-    """
-    result = wanted.copy()
-    free = np.ones(wanted.shape[2], bool)
-    # Before any vertex comes under its plane (by so much more than rounding does) there is nothing to lay.
-    under = np.einsum("kcn,kcn->kn", normal, wanted) < height + 1e-5
-    for i in range(max(CLAMPED, int(under.any(axis=1).argmax())), len(wanted)):
-        before, length, n = result[i - 1], lengths[i - 1], normal[i]
-        up = height[i] - _dot(n, before)
-        along = wanted[i] - before
-        rise = _dot(along, n)
-        size = np.sqrt(_dot(along, along))
-        low = rise * length < up * size
-        free &= ~low
-        if free.all():
-            continue
-        np.maximum(size, 1e-12, out=size)
-        along *= length / size
-        rise *= length / size
-        slope = np.clip(up, -length, length)
-        side = along - rise * n
-        side *= np.sqrt(length**2 - slope**2) / np.maximum(np.sqrt(_dot(side, side)), 1e-12)
-        side += slope * n
-        moved = np.where(low, side, along)
-        moved += before
-        result[i] = np.where(free, wanted[i], moved)
-    return result
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:

@@ -8,7 +8,8 @@ import trimesh
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody
 from neuralocks_core.character import Body, Character
-from neuralocks_core.deformation.resolve import MARGIN, Resolver, clearance, resolved, rest_distance
+from neuralocks_core.deformation.laying import MARGIN, clearance, resolved, rest_distance
+from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
