@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signed distance to the head, which stands still against the hair: a grid, made once."""
+"""Signed distance to what stands still against the hair, the head: a grid, made once. Its hollows count as inside."""
 
 import hashlib
 from dataclasses import dataclass, field
@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.hollows import filled
 
 CELL = 0.005
 """Distance between grid nodes [m]; on a head, linear interpolation is then right within 0.2 mm."""
@@ -65,6 +66,7 @@ class HeadField:
         size = np.ceil((high - self._low) / self.cell).astype(int) + 1
         nodes = self._low + self.cell * np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
         value, _, nearest = whole.closest(nodes.reshape(-1, 3), limit=EXACT, proven=False)
+        value = filled(value.reshape(size), self.cell).ravel()
         # Where something that moves is nearest, the grid knows nothing, and neither does what is mixed with it.
         self._values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
 

@@ -14,9 +14,11 @@ CLAMPED = 2
 """Vertices at the root that never move."""
 TRIES = 3
 """Planes that a vertex is laid on, one after the other: the next is that of where the last has brought it."""
+FLAT = 0.002
+"""A vertex that a plane moves by less than this [m] need not be measured again: so near, skin bends away by less than the margin."""
 BACK = 0.3
 """A strand that was pushed bends back to where it was wanted, each segment by at most so much of its length."""
-UNSEEN = 0.01
+UNSEEN = 0.012
 """Where no distance is known outside, it is at least this [m]."""
 STEEP = 0.003
 """By how much more than its length a segment may seem to go down [m]: distances are that wrong at most."""
@@ -123,6 +125,7 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
             tilted, gained = _tilted(along, up, lack, length[near])
             end[:, near] = before[:, near] + tilted
             distance[i, near] += gained
+            near = near[_size(tilted - along) > FLAT]
         else:
             hard[near] = True
         result[i] = end
@@ -132,13 +135,14 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
 def _supposed(planes: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
     """Distance (n,) and direction (3, n) where none is known, or one that is too deep to be true.
 
-    What is known of places beside it holds there, too, if it is inside; of two such planes, the nearer is the way out.
+    What is known of the vertex before holds there, too, if that lies on the skin or below it, and what is known of where
+    the vertex was wanted, if that is inside; of two such planes, the nearer is the way out.
 
     Args:
-        planes: distance (n,), its direction (3, n) and the way from there (3, n) of either place.
+        planes: distance (n,), its direction (3, n) and the way from there (3, n), of the vertex before and of that place.
     """
     (first, up, step), (second, other, far) = planes
-    height = np.where(first < 0, first + _dot(up, step), np.inf)
+    height = np.where(first < 2 * MARGIN, first + _dot(up, step), np.inf)
     nearer = np.where(second < 0, second + _dot(other, far), -np.inf)
     return np.maximum(height, nearer), np.where(nearer > height, other, up)
 

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hollows of a head that hair does not get into: a mouth, nostrils, what is behind the eyes."""
+
+import numpy as np
+import scipy.ndimage
+from scipy.spatial import cKDTree
+
+BALL = 0.004
+"""Where a ball of this radius cannot get to from outside is a hollow [m]: wider than lips are open, narrower than an ear's folds."""
+CREASE = 0.0015
+"""How much farther than such a ball hair may get into a crease [m]; also what distances to a grid's nodes are wrong by."""
+NEIGHBOURS = 8
+"""Nodes among which the nearest ball is looked for."""
+
+
+def filled(value: np.ndarray, cell: float) -> np.ndarray:
+    """Signed distances (X, Y, Z) [m] on a grid of nodes `cell` [m] apart, with hollows as inside.
+
+    Hair that goes through a cheek would else leave by the mouth: part of a strand would be pushed out, part of it in.
+    Distances are right already where no hollow is nearer than the outer skin, and stay bit for bit.
+    """
+    free = np.pad(value >= BALL, 1, constant_values=True)
+    number = scipy.ndimage.label(free)[0]
+    outside = (number == number[0, 0, 0])[1:-1, 1:-1, 1:-1]
+    if not outside.any():
+        return value
+    rim = outside & ~scipy.ndimage.binary_erosion(outside, np.ones((3, 3, 3)), border_value=1)
+    if not rim.any():
+        return value
+    # What is outside is all balls around free nodes that touch the skin; one is enough in most places.
+    nodes = np.argwhere(rim)
+    asked = ~outside
+    far, which = cKDTree(cell * nodes).query(cell * np.argwhere(asked), k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))
+    depth = (far - value[rim][which]).min(axis=1) - CREASE
+    result = value.copy()
+    result[asked] = np.minimum(value[asked], -depth)
+    return result
