@@ -125,7 +125,7 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
             tilted, gained = _tilted(along, up, lack, length[near])
             end[:, near] = before[:, near] + tilted
             distance[i, near] += gained
-            near = near[_size(tilted - along) > FLAT]
+            near = near[(_size(tilted - along) > FLAT) | (gained < lack - 1e-6)]
         else:
             hard[near] = True
         result[i] = end
