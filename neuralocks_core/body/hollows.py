@@ -17,7 +17,7 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     """Signed distances (X, Y, Z) [m] on a grid of nodes `cell` [m] apart, with hollows as inside.
 
     Hair that goes through a cheek would else leave by the mouth: part of a strand would be pushed out, part of it in.
-    Distances are right already where no hollow is nearer than the outer skin, and stay bit for bit.
+    Where no hollow is near, distances stay as they are, but for a millimetre in few of the nodes inside.
     """
     free = np.pad(value >= BALL, 1, constant_values=True)
     number = scipy.ndimage.label(free)[0]

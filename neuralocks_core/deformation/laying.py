@@ -12,9 +12,9 @@ SLACK = np.float32(1e-5)
 """Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
 CLAMPED = 2
 """Vertices at the root that never move."""
-TRIES = 3
+TRIES = 2
 """Planes that a vertex is laid on, one after the other: the next is that of where the last has brought it."""
-FLAT = 0.002
+FLAT = 0.004
 """A vertex that a plane moves by less than this [m] need not be measured again: so near, skin bends away by less than the margin."""
 BACK = 0.3
 """A strand that was pushed bends back to where it was wanted, each segment by at most so much of its length."""
@@ -98,8 +98,9 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
     for i in range(max(1, int((keep - distance > SLACK).any(axis=1).argmax())), len(wanted)):
         before, length = result[i - 1], lengths[i - 1]
         end = np.where(moved, before + _aimed(edges[i - 1], wanted[i - 1] - before, length), wanted[i])
-        # Distances change by no more than the way gone: most need not be measured anew.
-        near = np.flatnonzero(np.minimum(distance[i], UNSEEN) - _size(end - wanted[i]) < keep[i])
+        # Distances change by little more than the way gone: most need not be measured anew.
+        known = np.where(np.isinf(distance[i]), UNSEEN, distance[i])
+        near = np.flatnonzero(known - 1.2 * _size(end - wanted[i]) < keep[i])
         depth, out = distance[i].copy(), way[i].copy()
         distance[i, moved] = np.inf
         least = np.minimum(distance[i - 1], 0) - 1.1 * length - STEEP

@@ -33,7 +33,7 @@ def test_a_hollow_is_as_deep_as_the_skin_around_it(slit):
     np.testing.assert_array_equal(found[ball(0.1) > 0.004], head[ball(0.1) > 0.004])
 
 
-def test_an_open_dent_and_a_solid_head_stay_bit_for_bit():
+def test_an_open_dent_and_a_solid_head_stay_as_they_are():
     for head in (ball(0.1), np.maximum(ball(0.1), -ball(0.03, (0, 0, 0.1)))):
         found = filled(head, CELL)
         assert (found == head).mean() > 0.98 and np.abs(found - head).max() < 0.003
