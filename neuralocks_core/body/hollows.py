@@ -2,8 +2,6 @@
 """Hollows of a head that hair does not get into: a mouth, nostrils, what is behind the eyes."""
 
 import numpy as np
-import scipy.ndimage
-from scipy.spatial import cKDTree
 
 BALL = 0.004
 """Where a ball of this radius cannot get to from outside is a hollow [m]: wider than lips are open, narrower than an ear's folds."""
@@ -19,12 +17,15 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     Hair that goes through a cheek would else leave by the mouth: part of a strand would be pushed out, part of it in.
     Where no hollow is near, distances stay as they are, but for a millimetre in few of the nodes inside.
     """
+    from scipy import ndimage
+    from scipy.spatial import cKDTree
+
     free = np.pad(value >= BALL, 1, constant_values=True)
-    number = scipy.ndimage.label(free)[0]
+    number = ndimage.label(free)[0]
     outside = (number == number[0, 0, 0])[1:-1, 1:-1, 1:-1]
     if not outside.any():
         return value
-    rim = outside & ~scipy.ndimage.binary_erosion(outside, np.ones((3, 3, 3)), border_value=1)
+    rim = outside & ~ndimage.binary_erosion(outside, np.ones((3, 3, 3)), border_value=1)
     if not rim.any():
         return value
     # What is outside is all balls around free nodes that touch the skin; one is enough in most places.

@@ -71,7 +71,7 @@ def test_a_trained_model_knows_which_way_its_rig_faces(edited, tmp_path, monkeyp
     pytest.importorskip("torch")
     shot, told = edited(_askew), []
     hair = read_rigged_hair(shot)
-    monkeypatch.setattr("neuralocks_core.training.rig.train.train_static", lambda *_, **__: model_for(hair))
+    monkeypatch.setattr("neuralocks_core.training.rig.static.train_static", lambda *_, **__: model_for(hair))
     train_rig(shot, tmp_path / "m.neuralocks", dynamic=False, tell=told.extend)
     kept = RigModel.load(tmp_path / "m.neuralocks").training["facing"]
     assert kept == pytest.approx(hair.source.character.facing_angle, abs=1e-3) and abs(kept) > 2
