@@ -116,6 +116,24 @@ def inverse(transform: np.ndarray) -> np.ndarray:
     return result
 
 
+def inverses(transforms: np.ndarray) -> np.ndarray:
+    """Inverses (..., 4, 4) of affine transforms (..., 4, 4) that are not flat, written out for the reasons of `inverse`."""
+    linear = transforms[..., :3, :3]
+    a, b, c = (linear[..., column] for column in range(3))
+    result = np.zeros_like(transforms)
+    result[..., :3, :3] = (
+        np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-2) / volumes(linear)[..., None, None]
+    )
+    result[..., :3, 3:] = -result[..., :3, :3] @ transforms[..., :3, 3:]
+    result[..., 3, 3] = 1
+    return result
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def relative_to_parents(world: np.ndarray, parents: np.ndarray) -> np.ndarray:
     """Transforms of joints (..., J, 4, 4) relative to their parents' (J,), -1 for a root, out of those in the world."""
     local, below = world.copy(), parents >= 0

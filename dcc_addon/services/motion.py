@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import Mirrored, from_quaternion, rotation_part, sizes, to_quaternion
+from neuralocks_core.rotation import Mirrored, from_quaternion, inverses, rotation_part, sizes, to_quaternion
 
-from .uneven import carriable, undone, uneven
+from .uneven import carriable, uneven
 
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
@@ -53,7 +53,7 @@ def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
     size, some = sizes(even), uneven(bind, even)
     trim = np.zeros((len(bind), 4, 4))
     trim[:, [0, 1, 2], [0, 1, 2]] = 1 / size[:, None]
-    trim[some, :3, :3] = undone(bind[some])[:, :3, :3] @ (even[some, :3, :3] / size[some, None, None])
+    trim[some, :3, :3] = inverses(bind[some])[:, :3, :3] @ (even[some, :3, :3] / size[some, None, None])
     trim[:, 3, 3] = 1
     return trim
 
@@ -94,7 +94,7 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
     for level in _levels(parents):
         local, above = joints[:, level], parents[level]
         if above[0] >= 0:
-            local = (_turned_back if evenly else undone)(stored[:, above]) @ local
+            local = (_turned_back if evenly else inverses)(stored[:, above]) @ local
         if evenly:
             size = sizes(local)[..., None]
             turn = local[..., :3, :3] / size[..., None]

@@ -8,7 +8,7 @@ parent; one that inherits nothing, or is turned by constraints, is sheared relat
 
 import numpy as np
 
-from neuralocks_core.rotation import volumes
+from neuralocks_core.rotation import inverses
 
 UNEVEN = 1e-4
 """Scales that differ by less, relative to their mean, are one."""
@@ -39,31 +39,14 @@ def carriable(joints: np.ndarray, even: np.ndarray, parents: np.ndarray, levels,
         result[~whole, above] = even[~whole, above]
         joint, above = above, parents[above]
         if above >= 0:
-            whole = whole & ~_sheared(undone(joints[:, above]) @ joints[:, joint])
+            whole = whole & ~_sheared(inverses(joints[:, above]) @ joints[:, joint])
     for level in levels:
         others = level[~np.isin(level, chain)]
         link, above = joints[:, others], parents[others]
         if len(others) and above[0] >= 0:
-            link = undone(result[:, above]) @ link
+            link = inverses(result[:, above]) @ link
         result[:, others] = np.where(_sheared(link)[..., None, None], even[:, others], joints[:, others])
     return result
-
-
-def undone(transforms: np.ndarray) -> np.ndarray:
-    """Inverses of affine transforms (..., 4, 4), written out: a general one wakes BLAS threads for each."""
-    linear = transforms[..., :3, :3]
-    a, b, c = (linear[..., column] for column in range(3))
-    rows = [_cross(b, c), _cross(c, a), _cross(a, b)]
-    result = np.zeros_like(transforms)
-    result[..., :3, :3] = np.stack(rows, axis=-2) / volumes(linear)[..., None, None]
-    result[..., :3, 3:] = -result[..., :3, :3] @ transforms[..., :3, 3:]
-    result[..., 3, 3] = 1
-    return result
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def _sheared(transforms: np.ndarray) -> np.ndarray:

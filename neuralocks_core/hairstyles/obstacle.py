@@ -106,6 +106,7 @@ def _without_pockets(field: np.ndarray, step: float) -> np.ndarray:
     """Signed distances on a grid whose spacing is `step` [m], where what is shut off from outside is inside as well.
 
     Heads have eyes and a mouth modelled into them; without this a strand that once got in would find room there.
+    `body.hollows` is for a finer grid, and moves skin around its hollows a little, so that hair would grow otherwise.
     """
     regions, count = ndimage.label(field > 0.5 * step)  # lips and lids stand a little open
     if count < 2:

@@ -47,6 +47,8 @@ def test_affine_transforms_are_undone_by_their_inverse_and_flat_ones_refused():
         transform[:3] = rng.normal(size=(3, 4)) * size
         assert np.allclose(rotation.inverse(transform) @ transform, np.eye(4), atol=1e-9)
         assert np.allclose(rotation.inverse(transform), np.linalg.inv(transform), rtol=1e-9)
+        several = np.stack([transform, transform[[1, 0, 2, 3]], np.eye(4)])[:, None]
+        assert np.allclose(rotation.inverses(several), np.linalg.inv(several), rtol=1e-9)
     transform[:3, 1] = 0
     with pytest.raises(NeuralocksError, match="flat"):
         rotation.inverse(transform)

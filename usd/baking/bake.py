@@ -17,7 +17,7 @@ from ..border.amounts import check_number
 from ..border.time_codes import given_cuts, time_codes
 from ..border.units import check_layer_name
 from ..shot.notes import written_notes
-from ..shot.recorded import cut_facts
+from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
 from .posing import GroomPoser
 from .samples import write_samples
@@ -105,7 +105,7 @@ def bake(
         return GroomPoser(item, strand_model, look, **options)
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
-    facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
+    facts |= given_facts(cuts, joints)
     resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]

@@ -16,7 +16,7 @@ from ..border.amounts import check_number
 from ..border.time_codes import given_cuts, time_codes
 from ..border.units import check_layer_name
 from ..shot.notes import written_notes
-from ..shot.recorded import cut_facts
+from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
 from .bake import BakeResult, as_material, described
 from .placing import GroomPlacer
@@ -71,7 +71,7 @@ def simulate(
         return _SimulatedPoser(item, codes, shot.first, look, count, volume, progress)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
-    facts |= cut_facts(cuts) | ({"joints": dict(joints)} if joints else {})
+    facts |= given_facts(cuts, joints)
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
     notes += [text for rig in shot.rigs if cuts is None for text in rig.cut_notes()]

@@ -25,9 +25,10 @@ def recorded(prim: Usd.Prim) -> dict:
     return {name: list(value) if isinstance(value, Vt.DoubleArray) else value for name, value in facts.items()}
 
 
-def cut_facts(cuts: list[float] | None) -> dict:
-    """The record of the cuts, by time code, that the user gave; empty where they were found."""
-    return {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
+def given_facts(cuts: list[float] | None, joints: dict[str, str] | None) -> dict:
+    """The record of the cuts, by time code, and of the joints that the user gave; empty where they were found."""
+    told = {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
+    return told | ({"joints": dict(joints)} if joints else {})
 
 
 def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
