@@ -10,7 +10,8 @@ import numpy as np
 from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.preview import shading
-from neuralocks_core.preview.canvas import Camera, open_canvas
+from neuralocks_core.preview.camera import ANGLE, Camera
+from neuralocks_core.preview.canvas import open_canvas
 
 
 @dataclass(frozen=True)
@@ -22,14 +23,12 @@ class Detail:
         vertices: of each.
         scale: how many times larger to draw before reducing.
         width: of a strand, in pixels of the larger drawing.
-        samples: of a pixel of the larger drawing; 0 for one, without the cost of counting.
     """
 
     strands: int
     vertices: int
-    scale: float
+    scale: int
     width: float
-    samples: int
 
 
 @dataclass(frozen=True)
@@ -180,7 +179,7 @@ class Film:
         self._axes = np.stack([right, [0, 1.0, 0], front], axis=1)
         direction = front + 0.62 * right + np.array([0, 0.10, 0])
         direction /= np.linalg.norm(direction)
-        far = high / np.tan(np.radians(24.0) / 2)
+        far = high / np.tan(np.radians(ANGLE) / 2)
         up = np.array([0, 1.0, 0])
         aim = smooth - up * 0.36 * min(reach, 0.6)
         return [Camera(a + far * direction, a, up) for a in aim]

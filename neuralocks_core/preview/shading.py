@@ -44,9 +44,9 @@ def hair_colours(
         look: colours.
     """
     strands, vertices = len(counts), int(counts[0])
-    x = points.reshape(strands, vertices, 3)
-    tangent = _unit(np.gradient(x, axis=1).astype(np.float32))
-    outward = (x - centre).astype(np.float32)
+    x = (points - centre).astype(np.float32).reshape(strands, vertices, 3)
+    tangent = _unit(np.gradient(x, axis=1))
+    outward = x.copy()
     outward -= np.einsum("snc,snc->sn", outward, tangent)[..., None] * tangent
     outward = _unit(outward)
     step = np.diff(x, axis=1)
@@ -54,9 +54,9 @@ def hair_colours(
     shadow = ShadowMap(points, np.repeat(length * COVER / strands, vertices))
 
     rng = np.random.default_rng(7)
-    along = np.linspace(0, 1, vertices)[None, :, None] ** 1.3
-    base = (np.array(look.root) * (1 - along) + np.array(look.tip) * along).astype(np.float32)
-    shift = rng.normal(0, 0.05, (strands, 1, 1)).astype(np.float32)
+    down = np.linspace(0, 1, vertices)[None, :, None] ** 1.3
+    base = (np.array(look.root) * (1 - down) + np.array(look.tip) * down).astype(np.float32)
+    shift = rng.normal(0, 0.05, (strands, 1)).astype(np.float32)
     gloss = 0.5 * np.array(look.gloss, np.float32)
     light = np.zeros(x.shape, np.float32)
     for direction, power, dim in ((KEY, 2.6, 1.0), (FILL, 0.55, 0.6), (RIM, 2.2, 1.0)):
@@ -67,8 +67,9 @@ def hair_colours(
         diffuse = np.sqrt(np.clip(1 - cosine**2, 0, 1)) * wrap
         half = towards + to_eye
         half = (half / np.linalg.norm(half)).astype(np.float32)
-        bright = 0.30 * _highlight(tangent, outward, half, shift - 0.10, 90)
-        tinted = 0.9 * _highlight(tangent, outward, half, shift + 0.14, 22)
+        along, across = tangent @ half, outward @ half
+        bright = 0.30 * _highlight(along, across, shift - 0.10, 90)[..., None]
+        tinted = 0.9 * _highlight(along, across, shift + 0.14, 22)[..., None]
         light += power * clear * (base * (diffuse + tinted) + wrap * bright * gloss)
     sky = np.exp(-0.5 * shadow.depth(points, axes @ np.array([0, 0.8, 0.6]))).reshape(strands, vertices, 1)
     light += 0.30 * _smoothed(sky) * base
@@ -102,6 +103,14 @@ def body_colours(
         sky = sky * np.exp(-0.5 * shadow.depth(points + 0.004 * normals, axes @ np.array([0, 0.8, 0.6])))[:, None]
     edge = (1 - np.clip(normals @ to_eye, 0, 1)[:, None]) ** 3
     return srgb(albedo * (light + 0.28 * sky * np.array([0.85, 0.92, 1.0])) + 0.05 * edge * sky)
+
+
+def backdrop(width: int, height: int) -> np.ndarray:
+    """A soft studio background (height, width, 3) uint8."""
+    y, x = np.mgrid[0:height, 0:width]
+    far = np.hypot((x / width - 0.5) * 1.1, y / height - 0.42)
+    light = np.clip(0.60 - 0.42 * far, 0, 1)[..., None]
+    return (255 * light * np.array([0.96, 0.99, 1.04])).clip(0, 255).astype(np.uint8)
 
 
 class ShadowMap:
@@ -170,11 +179,13 @@ def srgb(linear: np.ndarray) -> np.ndarray:
     return np.clip(np.where(toned < 0.0031308, 12.92 * toned, 1.055 * toned ** (1 / 2.4) - 0.055), 0, 1)
 
 
-def _highlight(tangent, outward, half, shift, sharpness):
-    bent = tangent + shift * outward
-    along = bent @ half
-    along *= along / np.maximum(np.einsum("snc,snc->sn", bent, bent), 1e-18)
-    return np.clip(1 - along[..., None], 0, 1) ** sharpness
+def _highlight(along, across, shift, sharpness):
+    """sin^(2 sharpness) of the angle (S, N) between the half vector and the tangent, bent outward by a part of its length.
+
+    `along` and `across` (S, N) are the half vector's parts along the tangent and along outward, which is square to it.
+    """
+    cosine = (along + shift * across) / np.sqrt(1 + shift**2)
+    return np.exp(sharpness * np.log1p(-np.minimum(cosine**2, 0.999999)))
 
 
 def _unit(vectors):

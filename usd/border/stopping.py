@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C, or a farm's SIGTERM, ends a command at any time. While USD loads its modules, it swallows the signal or turns it
-into an error, and VTK may crash.
+into an error, and libraries that draw may crash.
 """
 
 import signal

@@ -235,7 +235,7 @@ def test_help_comes_without_the_heavy_parts():
 
 def test_the_runtime_imports_only_what_inference_needs():
     """Half a second to start is kept by what is not imported: no training, drawing or statistics."""
-    absent = ("torch", "warp", "onnx", "bpy", "trimesh", "pyvista", "matplotlib", "PIL", "pandas", "sympy",
+    absent = ("torch", "warp", "onnx", "bpy", "trimesh", "moderngl", "matplotlib", "PIL", "pandas", "sympy",
               "scipy.stats", "scipy.signal", "scipy.ndimage", "scipy.integrate")  # fmt: skip
     code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
     for module in (
