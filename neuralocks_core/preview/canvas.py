@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coloured triangles and lines to an image, without a display."""
 
+from dataclasses import replace
+
 from neuralocks_core.preview.plain_canvas import PlainCanvas
 
 
@@ -11,4 +13,6 @@ def open_canvas(width, height, triangles, strands, detail):
 
         return GlCanvas(width, height, triangles, strands, detail)
     except Exception:  # a missing wheel, library or driver each raises something of its own
-        return PlainCanvas(width, height, triangles, strands, detail)
+        # Coarser by one step, or a clip of ten seconds would take minutes.
+        coarser = replace(detail, scale=max(detail.scale - 1, 1), width=max(detail.width - 1, 1))
+        return PlainCanvas(width, height, triangles, strands, coarser)

@@ -28,7 +28,7 @@ class Detail:
     strands: int
     vertices: int
     scale: int
-    width: float
+    width: int
 
 
 @dataclass(frozen=True)

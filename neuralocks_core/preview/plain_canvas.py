@@ -6,62 +6,90 @@ import numpy as np
 from neuralocks_core.preview.camera import ANGLE, Camera
 from neuralocks_core.preview.shading import backdrop
 
+LONGEST = 64
+"""Samples of a segment, and along each side of a triangle, at most."""
+
 
 class PlainCanvas:
-    """Draws by sampling every triangle and segment a pixel or so apart and keeping the nearest sample.
+    """Draws by sampling every triangle and segment a pixel or so apart and keeping the nearest sample of a pixel.
 
     Slower and plainer than OpenGL, and works wherever numpy does. Arguments as of `GlCanvas`.
     """
 
     def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
-        self.size, self._scale = (width, height), detail.scale
+        self._scale, self._width = detail.scale, detail.width
+        self._wide, self._high = width * detail.scale, height * detail.scale
         self._triangles, self._shape = triangles, (strands, detail.vertices)
         self._backdrop = backdrop(width, height)
 
     def draw(self, camera: Camera, body, body_colours, hair, hair_colours) -> np.ndarray:
         """See `GlCanvas.draw`."""
-        wide, high = (side * self._scale for side in self.size)
-        samples = [self._segments(camera, hair, hair_colours, high)]
+        samples = []
+        if len(hair):
+            samples += self._segments(self._project(camera, hair), _packed(hair_colours))
         if body is not None:
-            samples.append(self._surface(camera, body, body_colours, high))
-        x, y, depth, colour = (np.concatenate(parts) for parts in zip(*samples, strict=True))
-        pixel_x, pixel_y = (x + wide / 2).astype(int), (high / 2 - y).astype(int)
-        kept = (pixel_x >= 0) & (pixel_x < wide) & (pixel_y >= 0) & (pixel_y < high) & (depth > 0)
-        order = np.flatnonzero(kept)[np.argsort(-depth[kept], kind="stable")]
-        image = np.zeros((high, wide, 4), np.uint8)
-        # Far samples first: the last one written to a pixel is the nearest.
-        image[pixel_y[order], pixel_x[order], :3] = (255 * colour[order]).astype(np.uint8)
-        image[pixel_y[order], pixel_x[order], 3] = 255
-        return composite(image, self._scale, self._backdrop)
+            samples += self._surface(self._project(camera, body), body_colours.astype(np.float32))
+        image = np.zeros(self._wide * self._high, np.uint32)
+        if samples:
+            pixel, depth, colour = (np.concatenate(parts) for parts in zip(*samples, strict=True))
+            # Far samples first: the last one written to a pixel is the nearest. Numbers of 16 bits are sorted by counting.
+            near, far = depth.min(), depth.max()
+            rank = (65535 * ((far - depth) / max(far - near, 1e-9))).astype(np.uint16)
+            order = np.argsort(rank, kind="stable")
+            image[pixel[order]] = colour[order]
+        return composite(image.view(np.uint8).reshape(self._high, self._wide, 4), self._scale, self._backdrop)
 
     def close(self) -> None:
         """Nothing to free."""
 
-    def _segments(self, camera, hair, colours, high):
-        seen = _project(camera, hair, high).reshape(*self._shape, 3)
-        tint = colours.reshape(*self._shape, 3)
-        steps = int(np.clip(np.ceil(np.abs(np.diff(seen[..., :2], axis=1)).max(initial=1)), 1, 24))
-        t = (np.arange(steps) / steps)[None, None, :, None]
-        place = seen[:, :-1, None] * (1 - t) + seen[:, 1:, None] * t
-        shade = tint[:, :-1, None] * (1 - t) + tint[:, 1:, None] * t
-        place, shade = place.reshape(-1, 3), shade.reshape(-1, 3)
-        return place[:, 0], place[:, 1], place[:, 2], shade
+    def _project(self, camera: Camera, points: np.ndarray) -> np.ndarray:
+        """Pixels right and down from the upper left corner, and depth [m], (N, 3)."""
+        seen = (points - camera.eye) @ (camera.axes * [1, -1, -1])
+        focal = self._high / 2 / np.tan(np.radians(ANGLE) / 2)
+        depth = seen[:, 2:]
+        place = focal * seen[:, :2] / np.maximum(depth, 1e-6) + [self._wide / 2, self._high / 2]
+        return np.concatenate([place, depth], axis=1).astype(np.float32)
 
-    def _surface(self, camera, body, colours, high):
-        seen = _project(camera, body, high)[self._triangles]
-        (ax, ay), (bx, by) = (seen[:, 1, :2] - seen[:, 0, :2]).T, (seen[:, 2, :2] - seen[:, 0, :2]).T
-        shown = ax * by - ay * bx > 0
-        seen, tint = seen[shown], colours[self._triangles[shown]]
-        size = np.ceil(1.5 * np.abs(seen[:, [1, 2, 0], :2] - seen[:, :, :2]).max(axis=(1, 2))).clip(1, 60).astype(int)
-        parts = []
+    def _segments(self, seen: np.ndarray, colours: np.ndarray) -> list[tuple]:
+        """Samples of the strands, as wide as asked for across each segment: pixel, depth and packed colour (n,)."""
+        seen = seen.reshape(*self._shape, 3)
+        start, way = seen[:, :-1].reshape(-1, 3), np.diff(seen, axis=1).reshape(-1, 3)
+        run = np.abs(way[:, :2])
+        steps = np.ceil(run.max(axis=1)).clip(1, LONGEST).astype(int)
+        which = np.repeat(np.arange(len(steps)), steps)
+        part = (np.arange(len(which)) - (np.cumsum(steps) - steps)[which]) / steps[which].astype(np.float32)
+        place = start[which] + part[:, None] * way[which]
+        # The colour of the nearer end: they lie close together, and mixing would cost as much as all the rest.
+        colour = colours.reshape(self._shape)[:, :-1].ravel()[which]
+        result = []
+        for aside in np.arange(self._width) - (self._width - 1) // 2:
+            shift = np.where(run[:, :1] > run[:, 1:], [0, aside], [aside, 0]).astype(np.float32)
+            result.append(self._kept(place[:, 0] + shift[which, 0], place[:, 1] + shift[which, 1], place[:, 2], colour))
+        return result
+
+    def _surface(self, seen: np.ndarray, colours: np.ndarray) -> list[tuple]:
+        """Samples of the triangles that face the camera, as of `_segments`."""
+        corners = seen[self._triangles]
+        (ax, ay), (bx, by) = (corners[:, 1, :2] - corners[:, 0, :2]).T, (corners[:, 2, :2] - corners[:, 0, :2]).T
+        low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+        inside = (high >= 0).all(axis=1) & (low < [self._wide, self._high]).all(axis=1)
+        shown = (ax * by - ay * bx < 0) & inside
+        corners, tint = corners[shown], colours[self._triangles[shown]]
+        size = np.ceil(1.5 * (high - low)[shown].max(axis=1)).clip(1, LONGEST).astype(int)
+        result = []
         for n in np.unique(size):
             i, j = np.mgrid[0 : n + 1, 0 : n + 1]
-            inside = i + j <= n
-            weights = np.stack([i[inside], j[inside], n - i[inside] - j[inside]], axis=1) / n
+            half = i + j <= n
+            weights = np.stack([i[half], j[half], n - i[half] - j[half]], axis=1).astype(np.float32) / n
             chosen = size == n
-            parts.append(np.concatenate([weights @ seen[chosen], weights @ tint[chosen]], axis=2).reshape(-1, 6))
-        both = np.concatenate(parts) if parts else np.zeros((0, 6))
-        return both[:, 0], both[:, 1], both[:, 2], both[:, 3:]
+            x, y, depth = np.moveaxis(weights @ corners[chosen], 2, 0).reshape(3, -1)
+            result.append(self._kept(x, y, depth, _packed((weights @ tint[chosen]).reshape(-1, 3))))
+        return result
+
+    def _kept(self, x, y, depth, colour) -> tuple:
+        """Of samples (n,), those before the camera and in the picture: pixel, depth, colour."""
+        kept = (x >= 0) & (x < self._wide) & (y >= 0) & (y < self._high) & (depth > 0)
+        return y[kept].astype(np.int32) * self._wide + x[kept].astype(np.int32), depth[kept], colour[kept]
 
 
 def composite(image: np.ndarray, scale: int, backdrop: np.ndarray) -> np.ndarray:
@@ -69,14 +97,16 @@ def composite(image: np.ndarray, scale: int, backdrop: np.ndarray) -> np.ndarray
 
     Its colours are multiplied by its coverage already, which is 0 or 255: the edge of hair gets no fringe.
     """
-    high, wide, _ = backdrop.shape
-    small = image.reshape(high, scale, wide, scale, 4).mean(axis=(1, 3))
+    total = np.zeros((*backdrop.shape[:2], 4), np.uint32)
+    for row in range(scale):
+        for column in range(scale):
+            total += image[row::scale, column::scale]
+    small = total / np.float32(scale**2)
     return (small[..., :3] + backdrop * (1 - small[..., 3:] / 255)).clip(0, 255).astype(np.uint8)
 
 
-def _project(camera: Camera, points: np.ndarray, high: int) -> np.ndarray:
-    """Pixels right and up of the middle, and depth [m], (N, 3)."""
-    seen = (points - camera.eye) @ (camera.axes * [1, 1, -1])
-    focal = high / 2 / np.tan(np.radians(ANGLE) / 2)
-    depth = np.maximum(seen[:, 2:], 1e-6)
-    return np.concatenate([focal * seen[:, :2] / depth, seen[:, 2:]], axis=1)
+def _packed(colours: np.ndarray) -> np.ndarray:
+    """Colours (n, 3) in 0..1 as red, green, blue and full coverage, a byte each in one number (n,)."""
+    result = np.full((len(colours), 4), 255, np.uint8)
+    result[:, :3] = 255 * colours
+    return result.view(np.uint32).ravel()
