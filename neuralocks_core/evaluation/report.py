@@ -158,7 +158,7 @@ def check_plot(path: str | os.PathLike) -> Path:
     if path.suffix.lower() not in PLOTS:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(PLOTS)}")
     if find_spec("matplotlib") is None:
-        raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[preview]'")
+        raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[compare]'")
     return path
 
 

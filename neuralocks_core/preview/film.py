@@ -169,7 +169,7 @@ class Film:
         smooth = _blurred(centre, self._calm / step)
         # How far the head strays from the smooth path, so that a jump does not leave the picture.
         stray = np.abs(centre - smooth).max()
-        high = 0.15 + 0.60 * min(reach, 0.6) + 0.5 * min(stray, 0.3)
+        high = 0.15 + 0.60 * min(reach, 0.6) + 0.6 * min(stray, 0.3)
         front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
         front /= np.linalg.norm(front)
         # Where the face looks on average, so that a shot of somebody's back does not show the back only.

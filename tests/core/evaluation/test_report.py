@@ -44,7 +44,7 @@ def test_json_is_plain_and_says_null_for_what_was_not_measured():
 
 
 def test_plot_is_a_picture_and_never_half_written(tmp_path):
-    pytest.importorskip("matplotlib", reason="the extra 'preview' is not installed")
+    pytest.importorskip("matplotlib", reason="the extra 'compare' is not installed")
     path = card().plot(tmp_path / "curves.png")
     assert path.read_bytes().startswith(b"\x89PNG") and [path] == list(tmp_path.iterdir())
     with pytest.raises(NeuralocksError, match="a file, not a folder"):

@@ -58,7 +58,7 @@ def test_resolving_takes_hair_out_of_the_body(tmp_path, model):
 
 
 def test_the_command_draws_the_curves_of_the_card(rigid, tmp_path, capsys):
-    pytest.importorskip("matplotlib", reason="the extra 'preview' is not installed")
+    pytest.importorskip("matplotlib", reason="the extra 'compare' is not installed")
     with pytest.raises(SystemExit) as ended:
         main(["evaluate", str(rigid), "--json", "--groom", "/Body", "--plot", str(tmp_path / "tips.png")])
     assert ended.value.code == 0 and json.loads(capsys.readouterr().out)["grooms"]
