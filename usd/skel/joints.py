@@ -50,7 +50,9 @@ class JointSource:
         self.bind, self.rest = self._bind_and_rest(skeleton)
         self.placement = Placement(prim)
         source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
-        self.animation = source if source and source.IsA(UsdSkel.Animation) else None
+        self.animation = source if source and source.IsA(UsdSkel.Animation) and source.IsActive() else None
+        if source and not source.IsActive():
+            self._ignore(f"{source.GetPath()}: is inactive, so UsdSkel ignores it; activate it, or bind another animation")
         self._animation = UsdSkel.Animation(self.animation) if self.animation else None
         self._columns = self._animated_joints()
 
@@ -174,14 +176,18 @@ class JointSource:
             return None
         order = {str(name): i for i, name in enumerate(self._animation.GetJointsAttr().Get() or ())}
         pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
-        self.ignored = self._unusable_channel()
-        if not self.ignored and not pairs:
-            self.ignored = f"{self.animation.GetPath()}: animates no joint of {self.path}; check its joint paths"
-        if self.ignored:
-            self.notes.append(self.ignored)
+        why = self._unusable_channel()
+        if not why and not pairs:
+            why = f"{self.animation.GetPath()}: animates no joint of {self.path}; check its joint paths"
+        if why:
+            self._ignore(why)
             return None
         self._width = len(order)
         return pairs
+
+    def _ignore(self, why: str) -> None:
+        self.ignored = why
+        self.notes.append(why)
 
     def _unusable_channel(self) -> str | None:
         """What is wrong with a channel for which UsdSkel ignores the animation, None if nothing is."""

@@ -279,6 +279,18 @@ def test_an_animation_that_usd_ignores_is_named_as_such(tmp_path):
         bake_rig(tmp_path / "shot.usda", tmp_path / "out.usda", model)
 
 
+def test_an_animation_that_is_switched_off_is_not_played(tmp_path):
+    """USD shows the rest pose of a skeleton whose animation prim is inactive."""
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "shot.usda")))
+    stage = Usd.Stage.Open(str(tmp_path / "shot.usda"))
+    stage.GetPrimAtPath("/Who/Motion").SetActive(False)
+    stage.GetRootLayer().Save()
+    query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")))
+    assert not query.GetAnimQuery()
+    with pytest.raises(NeuralocksError, match="/Who/Motion: is inactive, so UsdSkel ignores it; activate it"):
+        bake_rig(tmp_path / "shot.usda", tmp_path / "out.usda", model)
+
+
 def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
     """They are read as if they did."""
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.5))
