@@ -15,7 +15,7 @@ from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import root_uv
 
-from ..border.arrays import floats, integers
+from ..border.arrays import floats, integers, row_matrix
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.units import LAYERS, Border, check_not_input, open_stage, write_stage
@@ -84,22 +84,29 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     return [each.groom for each in found], notes
 
 
-def write_groom(path, groom: Groom) -> Path:
+def write_groom(path, groom: Groom, border: Border | None = None) -> Path:
     """Write one groom; see `write_grooms`."""
-    return write_grooms(path, [Authored(groom)])
+    return write_grooms(path, [Authored(groom)], border)
 
 
-def write_grooms(path, grooms: list[Authored]) -> Path:
-    """Write grooms below one root prim `/Groom`: metres, Y up, at once under the final name.
+def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> Path:
+    """Write grooms below one root prim `/Groom`, at once under the final name.
+
+    Args:
+        path: USD file to write.
+        grooms: in metres, Y up.
+        border: of the stage that they are made for, whose unit and axis the file takes; metres and Y up if left out.
 
     Raises:
         NeuralocksError: the path has another ending or cannot be written.
     """
 
     def author(stage: Usd.Stage) -> None:
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, border.metres_per_unit if border else 1.0)
         root = UsdGeom.Xform.Define(stage, "/Groom")
+        if border and not np.array_equal(border.from_core, np.eye(4)):
+            root.AddTransformOp().Set(row_matrix(border.from_core))
         Usd.ModelAPI(root).SetKind("component")
         stage.SetDefaultPrim(root.GetPrim())
         for each in grooms:

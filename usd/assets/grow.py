@@ -32,7 +32,7 @@ def grow(
     head: str | None = None,
     tell: Callable[[list[str]], None] | None = None,
 ) -> Path:
-    """Grow a hairstyle on the head of a USD character and write it as a USD groom, in metres and Y up.
+    """Grow a hairstyle on the head of a USD character and write it as a USD groom, in the unit and axis of its file.
 
     Args:
         style: one of `neuralocks_core.hairstyles.STYLES`.
@@ -52,7 +52,7 @@ def grow(
     check_not_input(out, rig.source.prim.GetStage())
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
-    return write_groom(out, Barber(rig.character).grow(style, count, seed))
+    return write_groom(out, Barber(rig.character).grow(style, count, seed), rig.border)
 
 
 class Barber:

@@ -52,7 +52,9 @@ class JointSource:
         source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
         self.animation = source if source and source.IsA(UsdSkel.Animation) and source.IsActive() else None
         if source and not source.IsActive():
-            self._ignore(f"{source.GetPath()}: is inactive, so UsdSkel ignores it; activate it, or bind another animation")
+            self._ignore(
+                f"{source.GetPath()}: is inactive, so UsdSkel ignores it; activate it, or bind another animation"
+            )
         self._animation = UsdSkel.Animation(self.animation) if self.animation else None
         self._columns = self._animated_joints()
 

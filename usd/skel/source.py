@@ -71,7 +71,8 @@ class StageRig:
         ends = self.clip.joints[[0, -1], :, :3, :3]
         first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
         turn = np.degrees(angle_between(first, last))
-        turn[list(replaced)] = 0
+        for joint in replaced:  # and what hangs from it
+            turn[self.character.skeleton.below(joint)] = 0
         start, end = self.time_codes[[0, -1]]
         notes = []
         if turn.max() > LOOP_GAP:

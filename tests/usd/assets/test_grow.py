@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from usd.assets.groom import import_groom
 from usd.assets.grow import grow
-from usd.shot.stage import read_rigs
+from usd.shot.stage import read_rigs, read_shot
+
+from ..shots import Recipe, write_shot
 
 BODY = Path(__file__).resolve().parents[3] / "examples" / "shot" / "body.usdc"
 
@@ -26,6 +28,25 @@ def test_a_style_grows_on_the_head_and_is_repeatable(tmp_path):
     roots = points[0].reshape(60, -1, 3)[:, 0]
     centre = character.canonical_to_bind[:3, 3] + character.head_centre
     assert np.linalg.norm(roots - centre, axis=1).max() < 0.2
+
+
+@pytest.mark.parametrize("unit, up", [(0.01, "Z"), (0.0254, "Y")])
+def test_a_groom_suits_the_stage_of_its_character(tmp_path, unit, up):
+    """Laid over a character in another unit or axis, it sits on the head without a transform of the user's."""
+    shot = write_shot(tmp_path, Recipe(unit=unit, up=up))
+    groom = grow("bob", shot, tmp_path / "groom.usda", count=40)
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "both.usda"))
+    layer.subLayerPaths = [groom.name, shot.name]
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    UsdGeom.SetStageUpAxis(stage, up)
+    layer.Save()
+    read = read_shot(tmp_path / "both.usda", grooms=["/Groom"])
+    character, (item,) = read.rigs[0].character, read.grooms
+    roots = item.groom.points[item.groom.starts]
+    centre = character.canonical_to_bind[:3, 3] + character.facing.T @ character.head_centre
+    assert np.linalg.norm(roots - centre, axis=1).max() < 0.2
+    assert not any("counts in" in note for note in read.notes)
 
 
 def test_what_is_read_is_not_written_over(tmp_path):

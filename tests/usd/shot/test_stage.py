@@ -187,6 +187,7 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     turned[1, -1, :3, :3] = from_vector(np.array([0, 1e-4, 0])) @ turned[1, -1, :3, :3]
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
+    assert not replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes(replaced=[0])  # which carries all others
 
 
 @given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
