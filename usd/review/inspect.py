@@ -19,7 +19,7 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.units import OTHERS, Border, open_stage
 from ..rig.facing import facing_notes
-from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, weight_notes
+from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
 from ..shot.curves import find_curves, read_groom
@@ -148,7 +148,7 @@ def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
-    spoils += weight_notes(rig) + facing_notes(rig)
+    spoils += weight_notes(rig) + facing_notes(rig) + mirrored_notes(rig, chains)
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
     ]

@@ -24,7 +24,7 @@ from ..border.units import check_layer_name, check_not_input
 from ..shot.notes import written_notes
 from ..shot.stage import check_cuts, frame_range
 from .layer import write_rig_layer
-from .stage import RiggedHair, read_rigged_hair, rigged_notes
+from .stage import RiggedHair, mirrored_notes, read_rigged_hair, rigged_notes
 
 STILL = 1e-4
 """A rotation that differs by less from none is none."""
@@ -107,6 +107,7 @@ def bake_rig(
         *_resized(source.path, size),
         *rigged_notes(hair.source, model.spec.pose_joints),
         *_name_notes(source),
+        *mirrored_notes(hair.source, hair.rig.chains),
         *_held(hair, turns),
     ]
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)

@@ -205,6 +205,16 @@ def check_orients(source: StageRig, chains: HairChains) -> None:
             )
 
 
+def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:
+    """Which hair joint, or joint that carries one, the animation mirrors; what hangs from it is mirrored alike."""
+    joints = np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)]))
+    flipped = (np.linalg.det(source.clip.joints[:, joints, :3, :3]) < 0).any(axis=0)
+    if not flipped.any():
+        return []
+    name = leaf(source.source.names[joints[np.argmax(flipped)]])
+    return [f"{source.path}: hair joint '{name}' is mirrored by its animation; remove the negative scale"]
+
+
 def _with_path(prim: Usd.Prim, error: Exception) -> str:
     text, path = str(error), str(prim.GetPath())
     return text if text.startswith((path, "--", "model")) else f"{path}: {text.removeprefix('skeleton: ')}"

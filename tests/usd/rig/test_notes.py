@@ -141,3 +141,18 @@ def test_a_character_in_another_format_is_told_the_way_to_usd(tmp_path, ending, 
             NeuralocksError, match=f"who.{ending}: not a readable USD file .*import it into Blender .*{how}"
         ):
             use(path)
+
+
+def test_hair_that_the_animation_mirrors_is_told(edited, tmp_path):
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda")))
+
+    def mirror(stage):
+        scales = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetScalesAttr()
+        values = list(scales.Get(1.0))
+        values[3] = Gf.Vec3h(-1, 1, 1)
+        scales.Set(values, 1.0)
+
+    shot = edited(mirror)
+    said = "hair joint 'hair_1' is mirrored by its animation"
+    assert any(said in note for note in bake_rig(shot, tmp_path / "out.usda", model).notes)
+    assert any(said in note for note in inspect(shot)["spoils"])
