@@ -30,7 +30,6 @@ class Runtime:
         described = json.loads((folder / "description.json").read_text("utf-8"))
         self.model, self.parts = described["model"], described["boundary vector"]["parts"]
         self.weights = np.array(described["boundary vector"]["bin weights"])
-        self.joints = described["grooms"]["files"][name]["joints"]
         self.fixed = dict(np.load(folder / name))
         self.frame, self.tail = (onnxruntime.InferenceSession(folder / f"{n}.onnx") for n in ("frame", "tail"))
         material = DEFAULT | material
@@ -102,6 +101,12 @@ def limited(vectors: np.ndarray, longest: float) -> np.ndarray:
     return vectors * np.minimum(1, longest / np.maximum(length, 1e-9))
 
 
+def joints_of(facts: dict) -> list[str]:
+    """Paths of the joints that a groom's boundary vector is made of: head, upper chest, pose joints."""
+    joints = facts["joints"]
+    return [joints["head"], joints["upper chest"], *joints["pose"]]
+
+
 class Motion:
     """Joints' world transforms at any time, as a bake reads them from a stage; an engine has its own way."""
 
@@ -147,7 +152,7 @@ def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str
     files = json.loads((folder / "description.json").read_text("utf-8"))["grooms"]["files"]
     stage, result, worst = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), 0.0
     for name, facts in files.items():
-        runtime, motion = Runtime(folder, name, material), Motion(stage, facts["joints"])
+        runtime, motion = Runtime(folder, name, material), Motion(stage, joints_of(facts))
         boundary = runtime.model["boundary"]
         curves = UsdGeom.BasisCurves(result.GetPrimAtPath(facts["prim"]))
         check_even(stage, facts["prim"])

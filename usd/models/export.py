@@ -1,66 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Unpack a model for other runtimes: plain ONNX files and a description of their inputs."""
+"""Unpack a model for other runtimes: plain ONNX files and `description.json`, which says how to feed them."""
 
 import json
 from contextlib import ExitStack
 from pathlib import Path
 
 from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.materials import Material
-from neuralocks_core.measures import MEASURES
 
 from ..border.stopping import check
-
-UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
-
-GRAPHS = {
-    "encoder.onnx": "once a groom: `shape` (S, 72), root-relative points of 24 vertices in scalp axes [m] "
-    "-> `code` (S, 32)",
-    "strand.onnx": "once a groom: `strand` (S, 70): root UV 2, own code 32, mean code of its lock 32, root normal 3, "
-    "length 1 [m] -> `strand_part` (S, 256)",
-    "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, 256), and where the frame "
-    "changes the weights behind, `middle` (256, 256) and `out` (256, 72)",
-    "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
-    "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
-    "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
-    "rig.onnx": "`features` (B, F) of B characters: pose, gravity and history of the boundary vector -> `turns` (B, joints, 4) "
-    "wxyz, joints as in the model's `chains`: local rotation now = local rotation in the bind pose * turn. The C header of "
-    "`neuralocks rig export-c` makes the features, too",
-}
-
-BOUNDARY = {
-    "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), (3, 3) without "
-    "scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m",
-    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 but for upper arms",
-    "gravity": "T(R_head(t)) g / 9.81",
-    "shape": "ten lengths of the bind body [m], as in `held`",
-    "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; 0, since clumping is no input",
-    "history": "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the head joint's place and t_k = t - k dt: "
-    "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
-    "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
-    "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
-    "its `bin weights`. In a held pose all is 0. A bake reads poses between samples from a natural cubic spline of the place "
-    "and of the quaternion's components; before the first sample the head goes on in a straight line and does not turn",
-}
-"""How each part of the boundary vector is made, for a model whose `linear` is "gravity", as those shipped."""
-
-SLIDERS = {
-    "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, `anchor` anew: `offsets` of "
-    "tail.onnx with `anchor` zero and the frame `held`",
-    "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
-    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g}) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 "
-    f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
-    "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
-    "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
-    "it, scaled to the rest edge's length",
-    "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
-    "goes on in a straight line and does not turn. A bake finds cuts, or is told them (`--cuts`)",
-    "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
-}
-"""What an artist or a game changes, and what it does to what is above."""
+from .description import described
 
 
 def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None, joints=None) -> list[Path]:
@@ -84,21 +34,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         raise NeuralocksError(
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
-    training = {name: value for name, value in (file.meta.get("training") or {}).items() if name != "curve"}
-    description = {"units": UNITS, "graphs": _graphs(file)}
-    spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
-    description["boundary vector"] = {
-        "length": spec.size,
-        "parts": {name: [part.start, part.stop] for name, part in spec.slices.items()},
-        "pose joints": spec.pose_joints,
-        "shape": MEASURES,
-        "steps": spec.steps,
-        "bin weights": [float(weight) for weight in spec.bin_weights],
-        "how": BOUNDARY,
-    }
-    if file.kind == "strands":
-        description["sliders"] = SLIDERS
-    description["model"] = file.meta | {"training": training}
+    description = described(file)
     tables = {}
     with ExitStack() as all_or_none:
 
@@ -115,17 +51,3 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
             put(name).write_bytes(data)
         check()
     return [folder / name for name in (*files, *tables)]
-
-
-def _graphs(file: model_file.ModelFile) -> dict:
-    from neuralocks_core.runtime import graph_session
-
-    result = {}
-    for name in file.graphs:
-        session = graph_session(file, name)
-        result[name] = {
-            "what": GRAPHS[name],
-            "inputs": {i.name: i.shape for i in session.get_inputs()},
-            "outputs": {o.name: o.shape for o in session.get_outputs()},
-        }
-    return result

@@ -30,8 +30,10 @@ ARRAYS = {
     "held": "(F,) float32, boundary vector of the bind pose, held",
     "facing": "(3, 3) float64, rotation from bind-world to canonical axes",
     "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint: its world transform times this "
-    "takes strands to the world",
-    "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints named, in their order",
+    "takes strands to the world, metres and Y up. Of that transform the linear part is the joint's rotation times its size "
+    "since the bind pose, 1 where it has not grown, whatever the unit of the stage",
+    "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints that `joints` names: head, upper chest, then the "
+    "pose joints",
     "stance": "(p, 3, 3) float64, of the pose joints in their order",
     "length": "(S,) float32, of each strand [m], for `clumping`",
     "lock": "(S,) int32, each strand's lock, a row of the three that follow",
@@ -52,7 +54,7 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
         grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
-        File name -> {"prim", "strands", "joints": joint paths of head, upper chest and the pose joints}.
+        File name -> {"prim", "strands", "joints": {"head": joint path, "upper chest": joint path, "pose": joint paths}}.
 
     Raises:
         NeuralocksError: what stops a bake of the shot.
@@ -80,7 +82,7 @@ def file_names(paths: list[str]) -> list[str]:
     return [f"{name}.npz" for name in names]
 
 
-def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], list[str]]:
+def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], dict]:
     """ARRAYS of one groom, and the joints whose motion its boundary vector is made of."""
     character = item.attachment.character
     sampler = model.sampler(character, item.attachment.rig.clip)
@@ -107,4 +109,5 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
         "lock_anchor": led.anchor_offsets,
         "lock_edges": rest_edges(locks.strands.rest),
     }
-    return arrays, [skeleton.names[joint] for joint in sampler.joints]
+    head, chest, *pose = (skeleton.names[joint] for joint in sampler.joints)
+    return arrays, {"head": head, "upper chest": chest, "pose": pose}

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is exported says how to feed it."""
+
+import json
+
+import numpy as np
+import onnxruntime
+import pytest
+
+from neuralocks_core import model as model_file
+from neuralocks_core.rig import RigModel
+from neuralocks_core.rig.network import held_features
+from neuralocks_core.rotation import from_vector
+from usd.models.export import export_model
+
+
+@pytest.mark.parametrize(
+    ("kind", "graph", "entry"), [("strands", "frame.onnx", "boundary vector"), ("rig", "rig.onnx", "features")]
+)
+def test_the_parts_of_the_input_are_those_of_the_graph(tmp_path, kind, graph, entry):
+    export_model(model_file.shipped(kind), tmp_path)
+    described = json.loads((tmp_path / "description.json").read_text("utf-8"))
+    parts = described[entry]["parts"]
+    assert [0, *(end for _, end in parts.values())] == [
+        *(start for start, _ in parts.values()),
+        described[entry]["length"],
+    ]
+    (shape,) = described["graphs"][graph]["inputs"].values()
+    assert shape[1] == described[entry]["length"] and parts.keys() <= described[entry]["how"].keys()
+
+
+def test_a_rig_is_fed_as_its_description_says(tmp_path):
+    """A held pose, from the text alone: the first two columns of what neck and upper chest are turned against the head."""
+    export_model(model_file.shipped("rig"), tmp_path)
+    described = json.loads((tmp_path / "description.json").read_text("utf-8"))["features"]
+    head, neck, chest = from_vector(np.random.default_rng(0).normal(0, 0.4, (3, 3)))
+    given = np.zeros((1, described["length"]), np.float32)
+    given[0, slice(*described["parts"]["pose"])] = np.concatenate(
+        [(head.T @ joint)[:, column] for joint in (neck, chest) for column in (0, 1)]
+    )
+    given[0, slice(*described["parts"]["gravity"])] = head.T @ [0, -1, 0]
+    (turns,) = onnxruntime.InferenceSession(tmp_path / "rig.onnx").run(None, {"features": given})
+    model = RigModel.load()
+    relative = np.stack([head.T @ neck, head.T @ chest])[None]
+    ours = model.evaluate(held_features(model.spec, relative, (head.T @ [0, -1, 0])[None]))
+    assert turns == pytest.approx(ours, abs=1e-5)
