@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edits of live hair's points by others: applied transforms, a moved origin, applied modifiers. Live points are not the
-hair's rest shape, so what was done to them is done to that.
+hair's rest shape, so what was done to them is done to that; or it is told that this cannot be. A rest shape that was
+deleted is put back.
 """
 
 import zlib
@@ -30,12 +31,14 @@ class Written(NamedTuple):
         points: (P, 3) float32 in the object's space.
         places: the object's transforms (4, 4) then, its own and in the world.
         modifiers: names of its modifiers.
+        rest: the rest shape, (P, 3) float32.
     """
 
     of: object
     points: np.ndarray
     places: tuple[np.ndarray, np.ndarray]
     modifiers: tuple[str, ...]
+    rest: np.ndarray
 
 
 class Followed(NamedTuple):
@@ -46,28 +49,34 @@ class Followed(NamedTuple):
         of: the curves.
         rest: checksum of the rest shape before.
         points: (P, 3) float32 after.
-        change: the transform (4, 4).
+        change: the transform (4, 4); or, in words, what cannot be done to the rest shape.
     """
 
     of: object
     rest: int
     points: np.ndarray
-    change: np.ndarray
+    change: np.ndarray | str
 
 
-def write(hair, points: np.ndarray, world: np.ndarray) -> None:
-    """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them."""
+def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None:
+    """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them and its rest shape (P, 3)."""
     curves.write(hair.data, points)
-    places = matrix(hair.matrix_basis), world
-    session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, tuple(hair.modifiers.keys()))
+    places, modifiers = (matrix(hair.matrix_basis), world), tuple(hair.modifiers.keys())
+    session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, modifiers, rest)
 
 
 def touched(hair) -> bool:
-    """Whether something was done to the points since they were written."""
+    """Whether something was done to the points since they were written, or their rest shape is gone."""
     before, data = session.written.get(hair.name_full), hair.data
-    if before is None or before.of != identity(data) or len(before.points) != len(data.points):
+    if before is None:
         return False
-    return not np.array_equal(curves.shown(data), before.points)
+    if len(before.points) == len(data.points):
+        if np.array_equal(curves.shown(data), before.points):
+            return not curves.has_rest(data)
+        if before.of == identity(data):
+            return True
+    # Other strands, or others' curves, are no edit; what a modifier made of these is, and may be in new curves.
+    return bool(_applied(hair, before))
 
 
 def follow(hair, sampled, world: np.ndarray) -> None:
@@ -83,29 +92,29 @@ def follow(hair, sampled, world: np.ndarray) -> None:
     """
     name, data = hair.name_full, hair.data
     before = session.written.get(name)
-    if not curves.has_rest(data):
-        return
-    if before is None and _follow_again(data):
+    if before is None and curves.has_rest(data) and _follow_again(hair):
         sampled.stale = session.wanting = True  # it may have stood otherwise then
     if not touched(hair):
         return
     now = curves.shown(data)
     del session.written[name]
+    same = len(now) == len(before.points)
+    if same and not curves.has_rest(data):
+        curves.put_aside(data, before.rest)
+        if np.array_equal(now, before.points):
+            return
     # What is applied to the points is taken from the object's own transform; or, where its parent's was applied with it,
     # from where it stands in the world.
-    for then, place in zip(before.places, (matrix(hair.matrix_basis), world), strict=True):
+    for then, place in zip(before.places, (matrix(hair.matrix_basis), world), strict=True) if same else ():
         change = inverse(place) @ then
         moved = transformed(before.points, change)
         if np.abs(moved - now).max() <= ROUNDING * np.abs(moved).max():
             break
     else:
-        gone = [f"'{modifier}' was applied to it" for modifier in before.modifiers if modifier not in hair.modifiers]
-        hair.neuralocks_hair.live = False
-        raise NeuralocksError(
-            f"{name}: {[*gone, 'its points were changed'][0]} while it was moved; that is lost, because Live puts "
-            "the points back to rest; undo, and do it with Live off"
-        )
-    session.followed[:] = [*session.followed[-KEPT:], Followed(before.of, _checksum(data), now, change)]
+        change = [*_applied(hair, before), "its points were changed"][0]
+    session.followed[:] = [*session.followed[-KEPT:], Followed(identity(data), _checksum(data), now, change)]
+    if isinstance(change, str):
+        _refuse(hair, change)
     curves.move_rest(data, change)
     session.doubtful.add(name)
     if name in sampled.bind_places:  # the hair is where it was, in another space
@@ -114,14 +123,30 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         sampled.motion.places[name] = sampled.motion.places[name] @ back
 
 
-def _follow_again(data) -> bool:
+def _applied(hair, before: Written) -> list[str]:
+    """What was done to hair by modifiers that are gone."""
+    return [f"'{name}' was applied to it" for name in before.modifiers if name not in hair.modifiers]
+
+
+def _refuse(hair, what: str) -> None:
+    hair.neuralocks_hair.live = False
+    raise NeuralocksError(
+        f"{hair.name_full}: {what} while it was moved, which is lost, for its rest shape cannot follow; "
+        "undo, and do it with Live off"
+    )
+
+
+def _follow_again(hair) -> bool:
     """Do to the rest shape what was done to the points, where an undo has brought these back; whether anything was ever
     done to them.
     """
+    data = hair.data
     own = [each for each in session.followed if each.of == identity(data)]
     if own:
         now, rest = curves.shown(data), _checksum(data)
         again = [each.change for each in own if each.rest == rest and np.array_equal(each.points, now)]
+        if again and isinstance(again[0], str):
+            _refuse(hair, again[0])
         if again:
             curves.move_rest(data, again[0])
     return bool(own)

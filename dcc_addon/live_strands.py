@@ -87,7 +87,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     points = prepared.points(*wanted)
     curves.keep_rest(hair.data)
     mute_deformers(hair)
-    edited.write(hair, points, place)
+    edited.write(hair, points, place, prepared.rest)
     joined.remember(hair, prepared.made_of[0])
     hair.data.update_tag()
     if graph.mode == "RENDER" and bpy.app.version < (4, 0):
@@ -182,7 +182,7 @@ def _recipe(hair, sampled, wanted: tuple):
     def make(say) -> LiveHair:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
         prepared = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
-        prepared.made_of, prepared.of, prepared.file = made_of, of, file
+        prepared.made_of, prepared.rest, prepared.of, prepared.file = made_of, own, of, file
         prepared.follow(sampled.clip)
         prepared.points(*wanted)
         return prepared
@@ -248,6 +248,7 @@ def show_all_rest() -> None:
     for data in bpy.data.hair_curves:
         if data.library is None:
             curves.restore_rest(data)
+    session.written.clear()
 
 
 def show_rest(hair) -> None:
@@ -261,6 +262,7 @@ def _restore(hair) -> None:
     """Give the curves of an object their rest shape back, that of hair which was joined to them as well."""
     joined.settle(hair)
     curves.restore_rest(hair.data)
+    session.written.pop(hair.name_full, None)
 
 
 def _give_up(hair, message: str) -> None:

@@ -8,13 +8,14 @@ undone with the hair; the absence of the attribute says that the points themselv
 import bpy
 import numpy as np
 
+from neuralocks_core import rest_copy
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from . import unbound
 from .nodes import geometry_nodes
 
-REST = "neuralocks_rest"
+REST = rest_copy.NAME
 TYPES = ("CATMULL_ROM", "POLY", "BEZIER", "NURBS")
 """By the number that Blender keeps in the attribute `curve_type`."""
 KEEPS_CACHES = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_rna.functions
@@ -75,7 +76,9 @@ def kind(data) -> str:
 def has_rest(data) -> bool:
     """Whether the rest shape is kept aside because the points are moved."""
     attribute = data.attributes.get(REST)
-    return attribute is not None and len(attribute.data) == len(data.points)
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
+        return False  # also where it was converted by hand
+    return len(attribute.data) == len(data.points)
 
 
 def keep_rest(data) -> None:
@@ -95,15 +98,20 @@ def keep_rest(data) -> None:
             "Relations > Make Single User > Object & Data)"
         )
     if has_rest(data):
-        if _without_rest(_read(data, REST)).any():  # strands that were joined are about to be moved, too
+        if rest_copy.never_written(_read(data, REST)).any():  # strands that were joined are about to be moved, too
             _keep(data, _rest(data))
         return
     kind(data)
+    put_aside(data, _read(data, "position"))
+
+
+def put_aside(data, values: np.ndarray) -> None:
+    """Keep (P, 3) float32 as rest shape where none is kept."""
     stale = data.attributes.get(REST)
     if stale is not None:  # the strands were edited since: the old rest shape fits them no longer
         data.attributes.remove(stale)
     data.attributes.new(REST, "FLOAT_VECTOR", "POINT")
-    _keep(data, _read(data, "position"))
+    _keep(data, values)
 
 
 def move_rest(data, matrix: np.ndarray, part: slice = slice(None)) -> None:
@@ -207,7 +215,7 @@ def _rest(data) -> np.ndarray:
     is: they are at rest as they are.
     """
     values = _read(data, REST)
-    bare = _without_rest(values)
+    bare = rest_copy.never_written(values)
     if bare.any():
         values[bare] = _read(data, "position")[bare]
     return _unmarked(values)
@@ -224,8 +232,3 @@ def _unmarked(values: np.ndarray) -> np.ndarray:
     """The same array, where points at the origin begin with a plain zero."""
     values[~values.any(axis=1), 0] = 0.0
     return values
-
-
-def _without_rest(values: np.ndarray) -> np.ndarray:
-    """Which points of a rest shape were never written."""
-    return ~(values.any(axis=1) | np.signbit(values[:, 0]))

@@ -27,10 +27,12 @@ class LiveHair:
 
     Attributes:
         made_of: whatever tells its maker that it must be made again.
+        rest: whatever its maker made the groom's points of.
         of, file: whatever tells its maker quickly that it is of other curves, or of a model file that was replaced.
     """
 
     made_of: object = None
+    rest: object = None
     of: object = None
     file: object = None
 

@@ -74,6 +74,13 @@ def apart(a, b):
     return float(np.abs(a - b).max())
 
 
+def choose(thing):
+    """Select an object alone, and make it the active one."""
+    for other in bpy.data.objects:
+        other.select_set(other == thing)
+    bpy.context.view_layer.objects.active = thing
+
+
 def own_handlers():
     """Handlers of the add-on on any of Blender's lists."""
     lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers))

@@ -11,7 +11,7 @@ import numpy as np
 from dcc_addon.scene.nodes import geometry_nodes
 from neuralocks_core.model import shipped
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
+from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, points_at, refused
 
 
 def rearranged(_folder: Path) -> None:
@@ -189,7 +189,7 @@ def applied(_folder: Path) -> None:
         if live:
             make_live(rig, strands)
             before = points_at(strands, 9)
-        _choose(strands)
+        choose(strands)
         change(strands)
         bpy.context.view_layer.update()
         moved = apart(points_at(strands, 9), before) if len(strands.data.points) * 3 == before.size else None
@@ -228,7 +228,7 @@ def applied(_folder: Path) -> None:
     strands.modifiers.new("Frizz", "NODES").node_group = tree
     make_live(rig, strands)
     points_at(strands, 9)
-    _choose(strands)
+    choose(strands)
     bpy.ops.object.modifier_apply(modifier="Frizz")
     points_at(strands, 10)
     assert "'Frizz' was applied" in messages()["Hair"] and not strands.neuralocks_hair.live
@@ -319,12 +319,6 @@ def hidden_prop(folder: Path) -> None:
         head.keyframe_insert("scale", frame=frame)
     scene.frame_set(3)
     refused(bpy.ops.neuralocks.sample_motion, "bone 'head'", "zero scale in frame 6")
-
-
-def _choose(thing) -> None:
-    for other in bpy.data.objects:
-        other.select_set(other == thing)
-    bpy.context.view_layer.objects.active = thing
 
 
 class _Returned:

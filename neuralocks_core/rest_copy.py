@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The copy of a groom's points at rest that lies beside points which Blender's live view has moved: an attribute of the
+curves there, and a primvar where Blender's own exporter has written them as USD.
+"""
+
+import numpy as np
+
+NAME = "neuralocks_rest"
+
+
+def never_written(values: np.ndarray) -> np.ndarray:
+    """Which points (P,) of a copy (P, 3) have none: zeros, as whoever adds points fills all attributes with. A point that
+    rests at the origin has a negative zero first.
+    """
+    return ~(values.any(axis=1) | np.signbit(values[:, 0]))
