@@ -27,14 +27,14 @@ class Written(NamedTuple):
     """What the live view wrote last.
 
     Attributes:
-        of: the curves that it was written to.
+        of: the hair object and the curves that it was written to.
         points: (P, 3) float32 in the object's space.
         places: the object's transforms (4, 4) then, its own and in the world.
         modifiers: names of its modifiers.
         rest: the rest shape, (P, 3) float32.
     """
 
-    of: object
+    of: tuple
     points: np.ndarray
     places: tuple[np.ndarray, np.ndarray]
     modifiers: tuple[str, ...]
@@ -61,19 +61,22 @@ class Followed(NamedTuple):
 def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None:
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them and its rest shape (P, 3)."""
     curves.write(hair.data, points)
-    places, modifiers = (matrix(hair.matrix_basis), world), tuple(hair.modifiers.keys())
-    session.written[hair.name_full] = Written(identity(hair.data), points.copy(), places, modifiers, rest)
+    of, places = (identity(hair), identity(hair.data)), (matrix(hair.matrix_basis), world)
+    session.written[hair.name_full] = Written(of, points.copy(), places, tuple(hair.modifiers.keys()), rest)
 
 
 def touched(hair) -> bool:
-    """Whether something was done to the points since they were written, or their rest shape is gone."""
+    """Whether something was done to the points since they were written, or their rest shape is gone. Modifiers that went
+    without doing anything are forgotten.
+    """
     before, data = session.written.get(hair.name_full), hair.data
-    if before is None:
+    if before is None or before.of[0] != identity(hair):
         return False
     if len(before.points) == len(data.points):
         if np.array_equal(curves.shown(data), before.points):
+            session.written[hair.name_full] = before._replace(modifiers=tuple(hair.modifiers.keys()))
             return not curves.has_rest(data)
-        if before.of == identity(data):
+        if before.of[1] == identity(data):
             return True
     # Other strands, or others' curves, are no edit; what a modifier made of these is, and may be in new curves.
     return bool(_applied(hair, before))
