@@ -4,6 +4,7 @@
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
+from neuralocks_core import rest_copy
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rotation import transformed
@@ -47,7 +48,7 @@ def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
 
 
 def rest_points(prim: Usd.Prim) -> np.ndarray:
-    """(P, 3) float32 points at rest in the prim's own space and units.
+    """(P, 3) float32 points at rest in the prim's own space and units: those that Blender's live view kept, where there are.
 
     Raises:
         NeuralocksError: there are none.
@@ -57,7 +58,8 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
         raise NeuralocksError(
             f"{prim.GetPath()}: the groom has no points; give it its rest shape as default-time points"
         )
-    return np.asarray(points, np.float32)
+    kept = _kept(prim)
+    return np.asarray(points, np.float32) if kept is None else kept
 
 
 def ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
@@ -71,6 +73,8 @@ def ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
 
 def moment(prim: Usd.Prim) -> float | None:
     """Time code of the points at rest, where they are taken from one sample of a moving cache."""
+    if _kept(prim) is not None:
+        return None
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
     if points.Get(Usd.TimeCode.Default()) is not None or not points.ValueMightBeTimeVarying():
         return None
@@ -105,6 +109,14 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
     """
     curves, path = UsdGeom.BasisCurves(prim), str(prim.GetPath())
     points = rest_points(prim)
+    if _copy(prim):
+        fact = "does not fit its points, which are moved already; export it with Live off"
+        if _kept(prim) is not None:
+            fact = (
+                "is its shape at rest, without what modifiers do; to have its points instead, export it with Live off, or "
+                "remove that primvar"
+            )
+        notes.append(f"{path}: was exported from Blender while Live was on; primvars:{rest_copy.NAME} {fact}")
     if (when := moment(prim)) is not None:
         notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
     counts = _counts(curves)
@@ -123,6 +135,22 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         guides=None if guides is None else guides.astype(bool),
         group=None if group is None else group.astype(np.int32),
     )
+
+
+def _kept(prim: Usd.Prim) -> np.ndarray | None:
+    """(P, 3) float32 points at rest that the Blender add-on kept beside live ones; None where it did not, or not for all."""
+    copy = _copy(prim)
+    if copy is None:
+        return None
+    kept, points = np.asarray(rest_primvar(copy)), rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
+    if kept.dtype != np.float32 or kept.shape != np.shape(points) or rest_copy.never_written(kept).any():
+        return None
+    return kept
+
+
+def _copy(prim: Usd.Prim) -> UsdGeom.Primvar | None:
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(rest_copy.NAME)
+    return primvar if primvar and primvar.HasValue() else None
 
 
 def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:

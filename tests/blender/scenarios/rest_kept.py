@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The rest shape of live hair, while modifiers are applied that change how many points there are, and while the attribute
-that it lies in is changed by hand.
+that it lies in is changed by hand, and in files that Blender's own exporter writes.
 """
 
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -12,7 +13,7 @@ from dcc_addon.handlers import on_update
 from dcc_addon.scene import curves
 from dcc_addon.scene.nodes import geometry_nodes
 from tests.blender import scenes
-from tests.blender.checks import apart, choose, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, needs_usd, points_at
 
 
 def applied_to_other_points(_folder: Path) -> None:
@@ -50,6 +51,28 @@ def applied_to_other_points(_folder: Path) -> None:
             bpy.ops.ed.redo()
             strands = bpy.data.objects["Hair"]
             assert "'Grown' was applied" in messages()["Hair"] and not strands.neuralocks_hair.live, messages()
+
+
+def strands_after_a_modifier(_folder: Path) -> None:
+    """Strands that are added to live hair from which a modifier was removed before are no work of that modifier."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    if not hasattr(strands.data, "add_curves"):
+        raise SkipTest("no strands can be added yet")
+    modifier = strands.modifiers.new("Grown", "NODES")
+    modifier.node_group = _frizz()
+    make_live(rig, strands)
+    points_at(strands, 9)
+    strands.modifiers.remove(modifier)
+    bpy.context.view_layer.update()
+    strands.data.add_curves([24])
+    end = np.float32([[0, 0.05, 1.7 - 0.01 * k] for k in range(24)])
+    curves.write(strands.data, np.concatenate([curves.shown(strands.data)[:-24], end]))
+    strands.data.update_tag()
+    bpy.context.view_layer.update()
+    assert strands.neuralocks_hair.live and not messages(), messages()
+    assert apart(curves.points(strands.data)[-24:], end) == 0.0
 
 
 def attribute_gone(_folder: Path) -> None:
@@ -93,6 +116,27 @@ def attribute_gone(_folder: Path) -> None:
         assert strands.neuralocks_hair.live and not messages(), messages()
     strands.neuralocks_hair.live = False
     assert np.array_equal(curves.shown(strands.data), groom)
+
+
+def exported_by_blender(folder: Path) -> None:
+    """Blender's own exporter writes live hair as it is shown, and its rest shape beside it: a bake moves that, and no hair
+    twice.
+    """
+    needs_usd()
+    from usd.baking.bake import bake
+
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig, (-11, 24))
+    make_live(rig, scenes.hair(rig, 20), resolve=False)
+    shown = {frame: points_at(bpy.data.objects["Hair"], frame) for frame in (2, 13)}
+    bpy.context.scene.frame_set(9)
+    file, baked = folder / "export.usdc", folder / "baked.usdc"
+    bpy.ops.wm.usd_export(filepath=str(file), export_animation=True, export_armatures=True, export_materials=False)
+    result = bake(file, baked, Path(MODEL), resolve=False)
+    assert any("Live was on" in note for note in result.notes), result.notes
+    for frame, points in shown.items():
+        assert apart(baked_points(baked, result.grooms[0]["path"], frame), points) < SAME, frame
 
 
 def _apply() -> None:

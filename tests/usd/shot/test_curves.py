@@ -8,11 +8,13 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
+from neuralocks_core.rest_copy import NAME
 from usd.assets.groom import import_groom
-from usd.shot.curves import left_as_they_are, read_groom
+from usd.baking.bake import bake
+from usd.shot.curves import left_as_they_are, moment, read_groom
 
 from ...core.formats.groom_files import write_hair
-from ..shots import Recipe, write_shot
+from ..shots import Recipe, samples, world_points, write_shot
 
 COUNTS = [2, 3, 2]
 POINTS = np.arange(21, dtype=np.float32).reshape(7, 3)
@@ -82,6 +84,55 @@ def test_caches_may_repeat_their_counts_but_not_change_them():
     curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)
     with pytest.raises(NeuralocksError, match="/Hair: its curveVertexCounts at time code 3 are not those at rest"):
         read_groom(curves.GetPrim(), np.eye(4), [])
+
+
+@pytest.mark.parametrize("cache", [False, True])
+def test_hair_that_was_exported_live_moves_once(tmp_path, model, cache):
+    """The points at rest that Blender's live view kept count, not those that it showed, one set or many."""
+    recipe = Recipe(bound="none", strands=5, vertices=4)
+    plain, live = write_shot(tmp_path, recipe, "plain"), write_shot(tmp_path, recipe, "live")
+    stage = Usd.Stage.Open(str(live))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    rest = np.array(curves.GetPointsAttr().Get())
+    UsdGeom.PrimvarsAPI(curves).CreatePrimvar(NAME, Sdf.ValueTypeNames.Float3Array, "vertex").Set(
+        Vt.Vec3fArray.FromNumpy(rest)
+    )
+    curves.GetPointsAttr().Clear()
+    for code in (1, 2) if cache else (Usd.TimeCode.Default(),):
+        curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(rest + np.float32(0.05)), code)
+    stage.GetRootLayer().Save()
+    bake(plain, tmp_path / "plain_bake.usdc", model)
+    notes = bake(live, tmp_path / "live_bake.usdc", model).notes
+    assert any("exported from Blender while Live was on" in note for note in notes)
+    for frame in (1, 6):
+        baked = [world_points(tmp_path / f"{name}_bake.usdc", frame) for name in ("plain", "live")]
+        assert np.array_equal(*baked)
+    if cache:
+        assert np.array_equal(samples(tmp_path / "live_bake.usdc", "points"), rest), "the bake's own default"
+
+
+@pytest.mark.parametrize(
+    ("kept", "counts"),
+    [
+        (POINTS + 1, True),
+        (np.where(np.arange(7)[:, None] == 3, np.float32([-0.0, 0, 0]), POINTS + 1), True),
+        (np.where(np.arange(7)[:, None] == 3, np.float32(0), POINTS + 1), False),
+        (POINTS[:5] + 1, False),
+    ],
+    ids=["all", "one at the origin", "one never written", "of other points"],
+)
+def test_a_rest_shape_that_was_kept_counts_where_it_is_whole(kept, counts):
+    stage = Usd.Stage.CreateInMemory()
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    for code in (1, 2):
+        curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(POINTS), code)
+    curves.CreateCurveVertexCountsAttr(COUNTS)
+    primvar = UsdGeom.PrimvarsAPI(curves).CreatePrimvar(NAME, Sdf.ValueTypeNames.Float3Array, "vertex")
+    primvar.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(kept, np.float32)), 2)
+    notes = []
+    assert np.array_equal(read_groom(curves.GetPrim(), np.eye(4), notes).points, kept if counts else POINTS)
+    assert (moment(curves.GetPrim()) is None) == counts
+    assert ("is its shape at rest" if counts else "does not fit its points") in notes[0]
 
 
 def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
