@@ -88,9 +88,12 @@ def keep_rest(data) -> None:
         NeuralocksError: the data belongs to another file, or to several objects, or cannot be moved by its points.
     """
     if data.library is not None or data.override_library is not None:
+        moved = (
+            "; they are not at rest there, for it was no Save that wrote them: save that file" if has_rest(data) else ""
+        )
         raise NeuralocksError(
             f"{data.name}: its curves are linked from another file and cannot be moved here; make them local (Object > "
-            "Relations > Make Local > Selected Objects and Data), or use Bake and Attach"
+            f"Relations > Make Local > Selected Objects and Data), or use Bake and Attach{moved}"
         )
     if data.users - data.use_fake_user > 1:
         raise NeuralocksError(

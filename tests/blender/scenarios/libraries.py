@@ -164,6 +164,36 @@ def beside_the_file(folder: Path) -> None:
     assert Path(model_path(strands)) == shots / "other.neuralocks"
 
 
+def written_by_a_script(folder: Path) -> None:
+    """What a script wrote into a library while Live was on is at rest where it is appended, and says so where it is linked."""
+    from dcc_addon.scene import curves
+
+    file = str(folder / "library.blend")
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    groom = curves.points(strands.data)
+    make_live(rig, strands)
+    points_at(strands, 9)
+    bpy.data.libraries.write(file, {rig, strands})
+    for link in (False, True):
+        scenes.empty()
+        with bpy.data.libraries.load(file, link=link) as (_, wanted):
+            wanted.objects = ["Rig", "Hair"]
+        for thing in wanted.objects:
+            bpy.context.scene.collection.objects.link(thing)
+        bpy.context.scene.neuralocks.armature, strands = wanted.objects
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        points_at(strands, 9)
+        assert apart(curves.points(strands.data), groom) == 0.0
+        if link:
+            assert "save that file" in messages()[strands.name_full], messages()
+        else:
+            assert not messages(), messages()
+            strands.neuralocks_hair.live = False
+            assert apart(curves.shown(strands.data), groom) == 0.0
+
+
 def appended(folder: Path) -> None:
     """Appended hair finds the model that is beside its own file, where Blender tells of it; hair that is made local says
     where it was looked for, and where it is.
