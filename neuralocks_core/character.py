@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
+from neuralocks_core.body.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, rotation_part, sizes
 
@@ -217,12 +218,24 @@ class Character:
         """World points (V, 3) of the body for one pose, joints (J, 4, 4)."""
         return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
 
-    def head_mask(self) -> np.ndarray | None:
-        """Which body vertices (V,) move mainly with the head or what hangs below it."""
+    @cached_property
+    def on_head(self) -> np.ndarray | None:
+        """Which body vertices (V,) move mainly with the head or what hangs below it, hats and hair cards among them."""
         if self.body is None:
             return None
         below = self.skeleton.below(self.head)
         return np.sum(self.body.joint_weights * below[self.body.joint_indices], axis=1) > 0.5
+
+    @cached_property
+    def skin(self) -> np.ndarray | None:
+        """Which body vertices (V,) are the character's own, not what it wears; all where that cannot be told."""
+        if self.body is None:
+            return None
+        return own_skin(self.body.points, self.body.triangles, self.on_head, HEAD_WIDTHS[0])
+
+    def head_mask(self) -> np.ndarray | None:
+        """Which body vertices (V,) are the head's skin: the head is measured on them."""
+        return None if self.body is None else self.on_head & self.skin
 
     @cached_property
     def head_width(self) -> float | None:

@@ -2,7 +2,8 @@
 """Body shape as ten lengths that mean the same on every rig.
 
 The paper conditions on the coefficients of its statistical body; those mean nothing on another one. Ten lengths
-measured on the bind pose around the head tell the network the same: where head, neck, shoulders and back are.
+measured on the bind pose around the head tell the network the same: where head, neck, shoulders and back are. They are
+those of the character's own skin, not of what it wears.
 """
 
 import numpy as np
@@ -41,7 +42,10 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
         head = points[mask]
         result[:4] = np.abs(head[:, 0]).max(), head[:, 1].max(), head[:, 2].max(), -head[:, 2].min()
         # The back at shoulder height, where long hair lies.
-        torso = points[~mask & (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])]
-        if len(torso):
-            result[9] = -torso[:, 2].min()
+        level = (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])
+        torso = level & ~character.on_head
+        if torso.any():
+            # Below clothes there may be no skin.
+            own = torso & character.skin
+            result[9] = -points[own if own.any() else torso, 2].min()
     return result

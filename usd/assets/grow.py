@@ -72,8 +72,9 @@ class Barber:
     def _scalp(self) -> Scalp:
         # Styles are grown facing +Z, around the head's own place.
         centre = self.character.facing @ self.character.canonical_to_bind[:3, 3] + self.character.head_centre
-        points = self.character.body.points @ self.character.facing.T
-        return from_head(points, self.character.body.triangles, centre)
+        points, triangles = self.character.body.points @ self.character.facing.T, self.character.body.triangles
+        # Not on a hat.
+        return from_head(points, triangles[self.character.skin[triangles[:, 0]]], centre)
 
     @cached_property
     def _obstacle(self) -> Obstacle:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+import trimesh
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.assets.groom import import_groom
@@ -62,6 +63,26 @@ def test_what_is_read_is_not_written_over(tmp_path):
             with pytest.raises(NeuralocksError, match=f"{out.name}: is part of the shot itself"):
                 work(*words)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_hair_grows_on_the_head_below_a_halo_as_without_it(tmp_path):
+    stage = Usd.Stage.Open(str(shutil.copy(BODY, tmp_path / "angel.usdc")))
+    head = read_rigs(BODY)[0].character.canonical_to_bind[:3, 3]
+    name = next(
+        n for n in UsdSkel.Skeleton(stage.GetPrimAtPath("/Body/Rig")).GetJointsAttr().Get() if n.endswith("/head")
+    )
+    halo, ball = UsdGeom.Mesh.Define(stage, "/Body/Halo"), trimesh.creation.icosphere(2, 0.1)
+    halo.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((ball.vertices + head + [0, 0.35, 0]).astype(np.float32)))
+    halo.CreateFaceVertexCountsAttr([3] * len(ball.faces))
+    halo.CreateFaceVertexIndicesAttr(ball.faces.ravel().tolist())
+    binding = UsdSkel.BindingAPI.Apply(halo.GetPrim())
+    binding.CreateSkeletonRel().SetTargets(["/Body/Rig"])
+    binding.CreateJointsAttr([name])
+    binding.CreateJointIndicesPrimvar(True, 1).Set([0])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    stage.Save()
+    grown = [grow("bob", body, tmp_path / f"{body.stem}.usda", count=60) for body in (BODY, tmp_path / "angel.usdc")]
+    assert grown[0].read_bytes() == grown[1].read_bytes()
 
 
 def test_unknown_styles_are_listed(tmp_path):

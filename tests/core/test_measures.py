@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The body is measured on its own skin."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.character import Body, Character
+from neuralocks_core.measures import body_measures
+from tests.core.rigs import HEAD, person
+
+SPINE, NECK = 1, 2
+
+
+def _skin():
+    """A person as one tall egg, and the joint that each point follows."""
+    egg = trimesh.creation.uv_sphere(radius=1.0, count=[60, 40])
+    points = egg.vertices * [0.12, 0.45, 0.11] + [0, 1.35, 0]
+    return points, egg.faces, np.where(points[:, 1] > 1.6, HEAD, np.where(points[:, 1] > 1.5, NECK, SPINE))
+
+
+def _ball(centre, size, joint):
+    ball = trimesh.creation.icosphere(2)
+    return ball.vertices * size + centre, ball.faces, np.full(len(ball.vertices), joint)
+
+
+def _cards():
+    """A sheet behind the head that goes on into the neck."""
+    x, y = np.meshgrid(np.linspace(-0.1, 0.1, 9), np.linspace(1.3, 1.75, 16))
+    corner = (np.arange(8) + 9 * np.arange(15)[:, None]).reshape(-1, 1)
+    points = np.stack([x, y, 0 * x - 0.3], axis=-1).reshape(-1, 3)
+    return points, corner + [0, 1, 9], np.where(points[:, 1] > 1.5, HEAD, NECK)
+
+
+WORN = {
+    "straw hat": _ball([0, 1.8, 0], [0.3, 0.1, 0.3], HEAD),
+    "halo": _ball([0, 2.1, 0], 0.15, HEAD),
+    "cards": _cards(),
+    "pack": _ball([0, 1.4, -0.3], 0.2, SPINE),
+}
+
+
+def _dressed(*pieces) -> Character:
+    starts = np.cumsum([0] + [len(points) for points, _, _ in pieces])
+    points = np.concatenate([points for points, _, _ in pieces])
+    triangles = np.concatenate([faces + start for (_, faces, _), start in zip(pieces, starts)])
+    joints = np.concatenate([joints for _, _, joints in pieces])[:, None]
+    return Character(person().skeleton, Body(points, triangles, joints, np.ones(joints.shape)))
+
+
+def _split(points, faces, joints):
+    """Every face with points of its own, as files part a skin along seams."""
+    return points[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3), joints[faces].reshape(-1)
+
+
+def _two_meshes(points, faces, joints):
+    """Head and trunk, either bound to one joint alone."""
+    upper = (joints[faces] == HEAD).all(axis=1)
+    parts = [(points, faces[upper], np.full(len(points), HEAD)), (points, faces[~upper], np.minimum(joints, NECK))]
+    kept = [np.unique(faces) for _, faces, _ in parts]
+    return [(p[k], np.searchsorted(k, f), j[k]) for k, (p, f, j) in zip(kept, parts)]
+
+
+@pytest.mark.parametrize("worn", WORN)
+@pytest.mark.parametrize("skin", ["one piece", "seams", "two meshes"])
+def test_what_is_worn_is_no_part_of_head_or_back(skin, worn):
+    pieces = {"one piece": [_skin()], "seams": [_split(*_skin())], "two meshes": _two_meshes(*_skin())}[skin]
+    bare, dressed = _dressed(*pieces), _dressed(*pieces, WORN[worn])
+    assert np.array_equal(body_measures(bare), body_measures(dressed))
+    assert np.array_equal(bare.head_centre, dressed.head_centre) and bare.head_width == dressed.head_width
+    assert body_measures(bare)[:2] == pytest.approx([0.1, 0.2], abs=0.005)
+
+
+@pytest.mark.parametrize("worn", WORN)
+def test_where_skin_cannot_be_told_every_mesh_counts(worn):
+    """A head that hangs together with nothing may be a hat as well."""
+    head, trunk = _ball([0, 1.68, 0.02], 0.1, HEAD), _ball([0, 1.3, 0], 0.15, SPINE)
+    assert _dressed(head, trunk).skin.all() and _dressed(head, trunk, WORN[worn]).skin.all()
+
+
+def test_hair_below_whose_skin_was_taken_away_lies_on_clothes():
+    head, trunk = _two_meshes(*_skin())
+    neck = trunk[0][:, 1] > 1.55
+    faces = trunk[1][neck[trunk[1]].all(axis=1)]
+    coat = _ball([0, 1.3, 0], [0.25, 0.2, 0.15], SPINE)
+    assert body_measures(_dressed(head, (trunk[0], faces, trunk[2]), coat))[9] == pytest.approx(0.14, abs=0.015)
