@@ -13,6 +13,8 @@ from neuralocks_core.rotation import inverse, rotation_part, sizes
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
+MOVED = 0.001
+"""Skin that a blend shape moves by less [m] is not moved by it; files round the offsets of all their points."""
 
 
 @dataclass(frozen=True)
@@ -236,6 +238,17 @@ class Character:
     def head_mask(self) -> np.ndarray | None:
         """Which body vertices (V,) are the head's skin: the head is measured on them."""
         return None if self.body is None else self.on_head & self.skin
+
+    @cached_property
+    def body_shapes(self) -> np.ndarray:
+        """Which blend shapes (B,) are of the body, not of the face: those that move nearly all of the head's skin, or a part
+        of what does not follow the head, more than a jaw pulls at the neck.
+        """
+        if self.body is None or not self.body.shapes:
+            return np.zeros(0, bool)
+        head, rest = self.head_mask(), ~self.on_head
+        moved = [np.linalg.norm(offsets, axis=1) > MOVED for offsets in self.body.shapes.values()]
+        return np.array([m[head].sum() > 0.8 * head.sum() or m[rest].sum() > 0.1 * rest.sum() for m in moved])
 
     @cached_property
     def head_width(self) -> float | None:

@@ -27,7 +27,7 @@ AVERAGE = np.array([0.075, 0.17, 0.11, 0.10, 0.09, 0.02, 0.17, 0.20, 0.03, 0.13]
 
 
 def body_measures(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
-    """The ten MEASURES (10,) [m] of the bind pose with blend shape weights `shape` (B,)."""
+    """The ten MEASURES (10,) [m] of the bind pose with blend shape weights `shape` (B,), of which those of a face do not count."""
     result = AVERAGE.copy()
     joints = character.canonical(character.skeleton.bind[:, :3, 3])
     humanoid = character.humanoid
@@ -38,7 +38,10 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
         result[6:9] = (left[0] - right[0]) / 2, -(left[1] + right[1]) / 2, -(left[2] + right[2]) / 2
     mask = character.head_mask()
     if mask is not None and mask.sum() >= 20:
-        points = character.canonical(character.body.shaped(shape))
+        if shape is not None and np.any(shape):
+            # A tongue put out makes no head deeper.
+            shape = np.where(character.body_shapes, shape, 0)
+        points = character.canonical(character.body.shaped(shape if np.any(shape) else None))
         head = points[mask]
         result[:4] = np.abs(head[:, 0]).max(), head[:, 1].max(), head[:, 2].max(), -head[:, 2].min()
         # The back at shoulder height, where long hair lies.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The body is measured on its own skin."""
+"""The body is measured on its own skin, in its own shape."""
 
 import numpy as np
 import pytest
@@ -40,12 +40,12 @@ WORN = {
 }
 
 
-def _dressed(*pieces) -> Character:
+def _dressed(*pieces, shapes=None) -> Character:
     starts = np.cumsum([0] + [len(points) for points, _, _ in pieces])
     points = np.concatenate([points for points, _, _ in pieces])
     triangles = np.concatenate([faces + start for (_, faces, _), start in zip(pieces, starts)])
     joints = np.concatenate([joints for _, _, joints in pieces])[:, None]
-    return Character(person().skeleton, Body(points, triangles, joints, np.ones(joints.shape)))
+    return Character(person().skeleton, Body(points, triangles, joints, np.ones(joints.shape), shapes or {}))
 
 
 def _split(points, faces, joints):
@@ -84,3 +84,25 @@ def test_hair_below_whose_skin_was_taken_away_lies_on_clothes():
     faces = trunk[1][neck[trunk[1]].all(axis=1)]
     coat = _ball([0, 1.3, 0], [0.25, 0.2, 0.15], SPINE)
     assert body_measures(_dressed(head, (trunk[0], faces, trunk[2]), coat))[9] == pytest.approx(0.14, abs=0.015)
+
+
+def test_shapes_of_the_face_do_not_count_and_those_of_the_body_do():
+    points, _, joints = _skin()
+    face = (joints == HEAD) & (points[:, 2] > 0.05) & (np.abs(points[:, 1] - 1.65) < 0.05)
+    chin = face | ((joints == NECK) & (points[:, 2] > 0.09))
+    assert face.any() and (chin & ~face).any()
+    forward, out = np.array([0, 0, 0.05]), points * [0.2, 0, 0.2]
+    shapes = {
+        "tongue": face[:, None] * forward,
+        "jaw": chin[:, None] * forward + 1e-5,
+        "heavy": out,
+        "big head": (joints == HEAD)[:, None] * out,
+        "stout": (joints != HEAD)[:, None] * out,
+    }
+    character = _dressed(_skin(), shapes=shapes)
+    assert character.body_shapes.tolist() == [False, False, True, True, True]
+    still, weights = body_measures(character), np.eye(5)
+    assert all(np.array_equal(body_measures(character, weights[i]), still) for i in (0, 1))
+    assert body_measures(character, weights[2])[[0, 2, 3, 9]] == pytest.approx(1.2 * still[[0, 2, 3, 9]])
+    both = body_measures(character, weights[0] + weights[2])
+    assert np.array_equal(both, body_measures(character, weights[2]))
