@@ -16,7 +16,7 @@ from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import SEMANTIC, Humanoid
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.measures import MEASURES, body_measures
+from neuralocks_core.measures import MEASURES, measures_read
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.track import Track
 
@@ -209,7 +209,7 @@ class BoundarySampler:
         if key not in self._shape_cache:
             if len(self._shape_cache) > 64:
                 self._shape_cache.clear()
-            self._shape_cache[key] = body_measures(self.character, shape)
+            self._shape_cache[key] = measures_read(self.character, shape)
         return self._shape_cache[key]
 
     def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -24,6 +24,14 @@ MEASURES = (
 )
 AVERAGE = np.array([0.075, 0.17, 0.11, 0.10, 0.09, 0.02, 0.17, 0.20, 0.03, 0.13])
 """An average adult [m], for what a rig does not have."""
+LOWEST = np.array([0.075, 0.128, 0.103, 0.078, *[-np.inf] * 5, 0.092])
+HIGHEST = np.array([0.101, 0.175, 0.145, 0.104, *[np.inf] * 5, 0.130])
+"""Between these a network may read them [m]; what it answers to others, it never learned.
+
+They hold `body_measures` of the body in `examples/shot` at 3,000 random shapes as `RolloutMaker` draws them (each weight
+within -0.6 and 0.6), and at all corners of these, rounded outward. Its shapes move no joints, so joints are without bounds:
+what is the same in all of training has no weight in a network.
+"""
 
 
 def body_measures(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
@@ -52,3 +60,8 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
             own = torso & character.skin
             result[9] = -points[own if own.any() else torso, 2].min()
     return result
+
+
+def measures_read(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
+    """The measures (10,) [m] as a network reads them: those of `body_measures`, within what was trained."""
+    return np.clip(body_measures(character, shape), LOWEST, HIGHEST)

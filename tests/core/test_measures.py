@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The body is measured on its own skin, in its own shape."""
+"""The body is measured on its own skin, in its own shape, and read within what a network learned."""
 
 import numpy as np
 import pytest
 import trimesh
 
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Body, Character
-from neuralocks_core.measures import body_measures
-from tests.core.rigs import HEAD, person
+from neuralocks_core.measures import AVERAGE, HIGHEST, LOWEST, body_measures
+from tests.core.rigs import HEAD, POSITIONS, moved, person
 
 SPINE, NECK = 1, 2
+SPEC = BoundarySpec()
 
 
 def _skin():
@@ -106,3 +108,21 @@ def test_shapes_of_the_face_do_not_count_and_those_of_the_body_do():
     assert body_measures(character, weights[2])[[0, 2, 3, 9]] == pytest.approx(1.2 * still[[0, 2, 3, 9]])
     both = body_measures(character, weights[0] + weights[2])
     assert np.array_equal(both, body_measures(character, weights[2]))
+
+
+def test_a_network_reads_no_more_than_it_learned():
+    clip, part = moved([0.0]), SPEC.slices["shape"]
+
+    def read(*pieces):
+        return BoundarySampler(SPEC, _dressed(*pieces), clip).vectors([0.0])[0, part]
+
+    centre = POSITIONS[HEAD] + [0, 0.02, 0]
+    trunk = _ball([0, 1.3, 0], 0.11, SPINE)
+    assert np.array_equal(BoundarySampler(SPEC, person(), clip).held_bind()[part][:4], AVERAGE[:4].astype(np.float32))
+    sizes = [0.09, 0.13, 0.104]
+    usual = _ball(centre, sizes, HEAD), trunk
+    assert np.array_equal(read(*usual), body_measures(_dressed(*usual)).astype(np.float32))
+    large = _ball(centre, 0.4, HEAD), trunk
+    assert np.array_equal(read(*large)[:4], HIGHEST[:4].astype(np.float32))
+    small = _ball(centre - [0, 0.1, 0], 0.03, HEAD), trunk
+    assert np.array_equal(read(*small)[:4], LOWEST[:4].astype(np.float32))

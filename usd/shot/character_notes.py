@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a character as it was bound: whether it stands, and whether it has a body."""
+"""Notes on a character as it was bound: whether it stands, has a body, and one of a size that a network knows."""
 
 from collections.abc import Sequence
 
@@ -7,17 +7,21 @@ import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
 from neuralocks_core.anatomy.standing import lies
+from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
 from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, drawn
-from .notes import partial_body
+from .notes import partial_body, unlikely_head
 from .seat import beginnings
 
 AROUND = 0.25
 """A mesh with some points this near to a head's joint [m] is the head's, or on it."""
 SOME = 20
+FARTHER = 0.5
+"""A measure that lies farther outside what was trained, in spans of that, is told: rigs put the joint of one and the same head a
+little higher or lower, and in hair that hardly shows."""
 
 
 def lies_down(rig: StageRig) -> list[str]:
@@ -31,6 +35,22 @@ def lies_down(rig: StageRig) -> list[str]:
     up = rig.border.up_axis
     guess = f"the stage has no upAxis, so {up} is up: author it" if unsaid else f"if it stands, check upAxis ({up})"
     return [f"{rig.path}: lies down in its bind pose, so its hair is taken to hang sideways{foreign or f'; {guess}'}"]
+
+
+def untrained(rig: StageRig) -> list[str]:
+    """The note on a character that carries hair and has another size than a network was trained on."""
+    if unlikely_head(rig):
+        return []  # told already
+    measures = body_measures(rig.character, rig.clip.shape[0])
+    outside = np.maximum(LOWEST - measures, measures - HIGHEST)
+    far = [i for i in np.argsort(-outside) if outside[i] > FARTHER * (HIGHEST - LOWEST)[i]]
+    if not far:
+        return []
+    each = [f"its {MEASURES[i]} is {measures[i]:.3g} m (trained: {LOWEST[i]:g} to {HIGHEST[i]:g})" for i in far]
+    return [
+        f"{rig.path}: {', '.join(each)}; a network draws its hair as if that were the nearest trained; if it shows, train a "
+        "model on this character; if a hat or the like is one piece with its skin, part them"
+    ]
 
 
 def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[str]:

@@ -2,12 +2,14 @@
 """Which curves of a stage are hair, and what carries them: the same answer for a bake and for `inspect`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pxr import Usd
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .attach import Attachment, attach, of_another
+from .character_notes import untrained
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
 
@@ -64,7 +66,7 @@ class HairSearch:
             self.far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
-        self._notes += left_as_they_are(prim)
+        self._notes += left_as_they_are(prim) + untrained(replace(found.rig, character=found.character))
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

@@ -11,6 +11,7 @@ from neuralocks_core.animation.random_motion import random_clip
 from neuralocks_core.body.statistical_body import DEFAULT_PHENOTYPE, SHAPES, StatisticalBody, statistical_body
 from neuralocks_core.character import Body, Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.measures import body_measures, measures_read
 from usd.assets.animation import write_animation
 from usd.assets.body import SKELETON, write_body
 from usd.shot.stage import read_rigs, read_shot
@@ -46,6 +47,13 @@ def test_the_shipped_body_is_a_person():
     # Blend shapes leave the head on its joint: no vertex of it goes farther than heads differ in size.
     head = character.head_mask()
     assert all(np.abs(offsets[head]).max() < 0.04 for offsets in body.shapes.values())
+
+
+def test_a_network_reads_the_shipped_body_as_it_is_in_every_shape_of_training():
+    character = read_rigs(SHOT / "body.usdc")[0].character
+    assert character.body_shapes.all()
+    for shape in np.random.default_rng(0).uniform(-0.6, 0.6, (200, len(SHAPES))):
+        assert np.array_equal(measures_read(character, shape), body_measures(character, shape))
 
 
 def test_the_scalp_is_the_upper_head():

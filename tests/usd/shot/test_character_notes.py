@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of a character that lies in its bind pose or has no body, and of a stage that says neither axis nor unit."""
+"""What is said of a character that lies in its bind pose, has no body or an unusual one, and of a stage that says neither axis
+nor unit.
+"""
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from usd.review.inspect import inspect
 from usd.rig.stage import rigged_notes
 from usd.shot.stage import read_shot
 
-from ..shots import Recipe, write_shot
+from ..shots import CENTRE, Recipe, write_shot
 
 LIES = "/Hero/Rig: lies down in its bind pose"
 
@@ -112,3 +114,21 @@ def test_a_head_whose_body_is_another_skeletons_is_told_once(tmp_path):
     stage.RemovePrim("/Hero/Skin")
     layer.Save()
     assert len(_said(layer.realPath, "same character")) == 1 and not _said(layer.realPath, "no body")
+
+
+@pytest.mark.parametrize("size, told", [(1, 0), (1.1, 0), (1.8, 1), (4, 0)])
+def test_a_head_larger_than_a_network_has_seen_is_told(tmp_path, size, told):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr()
+    values = np.array(points.Get())
+    head = values[:, 1] > 1.5
+    values[head] = CENTRE + size * (values[head] - CENTRE)
+    points.Set(Vt.Vec3fArray.FromNumpy(values.astype(np.float32)))
+    stage.Save()
+    said = _said(path, "trained")
+    assert len(said) == told and len(_said(path, "m wide")) == (size == 4)
+    if told:
+        assert said[0].startswith(
+            "/Hero/Rig: its head height over its joint is 0.26 m (trained: 0.128 to 0.175), its head half"
+        )
