@@ -2,8 +2,9 @@
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
 The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
-capital), parts by their usual names (limbs by `limb_shapes` where none is named like one), and the trunk by hierarchy: the
-upper chest is where the ways from the head and from the arms meet.
+capital), parts by their usual names (limbs by `limb_shapes` where none is named like one, and by `limb_chains` where
+only the first joint is), and the trunk by hierarchy: the upper chest is where the ways from the head and from the arms
+meet.
 """
 
 from collections.abc import Mapping
@@ -12,21 +13,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import leaf, sides_and_keys
+from neuralocks_core.anatomy.limb_chains import WHOLE, below_first
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.errors import NeuralocksError
 
 PARTS = {
-    "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder"),
-    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "humerus", "armupper"),
-    "lower_arm": ("lowerarm", "forearm", "lowarm", "elbow", "armlower", "loarm"),
+    "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder", "scapula"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "humerus", "armupper", "armup"),
+    "lower_arm": ("lowerarm", "forearm", "lowarm", "elbow", "armlower", "loarm", "armlow"),
     "hand": ("hand", "wrist"),
-    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "hip", "femur"),
-    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leg"),
+    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "legup", "hip", "femur"),
+    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leglow", "leg"),
     "foot": ("foot", "ankle"),
     "eye": ("eye", "eyeball"),
 }
 TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
+LIMBS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
+BY_HAND = "given by hand"
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
@@ -105,7 +109,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     for name, wanted in (by_hand or {}).items():
         if name not in SEMANTIC:
             raise NeuralocksError(f"--joint {name}=...: there is no such meaning; use one of {', '.join(SEMANTIC)}")
-        put(name, find_joint(names, wanted), "given by hand")
+        put(name, find_joint(names, wanted), BY_HAND)
 
     parts = {word for words in PARTS.values() for word in words}
     sides, keys = zip(*sides_and_keys([leaf(name) for name in names], parts), strict=True)
@@ -116,7 +120,8 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     if "head" not in joints:
         raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
     if positions is not None:
-        _find_unnamed_limbs(joints, put, names, sides, parents, positions)
+        _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions)
+    _follow_limbs(joints, put, names, keys, parents, positions)
     _find_trunk(joints, put, names, keys, parents)
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
@@ -169,8 +174,10 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
         return None
 
     found = {part: first(options) for part, options in PARTS.items()}
-    collar = first(("clavicle", "collar", "collarbone", "clav"))
+    collar = first(("clavicle", "collar", "collarbone", "clav", "scapula"))
     plain = first(("shoulder",))
+    if found["upper_leg"] is None and _numbered(found["lower_leg"], side, sides, keys, parents):
+        found["upper_leg"], found["lower_leg"] = found["lower_leg"], None
     if found["upper_arm"] is None and plain is not None:
         # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no
         # arm is named.
@@ -182,14 +189,36 @@ def _limbs(side, sides, keys, parents) -> dict[str, int]:
     return {part: joint for part, joint in found.items() if joint is not None}
 
 
-def _find_unnamed_limbs(joints, put, names, sides, parents, positions) -> None:
+def _numbered(joint, side, sides, keys, parents) -> bool:
+    """Whether a joint is the first of a limb whose joints all have the limb's name: `leg_01` over `leg_02`."""
+    return joint is not None and any(
+        i != joint and keys[i] == keys[joint] in WHOLE and sides[i] == side and joint in _ancestors(i, parents)
+        for i in range(len(keys))
+    )
+
+
+def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
+    """What of a limb has no name, below its first joint."""
+    for side in ("left", "right"):
+        for first, *rest in (tuple(f"{side}_{part}" for part in limb) for limb in LIMBS.values()):
+            if first not in joints or rest[0] in joints:
+                continue
+            begin, end = joints[first], joints.get(rest[1])
+            taken = {joint for name, joint in joints.items() if name.startswith(side)}
+            below = below_first(begin, end, keys, parents, positions, taken)
+            for name, joint in zip(rest, below, strict=True):
+                put(name, joint, f"below '{leaf(names[begin])}'")
+
+
+def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions) -> None:
     """Arms where no arm, and legs where no leg was found."""
-    lacking = [
-        limb for limb in ("arm", "leg") if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))
-    ]
+    lacking = [limb for limb in LIMBS if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))]
     if lacking:
         found = limbs_by_shape(_ancestors(joints["head"], parents), parents, positions, sides)
         for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
+            lower = name.replace("upper", "lower")
+            if lower != name and joints.get(lower) == joint and reasons[lower] != BY_HAND:
+                del joints[lower]  # `Leg` is the lower one only below another
             put(name, joint, f"by its place, '{leaf(names[joint])}'")
 
 

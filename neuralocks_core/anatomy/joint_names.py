@@ -106,7 +106,9 @@ def _side_and_key(words: list[str]) -> tuple[str, str]:
     elif len(words) == 1 and words[0][:5] == "right" and len(words[0]) > 5:
         words = ["right", words[0][5:]]
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
-    return side, "".join(word for word in words if word not in _SIDES and word not in _NOISE)
+    words = [word for word in words if word not in _SIDES and word not in _NOISE]
+    # mGear names a component and then its joint, `shoulder_L0_shoulder_jnt`.
+    return side, "".join(word for i, word in enumerate(words) if words[i - 1 : i] != [word])
 
 
 def prefixed_otherwise(names: Sequence[str], there: set[str]) -> tuple[str, ...] | None:

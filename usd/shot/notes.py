@@ -134,10 +134,10 @@ def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
 
 
 def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
-    """The note on joints that a network reads and that were not recognized by name."""
+    """The notes on joints that a network reads, and on elbows that tell it how arms are bound, that were not recognized."""
     missing = [name for name in joints if name not in rig.character.humanoid]
     if not missing:
-        return []
+        return _without_elbow(rig, joints)
     head = rig.character.humanoid.get("head")
     if head is not None and rig.source.parents[head] < 0:
         return [
@@ -145,7 +145,21 @@ def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
             "turn against it; export it with the body's skeleton as one"
         ]
     return [
-        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint"
+        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint",
+        *_without_elbow(rig, joints),
+    ]
+
+
+def _without_elbow(rig: StageRig, joints) -> list[str]:
+    """The note on upper arms that are read as if they were bound straight sideways."""
+    humanoid = rig.character.humanoid
+    arms = [name for name in joints if name.endswith("_upper_arm") and name in humanoid]
+    elbows = [name for name in (arm.replace("upper", "lower") for arm in arms) if name not in humanoid]
+    if not elbows:
+        return []
+    return [
+        f"{rig.path}: no joint found for {', '.join(elbows)}, so the arms count as bound in a T-pose; "
+        f"name it with --joint {elbows[0]}=JOINT"
     ]
 
 

@@ -128,6 +128,55 @@ RIGS = {
         "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",
         {"head": "DEF-spine.006", "neck": "DEF-spine.004", "upper_chest": "DEF-spine.003"},
     ),
+    "AdvancedSkeleton": (
+        "Root_M\n Spine1_M\n  Chest_M\n   Neck_M\n    Head_M\n   Scapula_L\n    Shoulder_L\n     Elbow_L\n   Scapula_R\n"
+        "    Shoulder_R",
+        {"left_shoulder": "Scapula_L", "left_upper_arm": "Shoulder_L", "left_lower_arm": "Elbow_L"},
+    ),
+    "mGear": (
+        "spine_C0_pelvis_jnt\n spine_C0_01_jnt\n  neck_C0_0_jnt\n   neck_C0_head_jnt\n  shoulder_L0_shoulder_jnt\n"
+        "   arm_L0_0_jnt\n    arm_L0_1_jnt\n     arm_L0_end_jnt\n  shoulder_R0_shoulder_jnt\n   arm_R0_0_jnt\n"
+        " leg_L0_0_jnt\n  leg_L0_1_jnt\n   foot_L0_0_jnt\n leg_R0_0_jnt",
+        {
+            "head": "neck_C0_head_jnt",
+            "left_shoulder": "shoulder_L0_shoulder_jnt",
+            "left_upper_arm": "arm_L0_0_jnt",
+            "left_lower_arm": "arm_L0_1_jnt",
+            "left_hand": "arm_L0_end_jnt",
+            "left_upper_leg": "leg_L0_0_jnt",
+            "left_lower_leg": "leg_L0_1_jnt",
+            "left_foot": "foot_L0_0_jnt",
+        },
+    ),
+    "numbered along the limbs": (
+        "root_jnt\n spine_01_jnt\n  neck_01_jnt\n   head_jnt\n  L_clavicle_jnt\n   L_arm_01_jnt\n    L_arm_twist_jnt\n"
+        "    L_sleeve_jnt\n     L_sleeve_02_jnt\n      L_sleeve_03_jnt\n    L_arm_02_jnt\n     L_arm_03_jnt\n"
+        " L_leg_01_jnt\n  L_leg_02_jnt\n   L_leg_03_jnt\n    L_leg_04_jnt",
+        {
+            "left_shoulder": "L_clavicle_jnt",
+            "left_upper_arm": "L_arm_01_jnt",
+            "left_lower_arm": "L_arm_02_jnt",
+            "left_hand": "L_arm_03_jnt",
+            "left_upper_leg": "L_leg_01_jnt",
+            "left_lower_leg": "L_leg_02_jnt",
+            "left_foot": "L_leg_03_jnt",
+        },
+    ),
+    "an elbow of another name, below joints that part the upper arm": (
+        "hips\n spine\n  neck\n   head\n  l_upperarm_01\n   l_upperarm_twist\n    l_upperarm_02\n     l_mid_arm\n      l_hand\n"
+        "       l_finger",
+        {"left_upper_arm": "l_upperarm_01", "left_lower_arm": "l_mid_arm", "left_hand": "l_hand"},
+    ),
+    "up and low behind the limb": (
+        "hips\n spine\n  neck\n   head\n  l_shoulder\n   l_armUp\n    l_armLow\n l_legUp\n  l_legLow",
+        {
+            "left_shoulder": "l_shoulder",
+            "left_upper_arm": "l_armUp",
+            "left_lower_arm": "l_armLow",
+            "left_upper_leg": "l_legUp",
+            "left_lower_leg": "l_legLow",
+        },
+    ),
     "MikuMikuDance": (
         "センター\n 上半身\n  上半身2\n   首\n    頭\n     左目\n     左髪1\n   左肩\n    左腕\n     左ひじ\n      左手首\n"
         "   右肩\n    右腕\n     右ひじ\n 下半身\n  左足\n   左ひざ\n    左足首\n  右足",
@@ -152,6 +201,30 @@ def test_finds_the_joints_of_common_rigs(name):
     paths, parents = rig(text)
     humanoid = find_humanoid(paths, parents)
     assert {key: paths[humanoid[key]].rpartition("/")[2] for key in expected} == expected
+
+
+def test_a_limb_goes_on_from_a_joint_given_by_hand():
+    paths, parents = rig("hips\n spine\n  head\n  a_L\n   b_L\n    c_L\n     d_L")
+    humanoid = find_humanoid(paths, parents, by_hand={"left_upper_arm": "b_L"})
+    assert {name: paths[joint][-3:] for name, joint in humanoid.items() if name.startswith("left")} == {
+        "left_upper_arm": "b_L",
+        "left_lower_arm": "c_L",
+        "left_hand": "d_L",
+    }
+
+
+def test_no_joint_is_two_bones_of_a_limb():
+    """Neither a lone `leg`, the upper one by its place, nor a hand of which an elbow is looked for."""
+    paths, parents = rig(
+        "hips\n spine\n  head\n  l_arm\n   l_hand\n  r_arm\n   r_hand\n l_leg\n  x1\n   x2\n r_leg\n  y1\n   y2"
+    )
+    heights = {"head": 1.6, "spine": 1.2, "hips": 0.9, "leg": 0.9, "x1": 0.5, "y1": 0.5, "x2": 0.1, "y2": 0.1}
+    names = [path.rpartition("/")[2] for path in paths]
+    sides = [0.1 * (("l_" in path) - ("r_" in path)) for path in paths]
+    places = np.array([(x, heights.get(name.split("_")[-1], 1.3), 0) for name, x in zip(names, sides)])
+    limbs = {name: names[joint] for name, joint in find_humanoid(paths, parents, places).items() if "_" in name}
+    assert {"left_upper_leg": "l_leg", "left_lower_leg": "x1", "left_foot": "x2"}.items() <= limbs.items()
+    assert limbs["left_upper_arm"] == "l_arm" and "left_lower_arm" not in limbs
 
 
 def test_tails_that_hang_from_the_neck_are_no_head():

@@ -11,9 +11,10 @@ from usd.review.inspect import inspect
 from usd.rig.stage import rigged_notes
 from usd.shot.stage import read_shot
 
-from ..shots import CENTRE, Recipe, write_shot
+from ..shots import CENTRE, JOINTS, Recipe, write_shot
 
 LIES = "/Hero/Rig: lies down in its bind pose"
+ELBOWS = {"left_lower_arm": "arm_twist_L", "right_lower_arm": "arm_twist_R"}
 
 
 def _said(path, words) -> list[str]:
@@ -132,3 +133,15 @@ def test_a_head_larger_than_a_network_has_seen_is_told(tmp_path, size, told):
         assert said[0].startswith(
             "/Hero/Rig: its head height over its joint is 0.26 m (trained: 0.128 to 0.175), its head half"
         )
+
+
+def test_arms_that_no_joint_continues_are_told_to_count_as_straight(tmp_path):
+    path = write_shot(tmp_path, Recipe())
+    assert not _said(path, "_lower_arm")
+    path.write_text(path.read_text().replace("elbow_", "arm_2_"))
+    assert not _said(path, "_lower_arm")
+    assert read_shot(path).rigs[0].character.humanoid["left_lower_arm"] == JOINTS.index("hips/spine/arm_L/elbow_L")
+    path.write_text(path.read_text().replace("arm_2_", "arm_twist_"))
+    (said,) = _said(path, "_lower_arm")
+    assert "left_lower_arm, right_lower_arm" in said and said.endswith("--joint left_lower_arm=JOINT")
+    assert not any("_lower_arm" in note for note in read_shot(path, joints=ELBOWS).notes)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Elbow and hand, or knee and foot, where names tell no more than where the limb begins: by hierarchy, from there on."""
+
+import numpy as np
+
+WHOLE = ("arm", "leg")
+"""Names of a whole limb, whose joints are numbered along it. Joints numbered by another name part one bone."""
+_PARTS_OF_A_BONE = ("twist", "roll")
+_APART = 1e-6
+"""Joints nearer to each other than this share of the skeleton's size are at one place."""
+
+
+def below_first(first: int, end: int | None, keys, parents, positions, taken=()) -> tuple[int | None, int | None]:
+    """The joints with which a limb's second bone begins and ends; None for what there is not.
+
+    Args:
+        first: the joint with which its first bone begins.
+        end: the one with which the second one ends, where it is known.
+        keys: what each joint is called, without numbers and side (J).
+        parents: (J,) parent indices, -1 for roots.
+        positions: bind positions (J, 3), or None.
+        taken: joints that are something else.
+    """
+    at = None if positions is None else np.asarray(positions, float)
+    second = _next(first, end, keys, parents, at, taken)
+    if second is None or end is not None:
+        return second, end
+    return second, _next(second, None, keys, parents, at, taken)
+
+
+def _next(joint: int, end: int | None, keys, parents, at: np.ndarray | None, taken) -> int | None:
+    """The joint with which the next bone begins: the next of the same name where that is a whole limb's, else the first on
+    the way to the end, or to the farthest joint.
+    """
+    depth = _depths_below(joint, parents)
+    if not depth:
+        return None
+    least = 0.0 if at is None else _APART * np.linalg.norm(np.ptp(at, axis=0))
+
+    def reach(other: int) -> float:
+        return float(depth[other] if at is None else np.linalg.norm(at[other] - at[joint]))
+
+    def begins_a_bone(other: int) -> bool:
+        part = any(word in keys[other] for word in _PARTS_OF_A_BONE)
+        return not part and other not in taken and reach(other) > least
+
+    numbered = [other for other in depth if keys[other] == keys[joint] and begins_a_bone(other)]
+    if numbered and keys[joint] in WHOLE:
+        return min(numbered, key=lambda other: (depth[other], other))
+    way = [end if end in depth else max(depth, key=reach)]
+    while way[-1] != joint:
+        way.append(int(parents[way[-1]]))
+    way = [other for other in way[-2::-1] if other != end and begins_a_bone(other)]
+    other_bone = (other for other in way if not keys[joint] or keys[other] != keys[joint])
+    return next(other_bone, way[0] if way else None)
+
+
+def _depths_below(joint: int, parents) -> dict[int, int]:
+    """How deep below a joint each of its descendants is."""
+    depth = {}
+    for other in range(len(parents)):
+        up, steps = other, 0
+        while up >= 0 and up != joint:
+            up, steps = int(parents[up]), steps + 1
+        if up == joint and steps:
+            depth[other] = steps
+    return depth
