@@ -134,7 +134,7 @@ def described(shot: Shot) -> list[dict]:
         {
             "path": item.path,
             "strands": item.groom.strand_count,
-            "points": len(item.groom.points),
+            "points": item.point_count,
             "joint": item.joint,
             "how": item.attachment.how,
         }

@@ -77,7 +77,7 @@ class OverrideWriter:
             name: "points" or "velocities".
             blocks: consecutive parts (n, 3) float32 of all P values: a large groom's are never all there twice.
         """
-        array, first, corners = Vt.Vec3fArray(len(item.groom.points)), 0, []
+        array, first, corners = Vt.Vec3fArray(item.point_count), 0, []
         inside = np.asarray(_Writable(array))
         for block in blocks:
             inside[first : first + len(block)] = block

@@ -99,7 +99,7 @@ def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool
             behind.put(writer.groom, item, velocities, facts)
             store, made = _Store(spool, writer, item, number, plan), None
             for code in plan.codes:
-                if spool.holds(number, code, len(item.groom.points)):
+                if spool.holds(number, code, item.point_count):
                     resumed += code in plan.wanted
                 else:
                     made = made or poser(item)
@@ -136,7 +136,7 @@ class _Store:
             self._writer.sample(self._item, code, "velocities", self._velocities(code))
 
     def _rows(self) -> Iterator[slice]:
-        count = len(self._item.groom.points)
+        count = self._item.point_count
         return (slice(low, min(low + BLOCK, count)) for low in range(0, count, BLOCK))
 
     def _points(self, code: float) -> Iterator[np.ndarray]:
@@ -163,7 +163,7 @@ class _Store:
 
 def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:
     # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
-    size = 1.03 * sum(len(item.groom.points) for item in shot.grooms) * 12 * (2 + velocities) * count
+    size = 1.03 * sum(item.point_count for item in shot.grooms) * 12 * (2 + velocities) * count
     folder = next((p for p in [out.parent, *out.parent.parents] if p.is_dir()), None)
     if folder is not None and size > (free := shutil.disk_usage(folder).free):
         raise NeuralocksError(

@@ -36,19 +36,20 @@ class Baked:
         return self.shot.border.seconds(self.codes)
 
     def world(self, item: StageGroom, code: float) -> np.ndarray:
-        """Points (P, 3) of a groom at a time code, world metres.
+        """Points (P, 3) of a groom, as it is drawn, at a time code, world metres.
 
         Raises:
             NeuralocksError: they are missing, not as many as at rest, or not finite.
         """
         points = UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(code)
         points = np.zeros((0, 3)) if points is None else np.asarray(points, float)
-        if len(points) != len(item.groom.points):
+        if len(points) != item.point_count:
             raise NeuralocksError(
-                f"{item.path}: {len(points)} points at time code {code:g}, {len(item.groom.points)} at rest; bake again"
+                f"{item.path}: {len(points)} points at time code {code:g}, {item.point_count} at rest; bake again"
             )
         if not np.isfinite(points).all():
             raise NeuralocksError(f"{item.path}: points at time code {code:g} are not finite; bake again")
+        points = points if item.beyond is None else points[item.beyond.hair]
         return transformed(points, self.shot.border.to_core @ item.placement.at(code))
 
     def canonical(self, item: StageGroom, code: float) -> np.ndarray:

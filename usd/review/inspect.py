@@ -22,7 +22,8 @@ from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
-from ..shot.curves import find_curves, read_groom
+from ..shot.curve_ends import drawn_groom
+from ..shot.curves import find_curves
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
 from ..shot.notes import (
@@ -188,7 +189,9 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
             joint = {"joint": rig_joint(found), "carried by": found.how}
         except NeuralocksError as error:
             stops.append(str(error))
-    groom = read_groom(prim, to_bind, spoils)
+    groom, beyond = drawn_groom(prim, to_bind, spoils)
+    if beyond is not None:
+        facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     if joint:
         spoils += groom_notes(prim, groom, border)
     made = recorded(prim)

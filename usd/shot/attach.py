@@ -19,7 +19,8 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
-from .curves import ends, moment, rest_points
+from .curve_ends import ends
+from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, find_seat, kinship, some_ends, ways
 from .seat_notes import lies_off_skin, moved_away, upside_down
 

@@ -62,15 +62,6 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
     return np.asarray(points, np.float32) if kept is None else kept
 
 
-def ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
-    """Which points (n,) are roots, or strands' last points; the first one alone where the counts do not fit the points."""
-    points, counts = len(rest_points(prim)), UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()
-    counts = np.asarray(rest_value(counts) or [], np.int64)
-    found = np.cumsum(counts) - (1 if last else counts)
-    found = found[(counts > 0) & (found >= 0) & (found < points)]
-    return found if len(found) else np.zeros(1, np.int64)
-
-
 def moment(prim: Usd.Prim) -> float | None:
     """Time code of the points at rest, where they are taken from one sample of a moving cache."""
     if _kept(prim) is not None:

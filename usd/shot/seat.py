@@ -19,7 +19,8 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import StageMesh
-from .curves import ends, moment, rest_points
+from .curve_ends import ends
+from .curves import moment, rest_points
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""

@@ -18,7 +18,8 @@ from ..border.units import Border, open_stage
 from ..skel.source import StageRig, find_skeletons
 from .attach import Attachment, rig_joint
 from .character_notes import lies_down, without_body
-from .curves import find_curves, read_groom
+from .curve_ends import Beyond, drawn_groom
+from .curves import find_curves
 from .hair_search import HairSearch
 from .lacking import no_groom, nothing_found
 from .notes import (
@@ -43,9 +44,10 @@ class StageGroom:
     Attributes:
         path: the BasisCurves prim.
         prim: the same, of the opened stage.
-        groom: at rest, bind-world metres.
+        groom: at rest, bind-world metres, as it is drawn.
         attachment: what carries it, and where it lies in the bind pose.
         placement: where the prim stands.
+        beyond: points of the prim that are not drawn, and that the groom lacks, if there are any.
     """
 
     path: str
@@ -53,6 +55,12 @@ class StageGroom:
     groom: Groom = field(repr=False)
     attachment: Attachment = field(repr=False)
     placement: Placement = field(repr=False)
+    beyond: Beyond | None = field(default=None, repr=False)
+
+    @property
+    def point_count(self) -> int:
+        """P, how many points the prim has."""
+        return len(self.groom.points if self.beyond is None else self.beyond.hair)
 
     @property
     def joint(self) -> str:
@@ -190,8 +198,8 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
         placement = Placement(prim)
         attachment = search.attachment(prim, placement)
         if attachment is not None:
-            groom = read_groom(prim, attachment.to_bind, notes)
-            found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement))
+            groom, beyond = drawn_groom(prim, attachment.to_bind, notes)
+            found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement, beyond))
             notes += groom_notes(prim, groom, attachment.rig.border)
     return found
 

@@ -2,6 +2,8 @@
 """Placing a groom part by part gives what the whole gives."""
 
 import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
 
 import usd.baking.placing as placing
 from neuralocks_core.strands.strand_set import strands_on
@@ -10,8 +12,14 @@ from usd.shot.stage import read_shot
 from ..shots import Recipe, write_shot
 
 
-def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch):
-    item = read_shot(write_shot(tmp_path, Recipe(strands=300, vertices=10, bound="mesh"))).grooms[0]
+@pytest.mark.parametrize("wrap", ["pinned", "nonperiodic"])
+def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch, wrap):
+    path = write_shot(tmp_path, Recipe(strands=300, vertices=10, bound="mesh", basis="catmullRom"))
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetWrapAttr().Set(wrap)
+    stage.Save()
+    item = read_shot(path).grooms[0]
+    assert (item.beyond is None) == (wrap == "pinned")
     character = item.attachment.character
     whole = strands_on(character, item.groom)
     # As hair moves: each strand its own way, more towards the tip.
@@ -31,4 +39,6 @@ def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch):
     assert np.array_equal(placed(32, 16384), one)
     assert np.abs(placed(32, 64) - one).max() < 1e-5
     rigid = item.groom.points @ character.carrying(joints)[:3, :3].T + character.carrying(joints)[:3, 3]
-    assert 1e-3 < np.abs(one - rigid).max() < 0.1
+    drawn = one if item.beyond is None else one[item.beyond.hair]
+    assert 1e-3 < np.abs(drawn - rigid).max() < 0.1
+    assert len(one) == item.point_count and np.isfinite(one).all()

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where curves begin and end as they are drawn: some have a point beyond each end, which steers the curve only.
+
+A Catmull-Rom curve that is not pinned goes from its second point to the last but one, and a B-spline begins and ends
+nearly there (UsdGeomBasisCurves, "Cubic Basis and Wrap"). Where the outer points are repeated, the end is at them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.groom import Groom
+
+from ..skel.surface import rest_value
+from .curves import read_groom, rest_points
+
+LEAST = 4
+"""Points of a cubic segment; shorter strands are not drawn, and all their points are taken for hair."""
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """Points that lie beyond the ends of the drawn curves.
+
+    Attributes:
+        before: those before a curve's first drawn point (n,), ascending; the following two are drawn.
+        after: those after a curve's last drawn point (m,), ascending; the two before are drawn.
+        hair: which of all points (P,) are drawn.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    hair: np.ndarray
+
+    def left_out(self, groom: Groom) -> Groom:
+        """A groom with all P points, without these."""
+        counts = groom.counts - np.bincount(groom.strand_of_point[~self.hair], minlength=groom.strand_count)
+        each = len(groom.widths) == len(groom.points)
+        return replace(
+            groom,
+            points=groom.points[self.hair],
+            counts=counts.astype(np.int32),
+            widths=groom.widths[self.hair] if each else groom.widths,
+        )
+
+
+def drawn_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> tuple[Groom, Beyond | None]:
+    """The groom as it is drawn, and which points of the prim it lacks; arguments and errors are those of `read_groom`."""
+    groom, beyond = read_groom(prim, to_bind, notes), beyond_ends(prim)
+    return (groom if beyond is None else beyond.left_out(groom)), beyond
+
+
+def beyond_ends(prim: Usd.Prim) -> Beyond | None:
+    """The points beyond the ends of a BasisCurves; None where there are none, and where its counts do not fit its points."""
+    curves, tokens = UsdGeom.BasisCurves(prim), UsdGeom.Tokens
+    if curves.GetTypeAttr().Get() != tokens.cubic or curves.GetWrapAttr().Get() != tokens.nonperiodic:
+        return None
+    if curves.GetBasisAttr().Get() not in (tokens.catmullRom, tokens.bspline):
+        return None
+    points, counts = rest_points(prim), _counts(prim)
+    if counts.sum() != len(points) or counts.min(initial=0) < 0:
+        return None
+    drawn = counts >= LEAST
+    last = (np.cumsum(counts) - 1)[drawn]
+    first = last + 1 - counts[drawn]
+    before = first[(points[first] != points[first + 1]).any(axis=1)]
+    after = last[(points[last] != points[last - 1]).any(axis=1)]
+    hair = np.ones(len(points), bool)
+    hair[before] = hair[after] = False
+    return None if hair.all() else Beyond(before, after, hair)
+
+
+def ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
+    """Which points (n,) are roots, or strands' last points; the first one alone where the counts do not fit the points."""
+    points, counts = len(rest_points(prim)), _counts(prim)
+    found = np.cumsum(counts) - (1 if last else counts)
+    found = found[(counts > 0) & (found >= 0) & (found < points)]
+    if (beyond := beyond_ends(prim)) is not None:
+        found = found - np.isin(found, beyond.after) if last else found + np.isin(found, beyond.before)
+    return found if len(found) else np.zeros(1, np.int64)
+
+
+def _counts(prim: Usd.Prim) -> np.ndarray:
+    return np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
