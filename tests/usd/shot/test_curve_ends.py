@@ -116,3 +116,16 @@ def test_repeated_ends_are_hair_to_their_last_point(tmp_path, model):
     moved = world_points(bake(shot, tmp_path / "bake.usdc", model).path, 5.0).reshape(STRANDS, -1, 3)
     np.testing.assert_allclose(moved[:, 2:-2].reshape(-1, 3), world_points(plain.path, 5.0), atol=1e-6)
     assert np.array_equal(moved[:, 0], moved[:, 2]) and np.array_equal(moved[:, -1], moved[:, -3])
+
+
+@pytest.mark.parametrize("wrap, said", [("pinned", 0), ("nonperiodic", 1)])
+def test_curves_that_are_drawn_from_above_the_skin_only_are_told_to_be_pinned(tmp_path, wrap, said):
+    path = write_shot(tmp_path, Recipe(strands=STRANDS, vertices=4, basis="bspline", bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    curves, hair = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")), strand_points(STRANDS, 4)
+    long = hair[:, :1] + 5 * (hair - hair[:, :1])
+    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(long.reshape(-1, 3).astype(np.float32)))
+    curves.GetWrapAttr().Set(wrap)
+    stage.Save()
+    notes = [note for note in read_shot(path).notes if note.startswith("/Hero/Hair")]
+    assert sum(note.endswith("set their wrap to pinned") for note in notes) == said == len(notes)
