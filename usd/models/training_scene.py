@@ -18,7 +18,7 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.units import open_stage
 from ..shot.attach import attach
-from ..shot.curve_ends import drawn_groom
+from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.notes import first_of, unfound, unlikely_head
 from ..shot.stage import StageRig, read_rigs
@@ -81,7 +81,7 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
     # Beside hair, the grass of a set is none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
-    found = [_strands(drawn_groom(prim, a.to_bind, notes)[0], a.character) for prim, a in near]
+    found = [_strands(groom_between(prim, a.to_bind, notes, drawn=a.drawn)[0], a.character) for prim, a in near]
     if not any(strands.valid.any() for strands in found):
         raise NeuralocksError(f"{source}: no strand has two distinct points; there is nothing to learn from")
     return [strands for strands in found if strands.valid.any()]

@@ -22,7 +22,7 @@ from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
-from ..shot.curve_ends import drawn_groom
+from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
@@ -179,17 +179,17 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
-    to_bind, joint = border.to_core @ placement.reference, {}
+    to_bind, drawn, joint = border.to_core @ placement.reference, False, {}
     if search is not None:
         try:
             found = search.attachment(prim, placement)
             if found is None:
                 return None
-            to_bind = found.to_bind
+            to_bind, drawn = found.to_bind, found.drawn
             joint = {"joint": rig_joint(found), "carried by": found.how}
         except NeuralocksError as error:
             stops.append(str(error))
-    groom, beyond = drawn_groom(prim, to_bind, spoils)
+    groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     if joint:

@@ -21,8 +21,8 @@ from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .curve_ends import ends
 from .curves import moment, rest_points
-from .seat import CLEARLY, NEAR, Seat, find_seat, kinship, some_ends, ways
-from .seat_notes import lies_off_skin, moved_away, upside_down
+from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, ways
+from .seat_notes import lies_off_skin, moved_away, not_pinned, upside_down
 
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
@@ -46,6 +46,7 @@ class Attachment:
             but those of a moving cache; else None.
         far: distance of the roots from the joint [m] where neither a binding nor a skin below says that it
             carries them and they lie out of its reach; else 0.
+        drawn: whether the hair begins where its curves are drawn, not at a point before.
     """
 
     rig: StageRig
@@ -55,6 +56,7 @@ class Attachment:
     skinned: bool
     at_default: np.ndarray | None = None
     far: float = 0.0
+    drawn: bool = False
 
 
 def attach(
@@ -93,6 +95,8 @@ def attach(
         else:
             found = _by_name(prim, rigs, placement, head)
             notes += [] if found.far else lies_off_skin(prim, found.rig, placement)
+    found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind))
+    notes += not_pinned(prim, found.rig, found.drawn)
     name = rig_joint(found)
     asked = found.rig.by_hand.get("head")
     if asked and leaf(name) != leaf(asked):

@@ -2,7 +2,8 @@
 """Where curves begin and end as they are drawn: some have a point beyond each end, which steers the curve only.
 
 A Catmull-Rom curve that is not pinned goes from its second point to the last but one, and a B-spline begins and ends
-nearly there (UsdGeomBasisCurves, "Cubic Basis and Wrap"). Where the outer points are repeated, the end is at them.
+nearly there (UsdGeomBasisCurves, "Cubic Basis and Wrap"). Where the outer points are repeated, the end is at them. But not
+everybody who leaves the wrap as it is adds such points: `seat.begins_where_drawn` asks the skin.
 """
 
 from dataclasses import dataclass, replace
@@ -45,9 +46,9 @@ class Beyond:
         )
 
 
-def drawn_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> tuple[Groom, Beyond | None]:
-    """The groom as it is drawn, and which points of the prim it lacks; arguments and errors are those of `read_groom`."""
-    groom, beyond = read_groom(prim, to_bind, notes), beyond_ends(prim)
+def groom_between(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str], *, drawn: bool) -> tuple[Groom, Beyond | None]:
+    """What `read_groom` gives; or, if hair begins where it is drawn, that much of it, and which points it lacks."""
+    groom, beyond = read_groom(prim, to_bind, notes), beyond_ends(prim) if drawn else None
     return (groom if beyond is None else beyond.left_out(groom)), beyond
 
 
@@ -71,12 +72,14 @@ def beyond_ends(prim: Usd.Prim) -> Beyond | None:
     return None if hair.all() else Beyond(before, after, hair)
 
 
-def ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
-    """Which points (n,) are roots, or strands' last points; the first one alone where the counts do not fit the points."""
+def ends(prim: Usd.Prim, *, last: bool = False, drawn: bool = False) -> np.ndarray:
+    """Which points (n,) are strands' first or last ones, of all or of those drawn; the very first one alone where the counts
+    do not fit the points.
+    """
     points, counts = len(rest_points(prim)), _counts(prim)
     found = np.cumsum(counts) - (1 if last else counts)
     found = found[(counts > 0) & (found >= 0) & (found < points)]
-    if (beyond := beyond_ends(prim)) is not None:
+    if drawn and (beyond := beyond_ends(prim)) is not None:
         found = found - np.isin(found, beyond.after) if last else found + np.isin(found, beyond.before)
     return found if len(found) else np.zeros(1, np.int64)
 

@@ -19,7 +19,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import StageMesh
-from .curve_ends import ends
+from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 
 NEAR = 0.03
@@ -61,7 +61,30 @@ class Seat:
 
 def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf) -> Seat | None:
     """A groom on a rig's nearest skin; None where the rig has no skin, or none `within` so far [m]."""
-    roots, when, best = some_ends(prim), moment(prim), None
+    roots = [some_ends(prim)]
+    if beyond_ends(prim) is not None:
+        roots.append(some_ends(prim, drawn=True))
+    seats = [_find_seat(each, moment(prim), rig, placement, within) for each in roots]
+    return min((seat for seat in seats if seat is not None), key=lambda seat: seat.distance, default=None)
+
+
+def begins_where_drawn(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> bool:
+    """Whether hair begins where its curves are drawn, rather than at points before: skin says which of them are the roots."""
+    if beyond_ends(prim) is None or not rig.skins:
+        return False
+    return off_skin(some_ends(prim, drawn=True), rig, to_bind) <= off_skin(some_ends(prim), rig, to_bind)
+
+
+def off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
+    """Distance of points (n, 3) of a prim from the nearest skin of a rig that has some, in the median [m]."""
+    far = [tree.query(transformed(points, to_bind))[0] for tree in rig.skins]
+    return float(np.median(np.min(far, axis=0)))
+
+
+def _find_seat(
+    roots: np.ndarray, when: float | None, rig: StageRig, placement: Placement, within: float
+) -> Seat | None:
+    best = None
 
     def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
@@ -129,13 +152,13 @@ def kinship(prim: Usd.Prim, rig: StageRig) -> int:
     return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
 
 
-def some_ends(prim: Usd.Prim, *, last: bool = False) -> np.ndarray:
-    """About SOME_ROOTS finite roots (n, 3) in the prim's own space; or the last points of these strands.
+def some_ends(prim: Usd.Prim, *, last: bool = False, drawn: bool = False) -> np.ndarray:
+    """About SOME_ROOTS finite `ends` (n, 3) in the prim's own space.
 
     Raises:
         NeuralocksError: none is finite.
     """
-    every = ends(prim, last=last)
+    every = ends(prim, last=last, drawn=drawn)
     found = rest_points(prim)[every[:: max(1, len(every) // SOME_ROOTS)]]
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):

@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on how a groom sits on skin: off it, upside down, drawn from above it only, or on a face that moves away below it."""
+"""Notes on how a groom sits on skin: off it, upside down, drawn from above it, or on a face that moves away below it."""
 
 import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
-from neuralocks_core.rotation import transformed
-
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .curve_ends import beyond_ends
-from .curves import rest_points
-from .seat import NEAR, SOME_ROOTS, Seat, find_seat, some_ends
+from .seat import NEAR, find_seat, off_skin, some_ends
 
 MOVES = 0.002
 """Skin that blend shapes move by less [m] stays with its roots."""
@@ -22,23 +19,19 @@ def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[s
     seat = find_seat(prim, rig, placement)
     if seat is None:
         return []
-    return (
-        upside_down(prim, rig, seat.to_bind)
-        or drawn_short(prim, rig, seat)
-        or [
-            f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {rig.path}"
-            f"{rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
-            "check that it was made for this pose"
-        ]
-    )
+    return upside_down(prim, rig, seat.to_bind) or [
+        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {rig.path}"
+        f"{rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
+        "check that it was made for this pose"
+    ]
 
 
 def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:
     """The note on strands whose last points lie on skin while their first ones do not."""
     if not rig.skins:
         return []
-    roots = _off_skin(some_ends(prim), rig, to_bind)
-    if roots <= NEAR or _off_skin(some_ends(prim, last=True), rig, to_bind) > NEAR:
+    roots = off_skin(some_ends(prim), rig, to_bind)
+    if roots <= NEAR or off_skin(some_ends(prim, last=True), rig, to_bind) > NEAR:
         return []
     return [
         f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "
@@ -46,25 +39,15 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     ]
 
 
-def drawn_short(prim: Usd.Prim, rig: StageRig, seat: Seat) -> list[str]:
-    """The note on curves whose first points lie on skin but are not drawn, for they lack the points beyond their ends."""
+def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool) -> list[str]:
+    """The note on curves that begin on skin but are drawn from above it, for they lack the points beyond their ends."""
     beyond = beyond_ends(prim)
-    if beyond is None or not len(beyond.before):
-        return []
-    first = rest_points(prim)[beyond.before[:: max(1, len(beyond.before) // SOME_ROOTS)]]
-    first = first[np.isfinite(first).all(axis=1)]
-    if not len(first) or _off_skin(first, rig, seat.to_bind) > NEAR:
+    if drawn or beyond is None or not len(beyond.before) or not rig.skins:
         return []
     return [
-        f"{prim.GetPath()}: its curves are not pinned, so they are drawn from their second points on, {seat.distance:.2g} m "
-        "from the skin on which the first ones lie; set their wrap to pinned"
+        f"{prim.GetPath()}: its curves are not pinned, so they are drawn from their second points on, but the first ones lie "
+        "on the skin and are taken for the roots; set their wrap to pinned"
     ]
-
-
-def _off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
-    """Distance of points (n, 3) from the nearest skin, in the median [m]."""
-    far = [tree.query(transformed(points, to_bind))[0] for tree in rig.skins]
-    return float(np.median(np.min(far, axis=0)))
 
 
 def moved_away(path: str, rig: StageRig, roots: np.ndarray) -> list[str]:

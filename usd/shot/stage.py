@@ -18,7 +18,7 @@ from ..border.units import Border, open_stage
 from ..skel.source import StageRig, find_skeletons
 from .attach import Attachment, rig_joint
 from .character_notes import lies_down, without_body
-from .curve_ends import Beyond, drawn_groom
+from .curve_ends import Beyond, groom_between
 from .curves import find_curves
 from .hair_search import HairSearch
 from .lacking import no_groom, nothing_found
@@ -198,7 +198,7 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
         placement = Placement(prim)
         attachment = search.attachment(prim, placement)
         if attachment is not None:
-            groom, beyond = drawn_groom(prim, attachment.to_bind, notes)
+            groom, beyond = groom_between(prim, attachment.to_bind, notes, drawn=attachment.drawn)
             found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement, beyond))
             notes += groom_notes(prim, groom, attachment.rig.border)
     return found

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, Vt
 
 import usd.baking.placing as placing
 from neuralocks_core.strands.strand_set import strands_on
@@ -16,7 +16,12 @@ from ..shots import Recipe, write_shot
 def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch, wrap):
     path = write_shot(tmp_path, Recipe(strands=300, vertices=10, bound="mesh", basis="catmullRom"))
     stage = Usd.Stage.Open(str(path))
-    UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetWrapAttr().Set(wrap)
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    curves.GetWrapAttr().Set(wrap)
+    if wrap == "nonperiodic":  # the second points on the skin, where such curves begin
+        points = np.array(curves.GetPointsAttr().Get()).reshape(300, 10, 3)
+        points -= points[:, 1:2] - points[:, :1]
+        curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3)))
     stage.Save()
     item = read_shot(path).grooms[0]
     assert (item.beyond is None) == (wrap == "pinned")

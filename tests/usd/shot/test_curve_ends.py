@@ -47,7 +47,9 @@ def test_only_points_that_no_curve_reaches_lie_beyond_its_ends():
     prim = _curves(stage, places, counts)
     beyond = beyond_ends(prim)
     assert beyond.before.tolist() == [0, 5] and beyond.after.tolist() == [4, 8]
-    assert ends(prim).tolist() == [1, 6, 9, 12] and ends(prim, last=True).tolist() == [3, 7, 11, 13]
+    assert ends(prim).tolist() == [0, 5, 9, 12] and ends(prim, last=True).tolist() == [4, 8, 11, 13]
+    assert ends(prim, drawn=True).tolist() == [1, 6, 9, 12]
+    assert ends(prim, last=True, drawn=True).tolist() == [3, 7, 11, 13]
     repeated = places.copy()
     repeated[0], repeated[8] = repeated[1], repeated[7]
     assert np.flatnonzero(~beyond_ends(_curves(stage, repeated, counts, "bspline")).hair).tolist() == [4, 5]
@@ -56,7 +58,7 @@ def test_only_points_that_no_curve_reaches_lie_beyond_its_ends():
     assert beyond_ends(_curves(stage, places, [5, 5])) is None  # read_groom says what is wrong with them
     prim = _curves(stage, places, counts)
     prim.GetAttribute("type").Set("linear")
-    assert beyond_ends(prim) is None and ends(prim).tolist() == [0, 5, 9, 12]
+    assert beyond_ends(prim) is None and ends(prim, drawn=True).tolist() == [0, 5, 9, 12]
 
 
 @pytest.mark.parametrize("basis", ["catmullRom", "bspline"])
@@ -118,14 +120,16 @@ def test_repeated_ends_are_hair_to_their_last_point(tmp_path, model):
     assert np.array_equal(moved[:, 0], moved[:, 2]) and np.array_equal(moved[:, -1], moved[:, -3])
 
 
-@pytest.mark.parametrize("wrap, said", [("pinned", 0), ("nonperiodic", 1)])
-def test_curves_that_are_drawn_from_above_the_skin_only_are_told_to_be_pinned(tmp_path, wrap, said):
-    path = write_shot(tmp_path, Recipe(strands=STRANDS, vertices=4, basis="bspline", bound="mesh"))
-    stage = Usd.Stage.Open(str(path))
-    curves, hair = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")), strand_points(STRANDS, 4)
-    long = hair[:, :1] + 5 * (hair - hair[:, :1])
-    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(long.reshape(-1, 3).astype(np.float32)))
-    curves.GetWrapAttr().Set(wrap)
-    stage.Save()
-    notes = [note for note in read_shot(path).notes if note.startswith("/Hero/Hair")]
-    assert sum(note.endswith("set their wrap to pinned") for note in notes) == said == len(notes)
+@pytest.mark.parametrize("basis", ["catmullRom", "bspline"])
+def test_first_points_that_lie_on_the_skin_are_roots(tmp_path, model, basis):
+    """Many leave the wrap of their curves as it is, and mean hair from its first point to its last: it moves as if pinned."""
+    paths = []
+    for wrap in ("pinned", "nonperiodic"):
+        path = write_shot(tmp_path, Recipe(strands=STRANDS, vertices=VERTICES, basis=basis, bound="mesh"), wrap)
+        stage = Usd.Stage.Open(str(path))
+        UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetWrapAttr().Set(wrap)
+        stage.Save()
+        paths.append(bake(path, tmp_path / f"{wrap}.usdc", model).path)
+        told = [note for note in read_shot(path).notes if note.endswith("set their wrap to pinned")]
+        assert len(told) == (wrap == "nonperiodic")
+    assert np.array_equal(world_points(paths[0], 5.0), world_points(paths[1], 5.0))
