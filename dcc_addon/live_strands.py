@@ -71,8 +71,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     place = world(hair, graph)
     joined.settle(hair)
     edited.follow(hair, sampled, place)
-    joints = pose(armature, sampled, scene, graph, moved)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
+    joints = pose(armature, sampled, scene, graph, moved, settings.resolve)
     frame = shown_frame(scene)
     row = sampled.motion.row(frame)
     if moved and row is not None and _elsewhere(hair, place, sampled, row, graph):

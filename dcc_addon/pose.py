@@ -5,6 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
+from .scene import rotations
 from .scene.binding import hidden
 from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
@@ -12,9 +13,9 @@ from .services.motion import TOLERANCE, as_carried
 from .session import session
 
 
-def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
+def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np.ndarray:
     """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for bit
-    as the bake reads them.
+    as the bake reads them; with `body` in all that the body is moved by, too.
     """
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:
@@ -28,9 +29,10 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))
     if row is not None:
-        # Only the joints that hair is moved by: hair bones of their own, say, may be live themselves.
-        read = sorted(set(sampled.character.humanoid.values()))
-        if np.abs(world[read] - sampled.drawn[row, read]).max() < TOLERANCE:
+        same = np.abs(world - sampled.drawn[row]).max(axis=(1, 2)) < TOLERANCE
+        if body:
+            same |= _live(armature, sampled)
+        if same[sampled.moving(body)].all():
             return sampled.clip.joints[row]
         if moved:
             sampled.stale = session.wanting = True
@@ -38,3 +40,12 @@ def pose(armature, sampled, scene, graph, moved: bool) -> np.ndarray:
     head = sampled.character.head
     drawn[head] = as_carried(drawn[head], armature.name_full)
     return drawn
+
+
+def _live(armature, sampled) -> np.ndarray:
+    """Which joints (J,) are hair bones that are live themselves, or hang from such."""
+    turned = rotations.named(armature.neuralocks_character.rig_kept)
+    found = np.array([bone in turned for bone in sampled.rig.bones])
+    for joint, parent in enumerate(sampled.rig.parents) if turned else ():  # parents come first
+        found[joint] |= parent >= 0 and found[parent]
+    return found

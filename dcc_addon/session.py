@@ -6,6 +6,7 @@ Blender objects are looked up by name each time: a pointer kept over an undo or 
 
 import traceback
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,15 @@ class SampledRig:
     def bodies(self) -> tuple[str, ...]:
         """Names of the body meshes."""
         return self.key[1]
+
+    def moving(self, body: bool) -> np.ndarray:
+        """Joints (N,) by which hair is moved; with `body` also those that move the body, which hair is kept out of."""
+        return self._moving_hair_and_body if body else np.unique(list(self.character.humanoid.values()))
+
+    @cached_property
+    def _moving_hair_and_body(self) -> np.ndarray:
+        hair, body = self.moving(False), self.character.body
+        return hair if body is None else np.union1d(hair, body.joint_indices[body.joint_weights > 0])
 
 
 @dataclass(eq=False)

@@ -201,7 +201,7 @@ class _Recording:
         world = part.world()
         self._parts.append(part)
         self._world[rows] = to_core(self._unit) @ world
-        self._drawn[rows] = joints @ self._trim
+        self._drawn[rows] = self._joints[: end - first] @ self._trim
         self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
     def sampled(self) -> SampledRig:

@@ -5,19 +5,19 @@ import numpy as np
 
 from ..services.motion import TOLERANCE
 from ..session import SampledRig, session
+from .carried import hairs_of
 from .layers import layer_of, working_in
 from .lookup import named
 from .sampling import key_of, posture_of, rigging_of, sample, step, stepping
 
 
 def ensure(context, armature, looking: bool = False) -> SampledRig:
-    """The sampled motion, sampled now if there is none, it is stale, or what is not keyed was posed since; `looking`, also
-    where some of its frames are not as they were.
+    """The sampled motion, sampled now if there is none or it is stale; `looking`, also where some of its frames are not as
+    they were.
     """
     notice(armature, context.scene)
     found = session.rigs.get(armature.name_full)
     known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
-    known = known and found.posture == posture_of(armature, context.scene)
     if not known or (looking and not _as_sampled(context, armature, found)):
         with stepping(context.scene):
             for _ in sample(context, armature):
@@ -31,7 +31,7 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
     Blender does not tell of, and no list of it is whole.
     """
     scene, name, frames = context.scene, armature.name_full, sampled.motion.frames
-    read = sorted(set(sampled.character.humanoid.values()))
+    read = sampled.moving(any(hair.neuralocks_hair.resolve for hair in hairs_of(armature, scene)))
     with stepping(scene):
         for row in {0, len(frames) // 2, len(frames) - 1}:
             step(scene, frames[row])
@@ -47,7 +47,9 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
 
 
 def notice(armature, scene) -> None:
-    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints."""
+    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints, or
+    what is not keyed posed otherwise, which counts in all frames.
+    """
     sampled = session.rigs.get(armature.name_full)
     if sampled is not None and not sampled.stale:
-        sampled.stale = sampled.rigging != rigging_of(armature, scene)
+        sampled.stale = sampled.rigging != rigging_of(armature, scene) or sampled.posture != posture_of(armature, scene)

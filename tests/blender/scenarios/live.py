@@ -117,6 +117,47 @@ def posing(folder: Path) -> None:
     assert apart(baked_points(folder / "b.usdc", "/Character/Hair_Hair", 9), after) < SAME
 
 
+def skin_posed(folder: Path) -> None:
+    """Hair is kept out of skin as it is posed by hand, on whatever bone it hangs, at once and in all frames once Blender was
+    idle; but hair bones that are live move no other hair.
+    """
+    from dcc_addon import background
+    from dcc_addon.session import session
+
+    pad = ("pad.L", "chest", (0.05, 0.02, 1.45), (0.05, 0.25, 1.5))
+    rig = scenes.armature(bones=[*scenes.BONES, *scenes.TAIL, pad])
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands, own = scenes.hair(rig, 60, length=0.4), rig.neuralocks_character
+    make_live(rig, strands, resolve=True)
+    before = points_at(strands, 9)
+    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    own.rig_live = True
+    assert apart(points_at(strands, 8), points_at(strands, 9)) > 1e-3 and apart(scenes.points(strands), before) == 0.0
+    assert rig.pose.bones["hair.01"].rotation_mode == "QUATERNION" and not session.rigs["Rig"].stale
+
+    rig.pose.bones["pad.L"].rotation_euler = (0.9, 0.3, 0)
+    bpy.context.view_layer.update()
+    posed = scenes.points(strands)
+    assert apart(posed, before) > 0.01
+    strands.neuralocks_hair.resolve = False
+    free = scenes.points(strands)
+    strands.neuralocks_hair.resolve = True
+    assert apart(free, posed) > 0.01
+    known = [session.rigs["Rig"]]
+    for _ in range(2):
+        background.doubt()
+        while background.look() is not None:
+            pass
+        known.append(session.rigs["Rig"])
+    assert known[0] is not known[1] and known[1] is known[2] and not known[2].stale
+    shown = points_at(strands, 9)
+    assert apart(shown, posed) < SAME
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "posed.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "posed.usdc", "/Character/Hair_Hair", 9), shown) < SAME
+    assert not messages(), messages()
+
+
 def not_keyed(_folder: Path) -> None:
     """A value that keys write, and that was changed and is not keyed yet, stays when the motion is sampled, whatever it is a
     value of.
