@@ -55,11 +55,15 @@ def check_heard(armature) -> None:
     """Refuse where baked keys would not be heard.
 
     Raises:
-        NeuralocksError: strips are switched off, or those of another track alone play.
+        NeuralocksError: a strip is being tweaked, strips are switched off, or those of another track alone play.
     """
     name, data = armature.name_full, armature.animation_data
     if data is None:
         return
+    if data.use_tweak_mode:  # the action that plays above all strips, perhaps on hair bones, is out of reach meanwhile
+        raise NeuralocksError(
+            f"{name}: an NLA strip is being edited (tweak mode); leave it first (Tab in the NLA editor)"
+        )
     if not data.use_nla:
         raise NeuralocksError(
             f"{name}: its NLA is switched off, and with it baked keys; switch it on in the NLA editor"
@@ -72,10 +76,10 @@ def check_heard(armature) -> None:
 
 
 def check_mode_left(armature, bones) -> None:
-    """Refuse bones on which baked keys would have no effect.
+    """Refuse bones on which baked keys would have no effect, or another one.
 
     Raises:
-        NeuralocksError: one has keys in every rotation mode.
+        NeuralocksError: one has keys in every rotation mode, or of the mode itself.
     """
     written = animated(armature.animation_data, without=(TRACK, BEFORE))
     for bone in bones:
@@ -84,6 +88,11 @@ def check_mode_left(armature, bones) -> None:
             raise NeuralocksError(
                 f"{armature.name_full}: hair bone '{bone}' has keys in every rotation mode, which play over baked ones; delete "
                 "its keys of one of them"
+            )
+        if f"{start}rotation_mode" in written:
+            raise NeuralocksError(
+                f"{armature.name_full}: hair bone '{bone}' has keys of its rotation mode, so that baked ones would not play; "
+                "delete these"
             )
 
 

@@ -8,8 +8,8 @@ def animated(data, without=()) -> set[str]:
     """
     if data is None:
         return set()
-    actions = {data.action, *(strip.action for strip in strips_of(data, without))} - {None}
-    return {curve.data_path for curve in [*data.drivers, *(c for action in actions for c in _curves(action))]}
+    played = [curve for user in (data, *strips_of(data, without)) for curve in _curves(user)]
+    return {curve.data_path for curve in [*data.drivers, *played] if not _muted(curve)}
 
 
 def strips_of(data, without=()) -> list:
@@ -20,10 +20,14 @@ def strips_of(data, without=()) -> list:
     return strips
 
 
-def _curves(action) -> list:
-    """F-curves of all slots; where actions have slots, `fcurves` are those of the first one, or gone."""
-    if len(getattr(action, "layers", ())):
-        return [
-            c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves
-        ]
-    return list(getattr(action, "fcurves", ()))
+def _curves(user) -> list:
+    """F-curves that animation data, or a strip, plays of its action: since Blender 4.4 those of one slot."""
+    action = user.action
+    if action is None or not hasattr(user, "action_slot_handle"):
+        return list(action.fcurves) if action is not None else []
+    bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+    return [curve for bag in bags if bag.slot_handle == user.action_slot_handle for curve in bag.fcurves]
+
+
+def _muted(curve) -> bool:
+    return curve.mute or (curve.group is not None and curve.group.mute)

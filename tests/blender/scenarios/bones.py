@@ -118,46 +118,6 @@ def keyed_bones(folder: Path) -> None:
             assert apart(turns(frame), matrices) < 1e-6
 
 
-def turned_otherwise(folder: Path) -> None:
-    """Hair bones that something else turns, too, are refused, live and by bakes, and keys that would not be heard; where
-    time is stretched, keys play as the live view does.
-    """
-    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
-    scenes.body(rig)
-    scenes.dance(rig)
-    scene, bone = bpy.context.scene, rig.pose.bones["hair.01"]
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-
-    def turns(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(each.matrix) for each in rig.pose.bones])
-
-    limit = bone.constraints.new("LIMIT_ROTATION")
-    rig.neuralocks_character.rig_live = True
-    turns(5)
-    assert "'Limit Rotation'" in messages()["Rig"]
-    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "mute the constraint")
-    limit.mute, bone.bone.use_inherit_rotation = True, False
-    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "Inherit Rotation")
-    bone.bone.use_inherit_rotation = True
-    rig.animation_data.use_nla = False
-    refused(bpy.ops.neuralocks.bake_keys, "NLA is switched off")
-    rig.animation_data.use_nla = True
-
-    for old, new in ((100, 50), (100, 200)):
-        scene.render.frame_map_old, scene.render.frame_map_new = old, new
-        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-        rig.neuralocks_character.rig_live = True
-        live = {frame: turns(frame) for frame in (1, 4, 11)}
-        assert not messages(), messages()
-        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
-        for frame, expected in live.items():
-            assert apart(turns(frame), expected) < SAME, (new, frame)
-        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
-
-
 def keyed_anew(folder: Path) -> None:
     """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
     not takes its place, and finds the bones as they were before the first.

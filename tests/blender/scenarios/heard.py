@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair bones that are moved by more than hair: what keeps baked keys from being heard, and what does not."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, messages, refused
+
+
+def turned_otherwise(folder: Path) -> None:
+    """Hair bones that something else turns, too, are refused, live and by bakes, and keys that would not be heard; where
+    time is stretched, keys play as the live view does.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    scene, bone = bpy.context.scene, rig.pose.bones["hair.01"]
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def turns(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+
+    limit = bone.constraints.new("LIMIT_ROTATION")
+    rig.neuralocks_character.rig_live = True
+    turns(5)
+    assert "'Limit Rotation'" in messages()["Rig"]
+    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "mute the constraint")
+    limit.mute, bone.bone.use_inherit_rotation = True, False
+    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "Inherit Rotation")
+    bone.bone.use_inherit_rotation = True
+    rig.animation_data.use_nla = False
+    refused(bpy.ops.neuralocks.bake_keys, "NLA is switched off")
+    rig.animation_data.use_nla = True
+    assert bone.keyframe_insert("rotation_mode", frame=1)
+    refused(bpy.ops.neuralocks.bake_keys, "hair.01", "rotation mode", "delete")
+    assert bone.keyframe_delete("rotation_mode", frame=1)
+    _edit_a_strip(rig)
+    refused(bpy.ops.neuralocks.bake_keys, "tweak mode", "leave it")
+    rig.animation_data.use_tweak_mode = False
+
+    for old, new in ((100, 50), (100, 200)):
+        scene.render.frame_map_old, scene.render.frame_map_new = old, new
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        rig.neuralocks_character.rig_live = True
+        live = {frame: turns(frame) for frame in (1, 4, 11)}
+        assert not messages(), messages()
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        for frame, expected in live.items():
+            assert apart(turns(frame), expected) < SAME, (new, frame)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+
+def _edit_a_strip(rig) -> None:
+    """Put the action on a strip, another one above it, and go into tweak mode."""
+    data = rig.animation_data
+    track, above = data.nla_tracks.new(), bpy.data.actions.new("Above")
+    strip = track.strips.new("Dance", 1, data.action)
+    data.action, strip.select, data.nla_tracks.active = above, True, track
+    data.use_tweak_mode = True
+    assert data.use_tweak_mode and data.action != above
+
+
+def keys_that_do_not_play(folder: Path) -> None:
+    """Keys in every rotation mode refuse a bake of hair bones only where they play: not those of muted curves and groups, nor
+    those of what else moves by the same action.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    channels = ("rotation_quaternion", "rotation_euler", "rotation_axis_angle")
+    for channel in channels:
+        rig.pose.bones["hair.01"].keyframe_insert(channel, frame=1, group=channel)
+
+    def refuses() -> None:
+        refused(bpy.ops.neuralocks.bake_keys, "hair.01", "every rotation mode")
+
+    def bakes() -> None:
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+    curves = {curve.group.name: curve for curve in scenes.fcurves(rig) if "hair.01" in curve.data_path}
+    assert set(curves) == set(channels)
+    refuses()
+    of_channel = [curve for curve in scenes.fcurves(rig) if curve.data_path == curves[channels[0]].data_path]
+    for muted in (True, False):
+        for curve in of_channel:
+            curve.mute = muted
+        bakes() if muted else refuses()
+    for muted in (True, False):
+        curves[channels[0]].group.mute = muted
+        bakes() if muted else refuses()
+
+    action = rig.animation_data.action
+    if hasattr(action, "slots"):
+        rig.animation_data.action_slot = action.slots.new("OBJECT", "Other")
+        bakes()
