@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones that are hidden by a scale of zero, as props are."""
+"""Bones that are hidden by a scale of zero, as props are, or mirrored by a negative one."""
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import volumes
 
 from .rig import RigArrays
 
@@ -12,30 +13,39 @@ FLAT, HIDDEN = 1e-6, 1e-4
 
 
 def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.ndarray) -> np.ndarray:
-    """Joints (T, J, 4, 4) of which none is flat: a prop is hidden by a scale of zero; it becomes HIDDEN times as large, and
-    turns as its parent does.
+    """Joints (T, J, 4, 4) of which none is flat or mirrored: a prop is hidden by a scale of zero; it becomes HIDDEN times as
+    large, and turns as its parent does. What is mirrored has its first axis turned round.
 
     Args:
         joints: over time.
         rig: whose they are.
-        needed: joints that hair needs, with those that they hang from; these may not be flat.
+        needed: joints that hair needs, with those that they hang from; these may be neither.
         frames: (T,), for messages.
 
     Raises:
         NeuralocksError: one of them is.
     """
     flat = np.linalg.norm(joints[..., :3, :3], axis=-2).min(axis=-1) < FLAT
-    if not flat.any():
+    mirrored = (volumes(joints[..., :3, :3]) < 0) & ~flat
+    if not (flat.any() or mirrored.any()):
         return joints
+    _check(mirrored, needed, "a negative scale", rig, frames)
+    _check(flat, needed | set(np.flatnonzero(rig.parents < 0)), "zero scale", rig, frames)
     result = joints.copy()
+    result[mirrored, :3, 0] *= -1
     for joint in np.flatnonzero(flat.any(axis=0)):  # parents come first
         rows = np.flatnonzero(flat[:, joint])
-        if joint in needed or rig.parents[joint] < 0:
-            raise NeuralocksError(
-                f"{rig.name}: bone '{rig.bones[joint]}' has zero scale in frame {frames[rows[0]]:g}, and hair is moved by it; "
-                "give it a scale above zero"
-            )
         above = result[rows, rig.parents[joint], :3, :3]
         size = np.cbrt(np.abs(np.linalg.det(above)))[:, None, None]
         result[rows, joint, :3, :3] = above * np.where(size > HIDDEN, HIDDEN / size, 1.0)
     return result
+
+
+def _check(wrong: np.ndarray, needed: set[int], what: str, rig: RigArrays, frames: np.ndarray) -> None:
+    """Refuse what is `wrong` (T, J) with a joint that is needed."""
+    for joint in np.flatnonzero(wrong.any(axis=0)):
+        if joint in needed:
+            raise NeuralocksError(
+                f"{rig.name}: bone '{rig.bones[joint]}' has {what} in frame {frames[wrong[:, joint]][0]:g}, and hair is moved "
+                "by it; give it a scale above zero"
+            )

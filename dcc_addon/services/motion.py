@@ -12,7 +12,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import Mirrored, from_quaternion, inverses, rotation_part, sizes, to_quaternion
 
-from .uneven import carriable, uneven
+from .uneven import ROUNDED, carriable, nearest, sheared, uneven
 
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
@@ -90,7 +90,8 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
     """Write translation, rotation and scale of some rows (T,) from world transforms (t, J, 4, 4), each relative to the
     parent as stored; all with one scale each, or not.
     """
-    stored = np.empty_like(joints)
+    stored = np.empty((len(joints), len(parents) + 1, 4, 4))
+    stored[:, -1] = np.eye(4)  # above a root, whose parent is -1
     for level in _levels(parents):
         local, above = joints[:, level], parents[level]
         if above[0] >= 0:
@@ -100,6 +101,8 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
             turn = local[..., :3, :3] / size[..., None]
         else:
             size, turn = np.linalg.norm(local[..., :3, :3], axis=-2), rotation_part(local)
+            lost = sheared(local, ROUNDED)
+            turn[lost], size[lost] = nearest(stored[:, above][lost], joints[:, level][lost])
         size = np.broadcast_to(size, (*size.shape[:-1], 3)).astype(np.float16)  # a SkelAnimation's have half precision
         own = [each.astype(np.float32) for each in (local[..., :3, 3], to_quaternion(turn), size)]
         for channel, values in zip(channels, own, strict=True):
@@ -165,7 +168,7 @@ class Motion:
         if not some.all():
             _store(channels, ~some, even[~some], parents)
         if some.any():
-            _store(channels, some, carriable(whole[some], even[some], parents, _levels(parents), head), parents, False)
+            _store(channels, some, carriable(whole[some], even[some], parents, head), parents, False)
         translation, rotation, scale = channels
         return cls(
             frames=np.asarray(frames, float),

@@ -14,6 +14,8 @@ UNEVEN = 1e-4
 """Scales that differ by less, relative to their mean, are one."""
 SHEAR = 1e-3
 """Axes with a smaller cosine between them are at right angles."""
+ROUNDED = 5e-3
+"""So are those with a smaller one than this, where scales of half precision have turned them."""
 
 
 def uneven(transforms: np.ndarray, even: np.ndarray) -> np.ndarray:
@@ -22,35 +24,41 @@ def uneven(transforms: np.ndarray, even: np.ndarray) -> np.ndarray:
     return np.abs(transforms[..., :3, :3] - even[..., :3, :3]).max(axis=(-1, -2)) > UNEVEN * size
 
 
-def carriable(joints: np.ndarray, even: np.ndarray, parents: np.ndarray, levels, head: int | None) -> np.ndarray:
-    """Transforms (T, J, 4, 4) that a chain can carry: each joint as it is, or with one scale where it would be sheared, or
-    would let the head be. The head itself is as it is.
+def carriable(joints: np.ndarray, even: np.ndarray, parents: np.ndarray, head: int | None) -> np.ndarray:
+    """Transforms (T, J, 4, 4) of which a chain can carry the head as it is: where one on the way up from it would be sheared,
+    all above that have one scale. Other joints are as they are; see `nearest`.
 
     Args:
         joints: world transforms (T, J, 4, 4); even: the same with one scale each.
         parents: (J,) int, -1 for a root.
-        levels: joints (j,) without a parent, their children, and so on.
         head: the joint that carries the hair, if there is one.
     """
-    result, chain, whole = joints.copy(), [], np.ones(len(joints), bool)
+    result, whole = joints.copy(), np.ones(len(joints), bool)
     above = -1 if head is None else head
     while above >= 0:
-        chain.append(above)
         result[~whole, above] = even[~whole, above]
         joint, above = above, parents[above]
         if above >= 0:
-            whole = whole & ~_sheared(inverses(joints[:, above]) @ joints[:, joint])
-    for level in levels:
-        others = level[~np.isin(level, chain)]
-        link, above = joints[:, others], parents[others]
-        if len(others) and above[0] >= 0:
-            link = inverses(result[:, above]) @ link
-        result[:, others] = np.where(_sheared(link)[..., None, None], even[:, others], joints[:, others])
+            whole = whole & ~sheared(inverses(joints[:, above]) @ joints[:, joint])
     return result
 
 
-def _sheared(transforms: np.ndarray) -> np.ndarray:
-    """Which transforms (..., 4, 4) have axes that are not at right angles."""
+def sheared(transforms: np.ndarray, cosine: float = SHEAR) -> np.ndarray:
+    """Which transforms (..., 4, 4) have axes that are not at right angles, with a cosine between them larger than this."""
     axes = transforms[..., :3, :3] / np.linalg.norm(transforms[..., :3, :3], axis=-2, keepdims=True)
     cosines = np.swapaxes(axes, -1, -2) @ axes
-    return np.abs(cosines - np.eye(3)).max(axis=(-1, -2)) > SHEAR
+    return np.abs(cosines - np.eye(3)).max(axis=(-1, -2)) > cosine
+
+
+def nearest(above: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (N, 3, 3) and scales (N, 3) of sheared joints relative to their parents, near to what they are in the world:
+    the rotation is the best with one scale, the scales are the best with this rotation. What is off in one joint does not
+    grow in those below it.
+
+    Args:
+        above, joints: world transforms (N, 4, 4) of the parents and of the joints.
+    """
+    above, joints = above[:, :3, :3], joints[:, :3, :3]
+    u, _, vt = np.linalg.svd(np.swapaxes(above, -1, -2) @ joints)
+    turned = above @ u @ vt
+    return u @ vt, (turned * joints).sum(axis=-2) / np.square(turned).sum(axis=-2)

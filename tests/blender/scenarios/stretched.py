@@ -118,3 +118,38 @@ def stretched_head_of_bones(folder: Path) -> None:
     for f, matrices in still.items():
         assert apart(bones(f), matrices) < SAME
     assert not messages(), messages()
+
+
+def stretched_limb(_folder: Path) -> None:
+    """Below an arm that is stretched, a hand that inherits none of it stays near to where Blender draws it, however far the
+    arm is stretched; a mirrored prop in that hand keeps nobody from sampling.
+    """
+    from dcc_addon.services.axes import to_core
+    from dcc_addon.session import session
+
+    places = [((0.67 + 0.06 * k, 0, 1.43), (0.73 + 0.06 * k, 0, 1.43)) for k in range(4)]
+    names = ("forearm.L", "hand.L", "finger.L", "tip.L", "prop")
+    hand = [(name, above, *ends) for name, above, ends in zip(names[1:], names, places)]
+    rig, scene = scenes.armature(bones=[*scenes.BONES, *hand]), bpy.context.scene
+    skin = scenes.body(rig)
+    skin.vertex_groups.remove(skin.vertex_groups["prop"])
+    scenes.dance(rig)
+    for name in names[1:]:
+        rig.data.bones[name].inherit_scale = "NONE"
+        rig.pose.bones[name].rotation_euler = (0.4, 0.3, 0.2)
+    for frame, stretch in ((1, 1.0), (2, 1.5), (13, 4.0), (14, 30.0), (24, 30.0)):
+        rig.pose.bones["forearm.L"].scale = (stretch**-0.5, stretch, stretch**-0.5)
+        rig.pose.bones["prop"].scale.x = -1 if frame > 13 else 1
+        for name in ("forearm.L", "prop"):
+            rig.pose.bones[name].keyframe_insert("scale", frame=frame)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    sampled, core = session.rigs["Rig"], to_core(1.0)
+    for frame in FRAMES:
+        scene.frame_set(frame)
+        drawn = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        there = np.array([core[:3, :3] @ (drawn.matrix_world @ vertex.co) for vertex in drawn.data.vertices])
+        joints = sampled.clip.joints[sampled.motion.row(frame)]
+        made = sampled.character.body.posed(joints @ sampled.character.inverse_bind)
+        assert apart(made, there) < 0.1, (frame, apart(made, there))
+    assert not messages(), messages()
