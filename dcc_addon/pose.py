@@ -15,7 +15,8 @@ from .session import session
 
 def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np.ndarray:
     """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for bit
-    as the bake reads them; with `body` in all that the body is moved by, too.
+    as the bake reads them; with `body` in all that the body is moved by, too. Of another pose the joints that are posed
+    otherwise are as drawn.
     """
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:
@@ -36,9 +37,10 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
             return sampled.clip.joints[row]
         if moved:
             sampled.stale = session.wanting = True
-    drawn = to_core(sampled.motion.metres_per_unit) @ world
-    head = sampled.character.head
+    drawn, head = to_core(sampled.motion.metres_per_unit) @ world, sampled.character.head
     drawn[head] = as_carried(drawn[head], armature.name_full)
+    if row is not None:
+        drawn[same] = sampled.clip.joints[row, same]
     return drawn
 
 
