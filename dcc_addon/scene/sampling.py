@@ -27,8 +27,10 @@ from .rigging import posture, rigging
 from .unkeyed import Unkeyed
 from .watched import watched
 
-BLOCK = 16
-"""Frames whose poses are made channels together: each then costs little, and all of them less than a slice of work."""
+BLOCK, MANY = 16, 6000
+"""Frames whose poses are made channels together, at most, and joints in all of these: each frame then costs little, and all
+of them about a slice of work.
+"""
 
 
 def shown_frame(scene) -> float:
@@ -97,6 +99,7 @@ def sample(context, armature) -> Iterator[tuple[int, int]]:
     """
     recording = _Recording(context, armature)
     total = len(recording.frames)
+    yield 0, total
     for row in range(total):
         recording.take(row)
         yield row + 1, total
@@ -130,7 +133,8 @@ class _Recording:
         self._rate = self._scene.render.fps / self._scene.render.fps_base
         self._unit = self._scene.unit_settings.scale_length
         count, bones = len(self.frames), len(self._rig.bones)
-        self._joints, self._parts = np.empty((BLOCK, bones, 4, 4)), []
+        self._block = min(BLOCK, max(1, MANY // bones))
+        self._joints, self._parts = np.empty((self._block, bones, 4, 4)), []
         self._drawn, self._world = np.empty((count, bones, 4, 4), np.float32), np.empty((count, bones, 4, 4))
         self._own = np.empty((count, bones, 3, 3), np.float32)
         self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
@@ -154,8 +158,8 @@ class _Recording:
                 armature = named(self.name)
             with working_in(self._scene, layer):
                 self._read(row, armature)
-        if row % BLOCK == BLOCK - 1 or row == len(self.frames) - 1:
-            self._store(row - row % BLOCK, row + 1)
+        if (row + 1) % self._block == 0 or row == len(self.frames) - 1:
+            self._store(row - row % self._block, row + 1)
 
     def _read(self, row: int, armature) -> None:
         """Read the frame that the scene shows."""
@@ -175,7 +179,7 @@ class _Recording:
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        self._joints[row % BLOCK], self._own[row] = self.reader.world(evaluated), self.reader.own(evaluated)
+        self._joints[row % self._block], self._own[row] = self.reader.world(evaluated), self.reader.own(evaluated)
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for other in self._tracked:
             self._places[other][row] = world(named(other), graph)

@@ -100,8 +100,9 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
             size = sizes(local)[..., None]
             turn = local[..., :3, :3] / size[..., None]
         else:
-            size, turn = np.linalg.norm(local[..., :3, :3], axis=-2), rotation_part(local)
+            size, turn = np.linalg.norm(local[..., :3, :3], axis=-2), np.empty((*local.shape[:2], 3, 3))
             lost = sheared(local, ROUNDED)
+            turn[~lost] = rotation_part(local[~lost])
             turn[lost], size[lost] = nearest(stored[:, above][lost], joints[:, level][lost])
         size = np.broadcast_to(size, (*size.shape[:-1], 3)).astype(np.float16)  # a SkelAnimation's have half precision
         own = [each.astype(np.float32) for each in (local[..., :3, 3], to_quaternion(turn), size)]

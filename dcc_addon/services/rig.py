@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class RigArrays:
     rest: np.ndarray
     head_bone: str = ""
 
-    @property
+    @cached_property
     def paths(self) -> list[str]:
         """Joint paths (J)."""
         return names.joint_paths(list(self.bones), list(self.parents))

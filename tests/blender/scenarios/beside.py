@@ -231,13 +231,14 @@ def prepared_together(_folder: Path) -> None:
 def sampled_beside(_folder: Path) -> None:
     """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is mended."""
     from dcc_addon import background
+    from dcc_addon.scene import sampling
     from dcc_addon.session import session
 
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
-    shown = points_at(strands, 9)
+    shown, motion = points_at(strands, 9), session.rigs["Rig"].motion
 
     def sample():
         session.rigs["Rig"].stale = True
@@ -249,6 +250,11 @@ def sampled_beside(_folder: Path) -> None:
         yield 1, 2
         raise KeyError("a bone")
 
+    for many in (3, 5 * len(rig.pose.bones)):
+        with patch.object(sampling, "MANY", many):
+            sample()
+        again = session.rigs["Rig"].motion
+        assert again is not motion and apart(again.world(), motion.world()) == 0.0, "in blocks of some frames"
     with patch.object(background, "sample", broken):
         sample()
     assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
