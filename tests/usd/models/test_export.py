@@ -20,6 +20,8 @@ from usd.models.export import export_model
 def test_the_parts_of_the_input_are_those_of_the_graph(tmp_path, kind, graph, entry):
     export_model(model_file.shipped(kind), tmp_path)
     described = json.loads((tmp_path / "description.json").read_text("utf-8"))
+    assert all(each["what"] for each in described["graphs"].values())
+    assert len(described[entry]["bin weights"]) == len(described["model"]["boundary"]["bins"])
     parts = described[entry]["parts"]
     assert [0, *(end for _, end in parts.values())] == [
         *(start for start, _ in parts.values()),
