@@ -40,7 +40,8 @@ class Runtime:
             self.fixed[f"{locks}anchor"] = self.answer("offsets", self.made(self.fixed["held"]), locks)
         length = np.maximum(self.fixed["length"], 1e-3)
         own = 12.36 * material["bend"] / length**4 + 9.81 * material["weight"] / length
-        self.stray = ((own + 120) / (own + 2 * material["clumping"]))[:, None, None]
+        tie = self.fixed["tie"]
+        self.stray = ((own + 120 * tie) / (own + 2 * material["clumping"] * tie))[:, None, None]
 
     def turns(self, rotations: np.ndarray) -> np.ndarray:
         """(T, n, 3, 3) world rotations of the joints named, since the bind pose."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from neuralocks_core.materials import RANGES, Material, constants
 from neuralocks_core.motion import GRAVITY
-from neuralocks_core.strands.locks import lock_means
+from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
 from neuralocks_core.strands.strand_set import K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
@@ -20,7 +20,7 @@ CANTILEVER = 12.36
 
 @dataclass(frozen=True, eq=False)
 class Locks:
-    """The locks of a groom as strands of their own, and how their motion moves their hairs.
+    """What ties join in the locks of a groom, as strands of their own, and how their motion moves their hairs.
 
     The network knows what a hair and its lock look like, but not where its neighbours are, so it learns nothing of ties
     between them. In each frame it is therefore asked for the locks' own strands, too, and hairs are drawn to where their
@@ -28,7 +28,7 @@ class Locks:
     """
 
     strands: StrandSet
-    """A strand for each lock: the mean of its hairs."""
+    """A strand for each lock: the mean of its hairs. Hairs of one lock that nothing ties are locks by themselves."""
     rest: np.ndarray
     """The hairs' (S, 24, 3) rest points [m]."""
     lock: np.ndarray
@@ -37,13 +37,17 @@ class Locks:
     """(S,) how firmly bending stiffness holds each hair, as a clamped rod: 12.36 / L^4 [1/m^4]."""
     pendulum: np.ndarray
     """(S,) how firmly its weight holds it, as a pendulum: g / L [1/s^2]."""
+    tie: np.ndarray
+    """(S,) how firmly ties hold a hair in its lock, against one tied to the lock's mean; see `_tie`."""
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:
         """The locks of a groom; hairs that are no strands do not count."""
         count = len(strands.rest)
         flat = np.concatenate([strands.rest.reshape(count, -1), strands.uv, strands.root_normal], axis=1)
-        means = lock_means(flat, strands.lock, strands.valid)
+        mates = lock_mates(strands.rest, strands.lock)
+        own = tied_together(mates)
+        means = lock_means(flat, own, strands.valid)
         rest, uv, normal = means[:, : 3 * K].reshape(-1, K, 3), means[:, 3 * K : -3], means[:, -3:]
         normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         lock = StrandSet(
@@ -58,15 +62,16 @@ class Locks:
             facing=strands.facing,
         )
         length = np.maximum(strands.length.astype(np.float64), 1e-3)
-        return cls(lock, strands.rest, strands.lock, CANTILEVER / np.square(np.square(length)), -GRAVITY[1] / length)
+        tie = _tie(strands.rest, mates, own, rest)
+        return cls(lock, strands.rest, own, CANTILEVER / np.square(np.square(length)), -GRAVITY[1] / length, tie)
 
     def spread(self, log_ratios: np.ndarray) -> np.ndarray:
         """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more of it.
 
         Whatever drives a hair out of its lock's way works against its own stiffness k0 and its ties, 2 k in the solver's
-        energy k |x - mean of neighbours|^2 per mass. So it strays by the drive over k0 + 2 k, with k0 = 12.36 B / L^4 + w g / L:
-        ties hardly act on short hair, and are most of what holds long hair. `benchmarks/materials.py` measures it beside
-        the solver.
+        energy k |x - mean of neighbours|^2 per mass. So it strays by the drive over k0 + 2 k t, with k0 = 12.36 B / L^4 + w g / L
+        and its `tie` t: ties hardly act on short hair, and are most of what holds long hair. `benchmarks/materials.py` measures
+        it beside the solver.
 
         Args:
             log_ratios: of the material (4,), see `Material.log_ratios`.
@@ -76,7 +81,7 @@ class Locks:
         """
         bend, weight, _, clumping = constants(log_ratios)
         own = bend * self.rod + weight * self.pendulum
-        return ((own + 2 * Material().clumping) / (own + 2 * clumping)).astype(np.float32)
+        return ((own + 2 * self.tie * Material().clumping) / (own + 2 * self.tie * clumping)).astype(np.float32)
 
     def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:
         """Change how far hairs stray from their locks, every length kept.
@@ -97,3 +102,25 @@ class Locks:
         change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, 1:]
         moved[:, :2] = 0
         np.cumsum(change, axis=1, out=moved[:, 2:])
+
+
+def _tie(rest: np.ndarray, mates: np.ndarray, lock: np.ndarray, means: np.ndarray) -> np.ndarray:
+    """How firmly ties hold the hairs of each lock (S,): 1 where each is tied to all others, 0 where one is alone.
+
+    Ties join next neighbours, so a wide lock resists little when its hairs part evenly from one side to the other, and as any
+    other when one parts from the next. Hair does both: it is the geometric mean of 1 and of the Rayleigh quotient of the ties
+    in the field by which hairs lie apart at rest.
+
+    Args:
+        rest: (S, 24, 3) [m].
+        mates: (S, M) int, see `lock_mates`.
+        lock: (S,) of each hair; means: of each lock (L, 24, 3) [m].
+    """
+    apart = (rest - means[lock]).reshape(len(rest), -1)
+    tied, count = mates >= 0, len(means)
+    pulled = np.zeros_like(apart)
+    for column, there in zip(mates.T, tied.T):
+        pulled[there] += apart[there] - apart[column[there]]
+    pulled /= np.maximum(tied.sum(axis=1), 1)[:, None]
+    work, size = (np.bincount(lock, (apart * each).sum(axis=1), count) for each in (pulled, apart))
+    return np.sqrt(np.maximum(work, 0) / np.maximum(size, 1e-12))[lock]

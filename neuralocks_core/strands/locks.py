@@ -140,6 +140,16 @@ def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
     return found
 
 
+def tied_together(mates: np.ndarray) -> np.ndarray:
+    """Which strands (S,) int32 the ties of `mates` (S, M) join, directly or by others; numbered without gaps from 0."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    strand, column = np.nonzero(mates >= 0)
+    ties = csr_array((np.ones(len(strand), bool), (strand, mates[strand, column])), shape=(len(mates),) * 2)
+    return connected_components(ties, directed=False)[1].astype(np.int32)
+
+
 def _tree(points: np.ndarray):
     """Points by nearness. SciPy takes longer to import than all else that a network needs to run."""
     from scipy.spatial import cKDTree

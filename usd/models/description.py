@@ -62,7 +62,7 @@ SLIDERS = {
     "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, `anchor` anew: `offsets` of "
     "tail.onnx with `anchor` zero and the frame `held`",
     "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
-    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g}) / (k0 + 2 clumping), k0 = 12.36 bend / length^4 "
+    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "

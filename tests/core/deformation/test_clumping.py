@@ -9,22 +9,54 @@ from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.strands.strand_set import K, StrandSet
 
 LENGTHS = np.array([0.02, 0.1, 0.3, 0.6])
+EACH = 6
+"""Hairs of one length, all tied to each other."""
 
 
 @pytest.fixture(scope="module")
 def locks():
-    """Hanging hairs of four lengths in one lock."""
-    count = len(LENGTHS)
+    """Hanging hairs of four lengths, a lock of each, some millimetres apart."""
+    length = np.repeat(LENGTHS, EACH)
+    count = len(length)
     rest = np.zeros((count, K, 3), np.float32)
-    rest[:, :, 1] = -np.linspace(0, 1, K) * LENGTHS[:, None]
+    rest[:, :, 1] = -np.linspace(0, 1, K) * length[:, None]
+    rest[:, :, 0] = 0.05 * np.repeat(np.arange(len(LENGTHS)), EACH)[:, None]
+    rest[:, :, ::2] += np.random.default_rng(0).normal(0, 0.002, (count, 1, 2))
     frames = np.broadcast_to(np.eye(3, dtype=np.float32), (count, 3, 3))
     valid, lock, uv = np.ones(count, bool), np.zeros(count, np.int32), np.full((count, 2), 0.5, np.float32)
-    length = LENGTHS.astype(np.float32)
-    return Locks.of(StrandSet(rest, valid, uv, frames, lock, length, np.zeros(3), np.zeros(3), np.eye(3)))
+    zero, length = np.zeros(3), length.astype(np.float32)
+    return Locks.of(StrandSet(rest, valid, uv, frames, lock, length, zero, zero, np.eye(3)))
 
 
 def of(locks, **material):
-    return locks.spread(Material(**material).log_ratios())
+    """The factor of one hair of each length."""
+    return locks.spread(Material(**material).log_ratios())[::EACH]
+
+
+def test_a_lock_is_what_ties_join(locks):
+    assert len(locks.strands.rest) == len(LENGTHS) and len(np.unique(locks.lock[::EACH])) == len(LENGTHS)
+    np.testing.assert_allclose(
+        np.square(locks.tie), EACH / (EACH - 1), rtol=1e-4
+    )  # from the mean of the others, not of all
+
+
+def test_a_hair_that_nothing_ties_goes_its_own_way(locks):
+    """Guide hairs may have no neighbour within reach; and a wide lock of next neighbours resists little when it parts."""
+    far = np.arange(6)[:, None, None] * np.array([1.0, 0, 0])
+
+    def law(apart):
+        rest = (locks.rest[-6:] * [0, 1, 0] + apart * far).astype(np.float32)
+        one = np.zeros(6, np.int32)
+        frames, uv, zero = np.broadcast_to(np.eye(3, dtype=np.float32), (6, 3, 3)), np.full((6, 2), 0.5), np.zeros(3)
+        strands = StrandSet(rest, np.ones(6, bool), uv, frames, one, np.full(6, 0.6), zero, zero, np.eye(3))
+        found = Locks.of(strands)
+        return found, found.spread(Material(clumping=0.0).log_ratios())
+
+    found, factor = law(0.03)
+    assert len(found.strands.rest) == 6 and (factor == 1).all()
+    near, wide = law(0.003)[0], law(0.015)[0]
+    assert len(near.strands.rest) == len(wide.strands.rest) == 1
+    assert 0 < wide.tie[0] < 0.7 < near.tie[0]
 
 
 def test_the_default_changes_nothing(locks):
@@ -41,7 +73,9 @@ def test_ties_hardly_act_on_short_hair_and_are_what_holds_long_hair(locks):
     loose, bound = of(locks, clumping=0.0), of(locks, clumping=240.0)
     assert loose[0] == pytest.approx(1, abs=0.02) and bound[0] == pytest.approx(1, abs=0.06)
     assert (np.diff(loose) > 0).all() and (np.diff(bound) < 0).all()
-    assert loose[-1] == pytest.approx(1 + 120 / (9.81 / 0.6), rel=0.01)  # a pendulum, as good as without stiffness
+    assert loose[-1] == pytest.approx(
+        1 + np.sqrt(1.2) * 120 / (9.81 / 0.6), rel=0.01
+    )  # a pendulum, as good as without stiffness
 
 
 def test_what_is_stiffer_or_heavier_feels_its_ties_less(locks):
