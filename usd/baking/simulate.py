@@ -2,15 +2,18 @@
 """A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import simulated, whole_locks
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
+from neuralocks_core.runtime import cores
 
 from ..border.amounts import check_number
 from ..border.time_codes import given_cuts, time_codes
@@ -49,7 +52,8 @@ def simulate(
 
     Args:
         shot, out, grooms, skeleton, head, frames, joints, subframes, material, cuts, progress: as for `bake`.
-        strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these.
+        strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these and
+            are pushed out of the body.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
 
     Raises:
@@ -101,11 +105,23 @@ class _SimulatedPoser:
             character, every.subset(chosen), clip, seconds, material, volume=volume, progress=progress
         )
         mean = every.rest.mean(axis=1)
-        self._nearest = cKDTree(mean[chosen]).query(mean)[1]
-        self._nearest[chosen] = np.arange(len(chosen))
+        self._chosen = chosen
+        self._others = np.setdiff1d(np.arange(len(mean)), chosen)
+        self._nearest = cKDTree(mean[chosen]).query(mean[self._others])[1]
+        self._resolver = Resolver(character, every.subset(self._others), clip)
 
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32, in the prim's own space and units."""
-        moved = self._moved[self._row[time_code]]
-        joints = self._rig.joints_at(time_code)
-        return self._placer.points(time_code, joints, lambda strands: moved[self._nearest[strands]])
+        joints, row = self._rig.joints_at(time_code), self._moved[self._row[time_code]]
+        moved = np.empty((len(self._chosen) + len(self._others), *row.shape[1:]), np.float32)
+        moved[self._chosen], moved[self._others] = row, self._resolved(row[self._nearest], time_code, joints)
+        return self._placer.points(time_code, joints, lambda strands: moved[strands])
+
+    def _resolved(self, followed: np.ndarray, time_code: float, joints: np.ndarray) -> np.ndarray:
+        """Displacement (n, 24, 3) of the strands that follow, kept out of the body: they lie elsewhere than those that they
+        follow, which the solver kept out of it.
+        """
+        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+        with ThreadPoolExecutor(cores()) as pool:
+            self._resolver.apply(followed, joints, shape, pool.map)
+        return followed

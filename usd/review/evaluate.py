@@ -21,7 +21,7 @@ from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.strand_set import K, StrandSet, strands_on
 
 from ..border.damage import names_damage
-from ..shot.recorded import recorded_material
+from ..shot.recorded import recorded, recorded_material
 from ..shot.stage import StageGroom
 from .baked import Baked, read_baked
 
@@ -94,7 +94,8 @@ class _Subject:
         self.baked, self.item, self.say = baked, item, say
         self.character, groom = item.attachment.character, item.groom
         every = strands_on(self.character, groom)
-        self.chosen = comparison.whole_locks(every, STRANDS)
+        # The strands that a solver moved are the first choice of seed 0: those that follow them must be met, too.
+        self.chosen = comparison.whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self.valid = int(every.valid.sum())
         self._within(groom)

@@ -4,8 +4,13 @@
 import numpy as np
 import pytest
 
+from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.evaluation.comparison import whole_locks
+from neuralocks_core.strands.strand_set import strands_on
 from usd.baking.simulate import simulate
+from usd.review.baked import read_baked
+from usd.review.evaluate import evaluate
 
 from ..shots import Recipe, samples, world_points, write_shot
 
@@ -21,6 +26,27 @@ def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
     lengths = [np.linalg.norm(np.diff(p.reshape(12, 12, 3), axis=1), axis=-1).sum(1) for p in (first, last)]
     assert np.abs(lengths[1] / lengths[0] - 1).max() < 0.05
     assert np.abs(samples(result.path, "velocities", at=5.0)).max() > 1
+
+
+def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypatch):
+    """And what is simulated stays as the solver has it. A report card tells of both."""
+    shot, points, cards = write_shot(tmp_path, Recipe(strands=160, vertices=24, frames=20)), [], []
+    for name in ("free", "kept"):
+        if name == "free":
+            monkeypatch.setattr(Resolver, "apply", lambda *args: None)
+        out = simulate(shot, tmp_path / f"{name}.usdc", strands=20).path
+        monkeypatch.undo()
+        points.append(samples(out, "points", at=16.0).reshape(160, 24, 3))
+        cards.append(evaluate(out).grooms["/Hero/Hair"])
+    item = read_baked(out).shot.grooms[0]
+    every = strands_on(item.attachment.character, item.groom)
+    chosen = whole_locks(every, 20)
+    assert (points[0][chosen] == points[1][chosen]).all() and (points[0] != points[1]).any()
+    free, kept = (card["penetration_3mm_percent"] for card in cards)
+    assert kept < 0.1 * free > 0.05
+    monkeypatch.setattr("usd.review.evaluate.STRANDS", 20)
+    few = evaluate(tmp_path / "free.usdc").grooms["/Hero/Hair"]
+    assert few["measured"] == 20 and few["penetration_3mm_percent"] > 0.3 * free
 
 
 def test_what_would_take_for_ever_or_means_nothing_is_refused(tmp_path):
