@@ -25,7 +25,7 @@ class Track:
         # Here, because it takes as long to import as all else that a runtime needs.
         from scipy.interpolate import CubicSpline
 
-        times, poses = _extended(clip)
+        times, poses = extended(clip)
         quaternions = rotation.continuous(rotation.to_quaternion(character.relative_rotations(poses, joints)))
         values = np.concatenate([poses[:, character.head, :3, 3], quaternions.reshape(len(times), -1)], axis=1)
         self._clip, self._start, self._end = clip, times[0], times[-1]
@@ -54,7 +54,7 @@ class Track:
         return position, rotation.from_quaternion(values[:, 3:].reshape(len(times), -1, 4))
 
 
-def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+def extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is
     smooth.
     """

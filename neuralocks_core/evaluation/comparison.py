@@ -11,6 +11,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress
 from neuralocks_core.rotation import rotation_part
+from neuralocks_core.smooth_motion import SmoothMotion
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 
@@ -18,6 +19,8 @@ STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
 MOST_STEPS = 10_000
 """Over five minutes; all of a rollout is held in memory."""
+TOGETHER = 32
+"""Strands whose rollout is interpolated at a time."""
 
 
 def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray) -> dict[str, float]:
@@ -57,7 +60,8 @@ def simulated(
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
 
-    It runs at its own step from the first time on, and anew from each cut, and is interpolated in between.
+    It runs at its own step from the first time on, and anew from each cut, and is interpolated in between. The motion
+    that it feels is smooth between the clip's samples, as the network reads it.
 
     Args:
         character: with its body.
@@ -91,8 +95,9 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
     """What `simulated` gives, of a clip without cuts and with hair at rest at `start` [s]."""
     from neuralocks_core.reference import simulate
 
-    clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 1)
-    joints, shapes = _unscaled(character, clip.at(clock)), clip.shape_at(clock)
+    # One step more than the last time needs: how hair goes on there is known, whichever times are wanted.
+    clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
+    joints, shapes = _unscaled(character, SmoothMotion(clip).at(clock)), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
@@ -110,11 +115,21 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
         bind_body=bind,
         **options,
     )
-    place = np.clip((times - start) / STEP, 0, len(clock) - 1)
-    low = np.minimum(place.astype(int), max(len(clock) - 2, 0))
-    part = (place - low)[:, None, None, None].astype(np.float32)
-    high = np.minimum(low + 1, len(clock) - 1)
-    return (1 - part) * rollout.points[low] + part * rollout.points[high] - strands.rest
+    return _between(clock, rollout.points, times) - strands.rest
+
+
+def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Points (T, S, 24, 3) float32 at times (T,), which are none before `clock` (C,) nor after it, of points
+    (C, S, 24, 3) there: cubics whose slopes are those of a parabola through each point and its neighbours.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    result, order = np.empty((len(times), *points.shape[1:]), np.float32), min(2, len(clock) - 1)
+    for low in range(0, points.shape[1], TOGETHER):
+        some = points[:, low : low + TOGETHER].astype(float)
+        slopes = np.gradient(some, STEP, axis=0, edge_order=order)
+        result[:, low : low + TOGETHER] = CubicHermiteSpline(clock, some, slopes)(times)
+    return result
 
 
 def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
