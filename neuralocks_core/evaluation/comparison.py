@@ -17,6 +17,9 @@ from neuralocks_core.strands.strand_set import StrandSet
 
 STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
+RUN_IN = 10.0
+"""Time [s] after which what was earlier has died away: a loop's hair, simulated from rest for so long, ends a period where it
+began, but for millimetres of a few strands that creep over skin."""
 MOST_STEPS = 10_000
 """Over five minutes; all of a rollout is held in memory."""
 TOGETHER = 32
@@ -66,7 +69,7 @@ def simulated(
     Args:
         character: with its body.
         strands: all valid.
-        clip: the motion.
+        clip: the motion. Of a loop, the first time should be RUN_IN before the next.
         times: (T,) [s].
         material: of the hair.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.

@@ -85,6 +85,22 @@ def write_shot(folder: Path, recipe: Recipe = Recipe(), name: str = "shot") -> P
     return path
 
 
+def write_loop(folder: Path) -> Path:
+    """Write a shot of six strands on a head that shakes once in 12 frames and is in the 13th as in the first."""
+    path = write_shot(folder, Recipe(frames=13, strands=6), "loop")
+    stage = Usd.Stage.Open(str(path))
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    still = animation.GetTranslationsAttr().Get(1.0)
+    for frame in range(1, 14):
+        turns = [Gf.Quatf(1)] * len(JOINTS)
+        angle = 45 * np.sin(np.pi * (frame - 1) / 6)
+        turns[HEAD] = Gf.Quatf(Gf.Rotation(Gf.Vec3d(0.5, 1, 0), float(angle)).GetQuat())
+        animation.GetRotationsAttr().Set(Vt.QuatfArray(turns), frame)
+        animation.GetTranslationsAttr().Set(still, frame)
+    stage.Save()
+    return path
+
+
 def strand_points(strands: int, vertices: int) -> np.ndarray:
     """(strands, vertices, 3) [m]: slightly curled hair on the upper half of the head."""
     rng = np.random.default_rng(5)

@@ -3,14 +3,14 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.comparison import simulated, whole_locks
+from neuralocks_core.evaluation.comparison import RUN_IN, simulated, whole_locks
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
@@ -45,13 +45,14 @@ def simulate(
     material=None,
     strands: int | None = None,
     volume: float = 0.0,
+    loop: bool = False,
     cuts=None,
     progress: Progress | None = None,
 ) -> BakeResult:
     """Simulate a shot's hair and write it as a bake.
 
     Args:
-        shot, out, grooms, skeleton, head, frames, joints, subframes, material, cuts, progress: as for `bake`.
+        shot, out, grooms, skeleton, head, frames, joints, subframes, material, loop, cuts, progress: as for `bake`.
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these and
             are pushed out of the body.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
@@ -66,18 +67,20 @@ def simulate(
     count = STRANDS if strands is None else strands
     check_number("--strands", count, 1, whole=True)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
-    cuts = given_cuts(cuts)
+    cuts = given_cuts(cuts, loop)
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
-    inputs = {"strands": count, "material": look.log_ratios().tolist(), "volume": volume, "codes": codes}
+    options = {"volume": float(volume), "loop": loop}
+    inputs = {"strands": count, "material": look.log_ratios().tolist(), "codes": codes, **options}
 
     def poser(item: StageGroom) -> _SimulatedPoser:
-        return _SimulatedPoser(item, codes, shot.first, look, count, volume, progress)
+        return _SimulatedPoser(item, codes, shot.first, look, count, **options, progress=progress)
 
-    facts = {"solver": "rods", "material": asdict(look), "strands": count, "volume": float(volume)}
+    facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= given_facts(cuts, joints)
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
+    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
     notes += [text for rig in shot.rigs if cuts is None for text in rig.cut_notes()]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
@@ -86,23 +89,23 @@ class _SimulatedPoser:
     """Points of one groom out of a simulation of some of its strands."""
 
     def __init__(
-        self, item: StageGroom, codes: list[float], first: float, material, count: int, volume: float, progress
+        self, item: StageGroom, codes: list[float], first: float, material, count: int, *, volume, loop, progress
     ):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
         chosen = whole_locks(every, count)
         if not len(chosen):
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
-        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest.
-        start = float(self._rig.time_codes[0])
-        wanted = {code: max(code, start) for code in Stencils(item, codes, first).codes}
-        times = sorted({start, *wanted.values()})
-        rows = {time: row for row, time in enumerate(times)}
-        self._row = {code: rows[time] for code, time in wanted.items()}
-        seconds = self._rig.border.seconds(times)
-        clip, character = self._rig.clip, item.attachment.character
+        codes, clip = Stencils(item, codes, first).codes, replace(self._rig.clip, loop=loop)
+        seconds = self._rig.border.seconds(codes)
+        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no
+        # beginning: what is wanted of it comes after some time.
+        wanted = clip.wrapped(seconds) if loop else np.maximum(seconds, clip.start)
+        times = np.unique([clip.start - RUN_IN * loop, *wanted])
+        self._row = dict(zip(codes, np.searchsorted(times, wanted), strict=True))
+        character = item.attachment.character
         self._moved = simulated(
-            character, every.subset(chosen), clip, seconds, material, volume=volume, progress=progress
+            character, every.subset(chosen), clip, times, material, volume=volume, progress=progress
         )
         mean = every.rest.mean(axis=1)
         self._chosen = chosen

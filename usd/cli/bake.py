@@ -15,6 +15,7 @@ from .options import (
     Head,
     Jobs,
     Joints,
+    Loop,
     Materials,
     Model,
     Out,
@@ -40,9 +41,7 @@ def bake_command(
         float, typer.Option(help="Motion strength from 0 (each pose as if held) to 4; 1 is as trained.")
     ] = 1.0,
     resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
-    loop: Annotated[
-        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
-    ] = False,
+    loop: Loop = False,
     cuts: Cuts = None,
     velocities: Annotated[bool, typer.Option(help="Write velocities for motion blur.")] = True,
     jobs: Jobs = None,
@@ -102,6 +101,7 @@ def simulate_command(
     strands: Annotated[
         int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
     ] = None,
+    loop: Loop = False,
     cuts: Cuts = None,
     volume: Annotated[
         float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
@@ -116,7 +116,7 @@ def simulate_command(
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,
-            cuts=cut_codes(cuts), progress=progress,
+            loop=loop, cuts=cut_codes(cuts), progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
 

@@ -34,6 +34,7 @@ Materials = Annotated[
         "damping 4..20 /s, clumping 0..240 /s^2.",
     ),
 ]
+Loop = Annotated[bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")]
 Cuts = Annotated[
     list[str] | None,
     typer.Option(

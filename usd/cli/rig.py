@@ -11,7 +11,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 
 from .command import command_of, counted, note, print_json
-from .options import AsJson, Cuts, Head, Joints, Seed, Skeleton, cut_codes, pairs
+from .options import AsJson, Cuts, Head, Joints, Loop, Seed, Skeleton, cut_codes, pairs
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -107,9 +107,7 @@ def bake(
         str | None, typer.Option(help="A:B[:STEP] to sample besides the animation's own; the shot's range if left out.")
     ] = None,
     subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
-    loop: Annotated[
-        bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")
-    ] = False,
+    loop: Loop = False,
     strength: Annotated[
         float, typer.Option(help="Motion strength of a dynamic model, from 0 to 2; 1 is as trained.")
     ] = 1.0,

@@ -2,6 +2,7 @@
 """`neuralocks evaluate`: the report card of a bake."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +15,7 @@ from neuralocks_core.evaluation import comparison
 from neuralocks_core.evaluation.pose_energies import energies, stretch_energy
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
-from neuralocks_core.motion import GRAVITY, G
+from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
@@ -34,8 +35,6 @@ COLLISION_VERTICES = 200_000
 """Most own vertices whose distances are measured, evenly along the strands."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
-BEFORE = 10.0
-"""Most time [s] that the reference is simulated before the bake's first frame: what was earlier has died away."""
 
 
 @names_damage
@@ -213,11 +212,13 @@ class _Subject:
         strands, times = self.strands, self.baked.times
         few = comparison.whole_locks(strands, REFERENCE_STRANDS)
         some = strands.subset(few)
-        rig = self.item.attachment.rig
+        clip = self._clip
         # The network knows what came before the first frame baked, so the reference must, too.
-        begun = max(min(times[0], rig.clip.start), times[0] - BEFORE)
+        begun = times[0] - comparison.RUN_IN
+        if not clip.loop:
+            begun = max(min(times[0], clip.start), begun)
         known = np.concatenate([[begun], times])
-        true = comparison.simulated(self.character, some, rig.clip, known, material, progress=self.say)[1:]
+        true = comparison.simulated(self.character, some, clip, known, material, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
@@ -226,7 +227,6 @@ class _Subject:
 
     def _held(self, material: Material, model, few) -> np.ndarray | None:
         """The model's answer for each pose as if it were held, if there is a model."""
-        rig = self.item.attachment.rig
         try:
             model = model if isinstance(model, StrandModel) else StrandModel.load(model)
         except NeuralocksError:
@@ -234,11 +234,16 @@ class _Subject:
                 raise
             return None
         session = StrandSession(model, self.strands)
-        sampler = model.sampler(self.character, rig.clip)
+        sampler = model.sampler(self.character, self._clip)
         ratios = material.log_ratios()
         session.anchor(sampler.held_bind(ratios))
         vectors = sampler.vectors(self.baked.times, ratios, 0.0)
         return np.stack([session.displacement(vector)[few] for vector in vectors])
+
+    @cached_property
+    def _clip(self) -> Clip:
+        """The motion, a loop where the bake tells that it was one."""
+        return replace(self.item.attachment.rig.clip, loop=bool(recorded(self.item.prim).get("loop")))
 
     @cached_property
     def _resolver(self) -> Resolver:

@@ -11,8 +11,9 @@ from neuralocks_core.strands.strand_set import strands_on
 from usd.baking.simulate import simulate
 from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
+from usd.review.inspect import inspect
 
-from ..shots import Recipe, samples, world_points, write_shot
+from ..shots import Recipe, samples, world_points, write_loop, write_shot
 
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
@@ -76,3 +77,19 @@ def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_pat
     assert samples(early, "points", at=-3).tobytes() == samples(early, "points", at=1).tobytes()
     before = simulate(shot, tmp_path / "before.usdc", strands=1, frames="-3:-2")
     assert any("none of it within -3 to -2" in note for note in before.notes)
+
+
+def test_a_loop_ends_as_it_begins(tmp_path):
+    """And its frames are the same, whichever are wanted."""
+    shot = write_loop(tmp_path)
+    whole, part = (
+        simulate(shot, tmp_path / f"{name}.usdc", strands=6, loop=True, frames=frames).path
+        for name, frames in (("whole", None), ("part", "7:12"))
+    )
+    first, last, middle = (world_points(whole, code) for code in (1.0, 13.0, 7.0))
+    assert np.abs(first - last).max() < 1e-3 < np.abs(first - middle).max()
+    assert np.abs(first - world_points(shot, 1.0)).max() > 5e-3
+    assert samples(whole, "points", at=7).tobytes() == samples(part, "points", at=7).tobytes()
+    assert inspect(whole)["grooms"][0]["baked with"]["loop"] is True
+    with pytest.raises(NeuralocksError, match="--cuts: a loop has none"):
+        simulate(shot, tmp_path / "cut.usdc", loop=True, cuts=[5])

@@ -18,7 +18,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.recorded import record, recorded
 
-from ..shots import Recipe, write_shot
+from ..shots import Recipe, write_loop, write_shot
 
 FRAMES = "1:60:4"
 
@@ -74,6 +74,17 @@ def test_a_part_of_a_shot_is_compared_with_hair_that_knows_what_came_before(tmp_
         tips.append(evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"])
     assert np.linalg.norm(tips[1][0]) > 0.005
     np.testing.assert_allclose(tips[1], tips[0][12:], atol=1e-5)
+
+
+def test_a_loop_is_compared_with_a_loop(tmp_path, model):
+    """Else the reference begins at rest where the bake remembers the end, and takes the loop's seam for a stop."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    shot, off = write_loop(tmp_path), {}
+    for loop in (False, True):
+        bake(shot, tmp_path / "hair.usdc", model, loop=loop, velocities=False)
+        tips = evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"]
+        off[loop] = np.linalg.norm(tips[0] - tips[-1])
+    assert off[True] < 5e-4 < 5e-3 < off[False]
 
 
 def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
