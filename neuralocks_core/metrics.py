@@ -98,9 +98,10 @@ def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -
 
 
 def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> int:
-    """Longest run of consecutive frames in which hair moves at 35 % of the reference's mean speed or more.
+    """Longest run of consecutive samples, of which a frame may have several, in which hair moves at 35 % of the reference's
+    mean speed or more.
 
-    Frames in which the reference stands still neither count nor break a run.
+    Samples at which the reference stands still neither count nor break a run.
     """
     own, true = speed(points, times).mean(axis=(1, 2)), speed(reference, times).mean(axis=(1, 2))
     moving = true >= STILL

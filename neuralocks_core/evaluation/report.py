@@ -37,7 +37,7 @@ LABELS = {
     "motion_error_rms": ("motion error, rms", "", "rigid = 1"),
     "velocity_error": ("velocity error", "", "rigid = 1"),
     "motion_ratio": ("motion ratio", "", "1 = as lively as the reference"),
-    "dynamic_frames": ("consecutive dynamic frames", "", "at 35 % of the reference's motion or more"),
+    "dynamic_frames": ("consecutive dynamic samples", "", "at 35 % of the reference's motion or more"),
     "tip_correlation": ("tip curve correlation", "", ""),
 }
 """Name of a measure -> what a person reads, unit, remark."""

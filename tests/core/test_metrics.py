@@ -6,6 +6,7 @@ import pytest
 
 from neuralocks_core import metrics
 from neuralocks_core.evaluation.pose_energies import curvature, energies, stretch_energy
+from neuralocks_core.evaluation.report import LABELS
 from neuralocks_core.materials import Material
 
 TIMES = np.arange(0, 4, 1 / 50)
@@ -87,6 +88,13 @@ def test_dynamic_frames_counts_the_longest_run():
     stopped = reference.copy()
     stopped[60:] = stopped[60]
     assert 55 <= metrics.dynamic_frames(stopped, stopped, TIMES) <= 60
+
+
+def test_dynamic_frames_are_samples_and_the_card_says_so():
+    """A shot's frame may have several."""
+    reference, _ = swinging()
+    assert metrics.dynamic_frames(reference[::2], reference[::2], TIMES[::2]) <= len(TIMES) // 2
+    assert "samples" in LABELS["dynamic_frames"][0]
 
 
 def test_settling_of_a_decaying_swing():
