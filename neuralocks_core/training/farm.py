@@ -53,9 +53,11 @@ class RolloutFarm:
         for leftover in self.folder.glob("*.tmp"):
             leftover.unlink(missing_ok=True)
 
-    def files(self) -> list[Path]:
-        """The rollouts that are there by now, in order."""
-        return sorted(self.folder.glob("*.npz"))
+    def files(self, first: int | None = None) -> list[Path]:
+        """The rollouts that are there by now, in order: all, or those of the `first` so many numbers."""
+        if first is None:
+            return sorted(self.folder.glob("*.npz"))
+        return [path for path in (_path(self.folder, index) for index in range(first)) if path.exists()]
 
     @property
     def alive(self) -> bool:
@@ -115,12 +117,16 @@ def load(path: Path) -> Rollout:
     )
 
 
+def _path(folder: Path, index: int) -> Path:
+    return folder / f"{index:06d}.npz"
+
+
 def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not inherited, as on Windows
     parent = multiprocessing.parent_process()
     maker = RolloutMaker(scene)
     for index in indices:
-        path = folder / f"{index:06d}.npz"
+        path = _path(folder, index)
         if not path.exists():
             save(path, maker.make(index))
         if parent is not None and not parent.is_alive():

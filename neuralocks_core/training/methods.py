@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from neuralocks_core.training.selfsupervised import train_on_moments
 
 FIRST = 24
 """Clips to wait for before the network starts: enough to normalise its inputs by."""
+STEPS_EACH = 10
+"""Steps to each further clip of a run of so many steps: about as many as two cores take while one is made."""
 
 
 def method_of(
@@ -45,8 +48,9 @@ class RolloutMethod:
         self.options, self.farm = options, farm
         self.bank = RolloutBank(scene, codes)
         self.inputs = self.bank.inputs
+        self._report = report
         wait(farm, min(FIRST, farm.count), lambda count: report(0.0, f"first simulations: {count}"))
-        self.bank.add(farm.files())
+        self.bank.add(self._at_step(0) if options.steps else farm.files())
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
         """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
@@ -54,7 +58,16 @@ class RolloutMethod:
 
     def train(self, net: StrandNet, optimisers, **since) -> Iterator[Descended]:
         """See `regression.regress`."""
-        return regress(self.bank, net, self.options, optimisers, self.farm.files, **since)
+        return regress(self.bank, net, self.options, optimisers, self.farm.files, at_step=self._at_step, **since)
+
+    def _at_step(self, step: int) -> list[Path]:
+        """What a run of so many steps learns from at one of them, however fast the farm is; waits for it."""
+        count, farm = min(FIRST + step // STEPS_EACH, self.farm.count), self.farm
+        if count == len(self.bank.rollouts):
+            return []
+        done = step / self.options.steps
+        wait(farm, count, lambda there: self._report(done, f"{step} steps, simulations: {there}"), numbered=True)
+        return farm.files(count)
 
     def material(self) -> str:
         """What there is to learn from, in a word."""
@@ -115,14 +128,14 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
     return strands, np.concatenate(frames)
 
 
-def wait(farm: RolloutFarm, count: int, say: Callable[[str], None]) -> None:
-    """Until a farm has made `count` rollouts; `say` is told how many there are.
+def wait(farm: RolloutFarm, count: int, say: Callable[[str], None], numbered: bool = False) -> None:
+    """Until a farm has made `count` rollouts, or if `numbered` the first `count`; `say` is told how many there are.
 
     Raises:
         NeuralocksError: a process of it failed.
     """
-    while len(farm.files()) < count:
+    while (there := len(farm.files(count if numbered else None))) < count:
         if farm.failed() or not farm.alive:
             raise NeuralocksError("training: the solver's process ended early; free some memory and try again")
-        say(f"{len(farm.files())} of {count}")
+        say(f"{there} of {count}")
         time.sleep(0.2)

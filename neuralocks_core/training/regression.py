@@ -38,7 +38,7 @@ class RegressionOptions:
 
     Attributes:
         minutes: wall-clock budget; `steps` wins where it is given.
-        steps: number of steps, for reproducible runs.
+        steps: number of steps; a run is then repeatable on one machine with one number of threads, whatever else it does.
         clips: rollouts in a step.
         moments: pairs of consecutive frames from each.
         strands: strands from each.
@@ -149,6 +149,7 @@ def regress(
     optimisers: list[torch.optim.Optimizer],
     new_files: Callable[[], list[Path]],
     *,
+    at_step: Callable[[int], list[Path]] | None = None,
     step: int = 0,
     done: float = 0.0,
 ) -> Iterator[Descended]:
@@ -160,17 +161,23 @@ def regress(
         options: budget and settings.
         optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
         new_files: the rollouts on disk by now.
+        at_step: the rollouts for a step; asked in place of `new_files`, before each, where `options.steps` is given.
         step, done: where an earlier run stopped.
     """
     net.train()
     rng = np.random.default_rng([options.seed, step])
 
-    def losses(_: float) -> dict[str, Tensor]:
+    counted = at_step if options.steps else None
+
+    def losses(done: float) -> dict[str, Tensor]:
+        if counted:
+            bank.add(counted(round(done * options.steps)))
         return regression_losses(net, bank.batch(rng, options), options)
 
     schedule = Schedule(options.minutes, options.steps, options.rate)
     for state in descend(optimisers, losses, schedule, step=step, done=done):
-        bank.add(new_files())
+        if not counted:
+            bank.add(new_files())
         yield state
     net.eval()
 

@@ -38,7 +38,7 @@ def train_command(
         list[str] | None, typer.Option(help="BVH or USD motions; made-up motion is always added.")
     ] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
-    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes; repeatable.")] = None,
     begin: Annotated[
         str | None,
         typer.Option(

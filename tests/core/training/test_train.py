@@ -17,7 +17,7 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.training import checkpoint
+from neuralocks_core.training import checkpoint, methods
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.regression import RegressionOptions
 from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
@@ -59,6 +59,24 @@ def test_held_out_strands_are_never_trained_on(scene):
     groom = scene.grooms[0]
     assert not set(held_out_split(groom, True)) & set(held_out_split(groom, False))
     assert len(held_out_split(groom, True)) > 0
+
+
+def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, tmp_path, monkeypatch):
+    """By seconds, each step learned from what happened to be there."""
+    monkeypatch.setattr(methods, "FIRST", 4)
+    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
+    graphs = []
+    for name, ready in (("early", 10), ("late", 0)):
+        out = tmp_path / f"{name}.neuralocks"
+        folder = tmp_path / f"{name}.neuralocks.training/rollouts"
+        folder.mkdir(parents=True)
+        for index in range(ready):
+            save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
+        monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
+        train_strands(scene, out, RegressionOptions(steps=80, clips=4, strands=4), rollouts=10)
+        graphs.append(model.read(out).graphs)
+        assert model.read(out).meta["training"]["rollouts"] == 10
+    assert graphs[0] == graphs[1]
 
 
 def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
