@@ -91,7 +91,8 @@ class _Hair:
         self.stiffness = self._reals(np.maximum(4 * material["bend"][:, None] / rods.mass, 1e-9))
         self.weight, self.damping = self._numbers(material["weight"]), self._numbers(material["damping"])
         self.gravity = wp.vec3(0.0, -gravity, 0.0)
-        self.old = wp.zeros(self.shape, dtype=wp.vec3, device=device)
+        self.old, self.twist = (wp.zeros(self.shape, dtype=wp.vec3, device=device) for _ in range(2))
+        self.waiting = wp.zeros(self.shape, dtype=wp.float32, device=device)
         far = np.full((*self.shape, 4), [0, 0, 0, -1e3], np.float32)
         self.plane = wp.array(far, dtype=wp.vec4, device=device)
         self.limit = self._reals(np.full((self.strands, vertices), margin))
@@ -128,7 +129,7 @@ class _Hair:
         self._run(
             self.kernels.frame, self.strands, self.length, self.inverse_mass, self.stiffness, self.curl, self.home,
             self.push, self.weight, self.damping, turns, origins, self.gravity, step, self.plane, self.limit, self.x,
-            self.old, self.velocity,
+            self.old, self.velocity, self.twist, self.waiting,
         )  # fmt: skip
 
     def read(self, head: np.ndarray, b: int, points: np.ndarray, planes: np.ndarray) -> None:

@@ -7,7 +7,9 @@ import pytest
 pytest.importorskip("warp", reason="the reference needs warp")
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.hairstyles import Obstacle, Scalp, grow
 from neuralocks_core.reference import simulate, simulate_xpbd
+from neuralocks_core.strands.strand_set import strand_set
 from tests.core.reference.swinging_heads import carried, edge_lengths, groom, shaken, sphere
 
 
@@ -29,6 +31,38 @@ def test_curls_agree():
     moved = np.linalg.norm(newton - rest, axis=-1).mean()
     small = simulate_xpbd(rest, head, substeps=80).points
     assert np.linalg.norm(small - newton, axis=-1).mean() < 0.15 * moved
+
+
+def library(style, strands=24):
+    """(S, 24, 3) of a library's style on a ball's upper half, around its centre."""
+    points, faces = sphere(0.09)
+    upper = faces[points[faces, 1].min(1) > 0]
+    scalp = Scalp(points, upper, np.zeros(3))
+    groom = grow(style, scalp, strands, 3, Obstacle(scalp, (points, faces)))
+    return strand_set(groom, np.zeros(3), np.zeros(3)).rest.astype(float)
+
+
+@pytest.mark.parametrize("style", ["wavy", "tight_curls", "coils", "afro"])
+def test_curls_come_to_rest(style):
+    """The bends' force has a potential: what turns the frame of a bend is pushed back by it."""
+    rest = library(style)
+    head = np.tile(np.eye(4), (75, 1, 1))
+    head[:, 0, 3] = 0.03 * np.clip(np.arange(75) / 6, 0, 1)
+    for bend in (1e-3, 1e-1):
+        points = simulate_xpbd(rest, head, material={"bend": bend}).points[-15:]
+        speed = 30 * np.linalg.norm(np.diff(points, axis=0), axis=-1).mean((0, 2))
+        assert speed.max() < 3e-3
+
+
+def test_curls_tend_to_the_implicit_solution():
+    rest, head = library("tight_curls"), shaken(30)
+    newton = simulate(rest, head, substeps=16, iterations=30, tolerance=1e-5).points
+    moved = np.linalg.norm(newton - rest, axis=-1).mean()
+    error = [
+        np.linalg.norm(simulate_xpbd(rest, head, substeps=n).points - newton, axis=-1).mean() / moved
+        for n in (20, 60, 180)
+    ]
+    assert error[2] < 0.03 and error[2] < 0.6 * error[1] < 0.36 * error[0]
 
 
 def test_bind_pose_and_constant_speed():
