@@ -2,7 +2,7 @@
 """The trusted simulator: implicit, inextensible rods on the network's own energies."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,9 @@ def simulate(
     if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
     way, frames = head_motion(head, substeps), len(head)
+    # about the head's first place: far from the world's origin rounding would decide
+    away = way.origin[0]
+    way = replace(way, origin=way.origin - away)
     material = check_material(material, strands)
     result = _empty_rollout(frames, strands, vertices)
     if strands == 0:
@@ -114,8 +117,9 @@ def simulate(
     )
     if body is not None:
         first, faces = check_body(body, triangles, frames)
+        first = first - away
         if bind_body is None:
-            bind_body = (first - way.origin[0]) @ np.asarray(head[0], np.float64)[:3, :3]
+            bind_body = first @ np.asarray(head[0], np.float64)[:3, :3]
         stepper.attach_body(np.asarray(bind_body), faces)
         stepper.move_body(first)
     _begin(stepper, way, rods, start, iterations)
@@ -123,7 +127,7 @@ def simulate(
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
-                stepper.move_body(_between(body, step, substeps))
+                stepper.move_body(_between(body, step, substeps) - away)
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
         left = stepper.read(result.points[frame], result.planes[frame])
         result.residual[frame], result.iterations[frame] = left

@@ -2,6 +2,7 @@
 """Extended position based dynamics: the simulator that games use, as the baseline of speed and accuracy."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,19 +54,22 @@ def simulate_xpbd(
     if not (np.isfinite(dt) and dt > 0) or substeps < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}: must be positive")
     rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
+    # about the head's first place, as in `rods.simulate`
+    away = way.origin[0]
+    way = replace(way, origin=way.origin - away)
     strands, vertices = rods.mass.shape
     hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)
     step, first = dt / substeps, head[0, :3, :3].astype(float)
     hair.begin(first, (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3))
     if body is not None:
         start, faces = check_body(body, triangles, frames)
-        hair.attach_body((start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
+        hair.attach_body((start - away) @ first if bind_body is None else np.asarray(bind_body), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     planes = np.empty((frames, strands, vertices, 4), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
         if body is not None:
-            hair.look(body[t], a, b)
+            hair.look(np.asarray(body[t]) - away, a, b)
         if t:
             hair.go(a, b, step)
         hair.read(head[t], b, points[t], planes[t])

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("warp", reason="the reference needs warp")
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.reference import simulate
+from neuralocks_core.reference import simulate, simulate_xpbd
 from tests.core.reference.swinging_heads import carried, edge_lengths, groom, heads, shaken, sphere
 
 
@@ -19,6 +19,19 @@ def test_bind_pose_stays_put():
     result = simulate(rest, head, carried(head, points), faces, neighbours=ties, bind_body=points)
     assert np.abs(result.points - rest).max() < 2e-6
     assert result.residual.max() < 1e-3
+
+
+@pytest.mark.parametrize("solver", [simulate, simulate_xpbd])
+def test_the_distance_from_the_origin_does_not_matter(solver):
+    """A power of two, so that the arguments themselves are not rounded."""
+    rest, head = groom(6), shaken()
+    head[:, :3, 3] = np.round(head[:, :3, 3] * 2**20) / 2**20
+    points, faces = sphere()
+    body = np.round(carried(head, points).astype(float) * 2**20) / 2**20
+    near = solver(rest, head, body, faces).points
+    head[:, :3, 3] += 4096.0
+    far = solver(rest, head, body + 4096.0, faces).points
+    assert np.abs(near - far).max() < 1e-5
 
 
 def test_constant_velocity_is_rest():
