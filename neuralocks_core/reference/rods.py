@@ -29,7 +29,8 @@ class Rollout:
     """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; (0, 0, 0, -1e3) if
     it is farther than 2 cm."""
     residual: np.ndarray
-    """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity."""
+    """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity; neighbours
+    and body planes as last looked at. Where rounding stops a strand before its tolerance it is not to be trusted."""
     iterations: np.ndarray
     """(T,) mean Newton steps a strand took for the frame."""
 

@@ -15,7 +15,8 @@ REACH = 0.1
 NEAR = 0.02
 """[m] planes farther away are not reported."""
 CHUNKS = (3, 3, 100)
-"""Newton steps between two looks at the body and at the neighbours."""
+"""Newton steps between two looks at the body and at the neighbours. Three looks a step, however many iterations: at
+clumping 240 strands that pull on each other are up to 2.7 mm from where they would settle, at 60 about 0.1 mm."""
 
 
 class Stepper:
