@@ -87,13 +87,12 @@ class Film:
         self._canvas = canvas(width, height, triangles, len(self._tone), detail)
 
     def shoot(self, frames, say: Callable[[int], None] = lambda done: None) -> Iterator[np.ndarray]:
-        """Pictures (height, width, 3) uint8 of frames; one is lit while the one before is drawn."""
-        with ThreadPoolExecutor(1) as pool:
-            ahead = pool.submit(self.light, int(frames[0]))
+        """Pictures (height, width, 3) uint8 of frames; two are lit while the one before is drawn."""
+        with ThreadPoolExecutor(2) as pool:
+            ahead = [pool.submit(self.light, int(frame)) for frame in frames[:2]]
             for i, frame in enumerate(frames):
-                lit = ahead.result()
-                if i + 1 < len(frames):
-                    ahead = pool.submit(self.light, int(frames[i + 1]))
+                lit = ahead.pop(0).result()
+                ahead += [pool.submit(self.light, int(after)) for after in frames[i + 2 : i + 3]]
                 yield self._canvas.draw(self._cameras[frame], *lit)
                 say(i + 1)
 
