@@ -105,7 +105,7 @@ class Locks:
 
 
 def _tie(rest: np.ndarray, mates: np.ndarray, lock: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """How firmly ties hold the hairs of each lock (S,): 1 where each is tied to all others, 0 where one is alone.
+    """How firmly ties hold the hairs of each lock (S,): about 1 where each is tied to all others, 0 where one is alone.
 
     Ties join next neighbours, so a wide lock resists little when its hairs part evenly from one side to the other, and as any
     other when one parts from the next. Hair does both: it is the geometric mean of 1 and of the Rayleigh quotient of the ties

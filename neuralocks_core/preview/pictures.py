@@ -21,7 +21,7 @@ PALETTE, DITHER = 5, 6.0
 
 PICTURE = Detail(16000, 24, 3, 2)
 CLIP = Detail(4000, 12, 2, 3)
-"""A quarter of the strands, wider: in motion it looks the same, and a frame takes a fifth of the time."""
+"""A quarter of the strands, wider, with half the vertices: in motion it looks the same, and is drawn far sooner."""
 
 
 def render(
