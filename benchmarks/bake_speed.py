@@ -158,7 +158,7 @@ def _infer(shot, out, model, frames, plain) -> dict:
 
     ready, loaded = read_shot(shot), StrandModel.load(model)
     start, busy = time.perf_counter(), time.process_time()
-    poser = GroomPoser(ready.grooms[0], loaded, resolve=not plain)
+    poser = GroomPoser(ready.grooms[:1], loaded, resolve=not plain)
     for code in range(1, frames + 1):
         poser.points(code)
     return _spent(start, busy)

@@ -39,7 +39,7 @@ def main() -> None:
     shot = read_shot(arguments.shot or shipped_shot())
     item = shot.grooms[0]
     rig, character = item.attachment.rig, item.attachment.character
-    poser = {name: GroomPoser(item, model, resolve=name == "with") for name in ("without", "with")}
+    poser = {name: GroomPoser([item], model, resolve=name == "with") for name in ("without", "with")}
     exact = Resolver(character, poser["with"].strands, rig.clip)
     began = time.process_time()
     exact.prepare()

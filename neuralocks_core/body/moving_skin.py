@@ -32,8 +32,9 @@ class Box:
     def __init__(self, low: np.ndarray, high: np.ndarray):
         span = np.maximum(np.asarray(high, float) - low, CELL)
         self.cell = max(CELL, float(np.cbrt(np.prod(span) / MOST_CELLS)))
-        self.size = np.ceil(span / self.cell).astype(int) + 4
-        self.low = np.asarray(low, float) - 2 * self.cell
+        self.size = np.ceil(span / self.cell).astype(int) + 5
+        # Cells lie the same for all grooms of a head.
+        self.low = (np.floor(np.asarray(low, float) / self.cell) - 2) * self.cell
         self.strides = np.array([self.size[1] * self.size[2], self.size[2], 1])
         self.count = int(np.prod(self.size))
 

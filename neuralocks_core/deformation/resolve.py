@@ -26,6 +26,16 @@ PUSHED = 1024
 """Strands pushed together."""
 
 
+def reach(character: Character, strands: StrandSet) -> float:
+    """Radius [m] about the middle of the head in which the groom could touch the body in some pose, with room for the neck to
+    bend; 0 where it has no strand. In steps, so that the grooms of a head share it, and what is made of it.
+    """
+    if not strands.valid.any():
+        return 0.0
+    roots = strands.rest[strands.valid, 0] - character.head_centre
+    return float(STEP * np.ceil((np.linalg.norm(roots, axis=1) + strands.length[strands.valid]).max() / STEP) + ROOM)
+
+
 class Resolver:
     """Keeps one groom out of its character's body, frame by frame, in canonical space.
 
@@ -158,15 +168,10 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
 
 
 def _within_reach(character: Character, strands: StrandSet) -> Body | None:
-    """The part of the body that the hair could touch in some pose, with room for the neck to bend: a ball about the head, in
-    steps, so that the grooms of a head share it, and what is made of it.
-    """
-    body, centre = character.body, character.head_centre
-    if not strands.valid.any():
-        return None
-    reach = np.linalg.norm(strands.rest[strands.valid, 0] - centre, axis=1) + strands.length[strands.valid]
-    radius = STEP * np.ceil(float(reach.max()) / STEP) + ROOM
-    near = np.linalg.norm(character.canonical(body.points) - centre, axis=1) < radius
+    """The part of the body within `reach`."""
+    body = character.body
+    off = np.linalg.norm(character.canonical(body.points) - character.head_centre, axis=1)
+    near = off < reach(character, strands)
     faces = body.triangles[near[body.triangles].any(axis=1)]
     if not len(faces):
         return None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -67,6 +67,17 @@ class StrandSet:
             head_centre=self.head_centre,
             facing=self.facing,
         )
+
+    @classmethod
+    def joined(cls, sets: list[StrandSet]) -> StrandSet:
+        """Strand sets of one head, one after the other; each keeps its own locks."""
+        if len(sets) == 1:
+            return sets[0]
+        fields = ("rest", "valid", "uv", "root_frame", "length")
+        values = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
+        before = np.cumsum([0, *(each.lock.max(initial=-1) + 1 for each in sets[:-1])])
+        lock = np.concatenate([each.lock + first for each, first in zip(sets, before)])
+        return replace(sets[0], lock=lock.astype(np.int32), **values)
 
 
 def strands_on(character: Character, groom: Groom) -> StrandSet:

@@ -101,12 +101,14 @@ def bake(
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {"model": _digest(strand_model), "material": look.log_ratios().tolist()}
 
-    def poser(item: StageGroom) -> GroomPoser:
-        return GroomPoser(item, strand_model, look, **options)
+    def poser(items: list[StageGroom]) -> GroomPoser:
+        return GroomPoser(items, strand_model, look, **options)
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
     facts |= given_facts(cuts, joints)
-    resumed = write_samples(shot, out, codes, poser, inputs | options, facts, velocities=velocities, progress=progress)
+    resumed = write_samples(
+        shot, out, codes, poser, inputs | options, facts, together=True, velocities=velocities, progress=progress
+    )
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
     if cuts is None and strand_model.spec.bins:

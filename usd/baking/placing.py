@@ -136,9 +136,5 @@ def _parts(groom: Groom) -> list[Groom]:
 
 def _strands(parts: list[Groom], character: Character) -> StrandSet:
     """What `strands_on` gives for the whole groom, made part by part."""
-    if len(parts) == 1:
-        return strands_on(character, parts[0])
-    sets = [strands_on(character, part) for part in parts]
-    fields = ("rest", "valid", "uv", "root_frame", "length")
-    joined = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
-    return replace(sets[0], lock=lock_of_roots(joined["rest"][:, 0]), **joined)
+    joined = StrandSet.joined([strands_on(character, part) for part in parts])
+    return joined if len(parts) == 1 else replace(joined, lock=lock_of_roots(joined.rest[:, 0]))

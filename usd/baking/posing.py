@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One groom's points at any time code: a pure function of the shot and the model."""
+"""Points of grooms at any time code: a pure function of the shot and the model."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.deformation.resolve import Resolver, reach
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel, chunks
@@ -17,10 +18,10 @@ from .placing import GroomPlacer
 
 
 class GroomPoser:
-    """Deforms one groom of a shot with a model.
+    """Deforms grooms of a shot with a model.
 
     Args:
-        item: the groom.
+        items: grooms of one head, which share the work that its body and its motion make.
         model: the strand model; its threads share the work, and the result does not depend on them.
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
@@ -30,7 +31,7 @@ class GroomPoser:
 
     def __init__(
         self,
-        item: StageGroom,
+        items: Sequence[StageGroom],
         model: StrandModel,
         material: Material | None = None,
         *,
@@ -38,38 +39,47 @@ class GroomPoser:
         resolve: bool = False,
         loop: bool = False,
     ):
-        self.item, self._rig, self._model = item, item.attachment.rig, model
-        character = item.attachment.character
+        attachment, self._model = items[0].attachment, model
+        character, self._rig = attachment.character, attachment.rig
         self._material = (material or Material()).log_ratios()
         self._strength = strength
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
-        self._resolver = None
+        self._resolvers: list[tuple[slice | np.ndarray, Resolver]] = []
         with preparing():  # or 150 MB of a large groom would stay allocated
-            self._placer = GroomPlacer(item)
-            self._session = StrandSession(model, self._placer.strands)
+            self._placers = [GroomPlacer(item) for item in items]
+            self._session = StrandSession(model, StrandSet.joined([placer.strands for placer in self._placers]))
             self._session.anchor(self._sampler.held_bind(self._material))
             if resolve and character.body is not None:
-                self._resolver = Resolver(character, self._placer.strands, self._rig.clip)
-                self._resolver.prepare()
+                self._resolvers = [
+                    (rows, Resolver(character, self.strands.subset(rows), self._rig.clip)) for rows in self._alike()
+                ]
+                for _, resolver in self._resolvers:
+                    resolver.prepare()
 
     @property
     def strands(self) -> StrandSet:
-        """The groom as the network sees it."""
-        return self._placer.strands
+        """All grooms, one after the other, as the network sees them."""
+        return self._session.strands
 
     def points(self, time_code: float) -> np.ndarray:
-        """The groom's points (P, 3) float32 at a time code, in the prim's own space and units."""
-        joints = self._rig.joints_at(time_code)
-        if self._resolver is None:
-            placed = self._placer.at(time_code, joints)
+        """Points (P, 3) float32 at a time code of all grooms, one after the other, each in its prim's own space and units."""
+        joints, (first, *others) = self._rig.joints_at(time_code), self._placers
+        if not self._resolvers and not others:
+            placed = first.at(time_code, joints)
             self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
         moved = self._displacement(time_code, joints)
         # Each chunk's points take the place of its displacement where they are as many.
-        placed = self._placer.at(time_code, joints, moved.reshape(-1, 3) if self._placer.same_size else None)
-        for strands in chunks(len(moved)):
-            placed.put(strands, moved[strands].copy())
-        return placed.points
+        in_place = all(placer.same_size for placer in self._placers)
+        count = sum(placer.item.point_count for placer in self._placers)
+        points, row, strand = moved.reshape(-1, 3) if in_place else np.empty((count, 3), np.float32), 0, 0
+        for placer in self._placers:
+            placed = placer.at(time_code, joints, points[row : row + placer.item.point_count])
+            own = moved[strand : strand + placer.item.groom.strand_count]
+            for strands in chunks(len(own)):
+                placed.put(strands, own[strands].copy())
+            row, strand = row + len(placed.points), strand + len(own)
+        return points
 
     def moved(self, time_code: float) -> np.ndarray:
         """Displacement (S, 24, 3) float32 [m] of the network's vertices, in canonical space."""
@@ -77,12 +87,25 @@ class GroomPoser:
 
     def _displacement(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         moved = self._session.displacement(self._vector(time_code, joints))
-        if self._resolver is not None:
+        if self._resolvers:
             shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
-            self._resolver.apply(moved, joints, shape, self._model.map)
+            for rows, resolver in self._resolvers:
+                part = moved[rows]
+                resolver.apply(part, joints, shape, self._model.map)
+                moved[rows] = part
             if moved.nbytes > LARGE:
                 give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
         return moved
+
+    def _alike(self) -> list[slice | np.ndarray]:
+        """Strands of grooms with the same part of the body in their reach: each groom is moved as if it were alone."""
+        found: dict[float, list] = {}
+        first, character = 0, self._placers[0].item.attachment.character
+        for placer in self._placers:
+            rows = np.arange(first, first + len(placer.strands.rest))
+            found.setdefault(reach(character, placer.strands), []).append(rows)
+            first += len(rows)
+        return [slice(None)] if len(found) == 1 else [np.concatenate(rows) for rows in found.values()]
 
     def _vector(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         seconds = self._rig.border.seconds([time_code])

@@ -20,6 +20,7 @@ from ..border.damage import names_damage
 from ..border.stopping import stopped
 from ..border.units import check_not_input, used_files
 from ..shot.stage import Shot, StageGroom
+from .batches import batches
 from .override import OverrideWriter, deliver
 from .sample_layer import Lagging
 from .spool import Spool, fingerprint, program_files
@@ -31,10 +32,10 @@ BLOCK = 1 << 16
 
 
 class Poser(Protocol):
-    """What gives a groom's points."""
+    """What gives the points of grooms."""
 
     def points(self, time_code: float) -> np.ndarray:
-        """(P, 3) float32, in the prim's own space and units."""
+        """(P, 3) float32 of all grooms, one after the other, each in its prim's own space and units."""
 
 
 @names_damage
@@ -42,10 +43,11 @@ def write_samples(
     shot: Shot,
     out: Path,
     codes: list[float],
-    poser: Callable[[StageGroom], Poser],
+    poser: Callable[[list[StageGroom]], Poser],
     inputs: dict,
     facts: dict,
     *,
+    together: bool = False,
     velocities: bool = True,
     progress: Progress | None = None,
 ) -> int:
@@ -55,9 +57,10 @@ def write_samples(
         shot: what is overridden.
         out: `.usdc`, `.usd` or `.usda`.
         codes: ascending time codes.
-        poser: makes the poser of a groom; called only if something is left to compute.
+        poser: makes the poser of grooms; called only if something is left to compute.
         inputs: plain values that, with the shot, its files and this program's, determine every sample.
         facts: what the file tells of how it was made, see `recorded`.
+        together: pose the grooms of a head together, not each alone.
         velocities: write velocities.
         progress: called with (done, total, message).
 
@@ -73,7 +76,8 @@ def write_samples(
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
-        return _write(shot, codes, poser, spool, facts, velocities, progress or silent)
+        batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
+        return _write(shot, codes, batched, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) or stopped():
             spool.close()
@@ -89,42 +93,73 @@ def _carried(item: StageGroom) -> list:
     return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
 
 
-def _write(shot: Shot, codes, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
+def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
     writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
-    plans = [Stencils(item, codes, shot.first, velocities) for item in shot.grooms]
-    total, done, resumed = sum(len(plan.codes) for plan in plans), 0, 0
+    plans = [[Stencils(item, codes, shot.first, velocities) for item in items] for items in batched]
+    needed = [sorted(set().union(*(plan.codes for plan in some))) for some in plans]
+    # A frame of a batch is posed once, and written for each of its grooms.
+    total = sum((2 * len(items) - 1) * len(codes) for items, codes in zip(batched, needed, strict=True))
+    done, resumed = 0, 0
     say(0, total, "reading")
     with WriteBehind() as behind:
-        for number, (item, plan) in enumerate(zip(shot.grooms, plans, strict=True)):
-            behind.put(writer.groom, item, velocities, facts)
-            store, made = _Store(spool, writer, item, number, plan), None
-            for code in plan.codes:
-                if spool.holds(number, code, item.point_count):
-                    resumed += code in plan.wanted
+        for number, (items, some) in enumerate(zip(batched, plans, strict=True)):
+            ends = np.cumsum([0, *(item.point_count for item in items)])
+            stores = [
+                _Store(spool, writer, item, plan, number, int(first)) for item, plan, first in zip(items, some, ends)
+            ]
+            behind.put(stores[0].open, velocities, facts)
+            made = None
+            for code in needed[number]:
+                if spool.holds(number, code, ends[-1]):
+                    resumed += sum(code in plan.wanted for plan in some)
                 else:
-                    made = made or poser(item)
+                    made = made or poser(items)
                     # At once: points that waited for it would lie in memory beside those of the next frame.
                     spool.write(number, code, made.points(code))
-                behind.put(store.frame, code)
-                done += 1
-                say(done, total, item.path)
-            behind.put(store.finish)
+                behind.put(stores[0].frame, code)
+                done += len(items)
+                say(done, total, items[0].path)
+            behind.put(stores[0].finish)
+            for store in stores[1:]:
+                behind.put(store.whole, velocities, facts)
+                done += len(needed[number])
+                say(done, total, store.item.path)
         behind.put(writer.close)
     deliver(spool)
     return resumed
 
 
 class _Store:
-    """Writes one groom's points frame by frame, and velocities once both sides are there."""
+    """Writes one groom's points frame by frame, and velocities once both sides are there.
 
-    def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, number: int, plan: Stencils):
-        self._spool, self._writer, self._item, self._number, self._plan = spool, writer, item, number, plan
+    Args:
+        spool, writer: from where, to where.
+        item: the groom.
+        plan: which time codes.
+        number: its batch.
+        first: its first point among those of the batch.
+    """
+
+    def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, plan: Stencils, number: int, first: int):
+        self._spool, self._writer, self.item, self._plan = spool, writer, item, plan
+        self._number, self._first = number, first
         self._order = Lagging(item.attachment.rig.border.frame)
+
+    def open(self, velocities: bool, facts: dict) -> None:
+        """Before the first frame."""
+        self._writer.groom(self.item, velocities, facts)
+
+    def whole(self, velocities: bool, facts: dict) -> None:
+        """All of it, where all points are in the spool."""
+        self.open(velocities, facts)
+        for code in self._plan.codes:
+            self.frame(code)
+        self.finish()
 
     def frame(self, code: float) -> None:
         """The next time code in the list, whose points are in the spool."""
         if code in self._plan.wanted:
-            self._writer.sample(self._item, code, "points", self._points(code))
+            self._writer.sample(self.item, code, "points", self._points(code))
             self._differences(self._order.after(code))
 
     def finish(self) -> None:
@@ -133,11 +168,11 @@ class _Store:
 
     def _differences(self, codes: list[float]) -> None:
         for code in codes if self._plan.velocities else ():
-            self._writer.sample(self._item, code, "velocities", self._velocities(code))
+            self._writer.sample(self.item, code, "velocities", self._velocities(code))
 
     def _rows(self) -> Iterator[slice]:
-        count = self._item.point_count
-        return (slice(low, min(low + BLOCK, count)) for low in range(0, count, BLOCK))
+        first, end = self._first, self._first + self.item.point_count
+        return (slice(low, min(low + BLOCK, end)) for low in range(first, end, BLOCK))
 
     def _points(self, code: float) -> Iterator[np.ndarray]:
         """Blocks (n, 3) float32, in units of the prim."""

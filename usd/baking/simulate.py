@@ -73,8 +73,8 @@ def simulate(
     options = {"volume": float(volume), "loop": loop}
     inputs = {"strands": count, "material": look.log_ratios().tolist(), "codes": codes, **options}
 
-    def poser(item: StageGroom) -> _SimulatedPoser:
-        return _SimulatedPoser(item, codes, shot.first, look, count, **options, progress=progress)
+    def poser(items: list[StageGroom]) -> _SimulatedPoser:
+        return _SimulatedPoser(*items, codes, shot.first, look, count, **options, progress=progress)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= given_facts(cuts, joints)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Grooms of one head are posed together, and each comes out as if it were alone."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, UsdSkel, Vt
+
+import usd.baking.batches as batches
+from usd.baking.bake import bake
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, samples, write_shot
+
+LENGTHS = 0.2, 1.0, 1.5
+"""How long the hair of each prim is, of the recipe's: they reach different parts of the body."""
+
+
+@pytest.fixture
+def shot(tmp_path):
+    """Hair in three prims, and stubble on the chest, which another joint carries."""
+    path = write_shot(tmp_path, Recipe(strands=30, vertices=9))
+    stage = Usd.Stage.Open(str(path))
+    points = np.array(UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr().Get()).reshape(30, 9, 3)
+    for name, rows, length in zip("ABC", np.split(np.arange(30), 3), LENGTHS):
+        own = points[rows, :1] + length * (points[rows] - points[rows, :1])
+        _curves(stage, f"/Hero/{name}", own, 3)
+    _curves(stage, "/Hero/Stubble", [0, -0.3, 0] + points[:6, :1] + 0.2 * (points[:6] - points[:6, :1]), 2)
+    stage.GetPrimAtPath("/Hero/Hair").SetActive(False)
+    stage.Save()
+    return path
+
+
+def _curves(stage, path: str, points: np.ndarray, joint: int) -> None:
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr("linear")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    curves.CreateCurveVertexCountsAttr([points.shape[1]] * len(points))
+    curves.CreateWidthsAttr([0.001])
+    curves.SetWidthsInterpolation("constant")
+    binding = UsdSkel.BindingAPI.Apply(curves.GetPrim())
+    binding.CreateSkeletonRel().SetTargets(["/Hero/Rig"])
+    binding.CreateJointIndicesPrimvar(True, 1).Set([joint])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+
+
+def test_those_of_one_head_that_follow_each_other_are_together(shot, monkeypatch):
+    def names():
+        return [[item.path[-1] for item in items] for items in batches.batches(read_shot(shot).grooms)]
+
+    assert names() == [["A", "B", "C"], ["e"]]
+    monkeypatch.setattr(batches, "TOGETHER", 20)
+    assert names() == [["A", "B"], ["C"], ["e"]]
+
+
+@pytest.mark.parametrize("resolve", [True, False])
+def test_each_is_moved_as_if_it_were_alone(shot, tmp_path, model, monkeypatch, resolve):
+    together = bake(shot, tmp_path / "together.usdc", model, resolve=resolve).path
+    monkeypatch.setattr(batches, "TOGETHER", 0)
+    alone = bake(shot, tmp_path / "alone.usdc", model, resolve=resolve).path
+    for name in ("A", "B", "C", "Stubble"):
+        for kind, most in (("points", 1e-6), ("velocities", 1e-4)):
+            one, other = (samples(path, kind, at=5.0, prim=f"/Hero/{name}") for path in (together, alone))
+            assert np.abs(one - other).max() < most
+        assert np.ptp([samples(together, "points", at=code, prim=f"/Hero/{name}") for code in (1.0, 5.0)], axis=0).any()
+
+
+def test_an_interrupted_bake_goes_on(shot, tmp_path, model):
+    out = tmp_path / "bake.usdc"
+    whole = bake(shot, out, model).path.read_bytes()
+    out.unlink()
+
+    def stop(done, total, message):
+        if done >= 9:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    assert bake(shot, out, model).resumed == 9
+    assert out.read_bytes() == whole

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which grooms of a shot are posed together: hair in hundreds of prims costs little more than hair in one."""
+
+from collections.abc import Sequence
+
+from ..shot.stage import StageGroom
+
+TOGETHER = 1 << 14
+"""Strands at most in several grooms that are posed together: what is kept for each strand does not grow with the shot."""
+
+
+def batches(grooms: Sequence[StageGroom]) -> list[list[StageGroom]]:
+    """Grooms in their order, those of one head that follow each other together.
+
+    It depends on the grooms alone, not on what is asked of them: so every part of a bake has the same.
+    """
+    found: list[list[StageGroom]] = []
+    for item in grooms:
+        last = found[-1] if found else []
+        count = sum(each.groom.strand_count for each in last) + item.groom.strand_count
+        if last and _head(last[0]) == _head(item) and count <= TOGETHER:
+            last.append(item)
+        else:
+            found.append([item])
+    return found
+
+
+def _head(item: StageGroom) -> tuple[str, int]:
+    return item.attachment.rig.path, item.attachment.character.head
