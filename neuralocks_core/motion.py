@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import scipy_rotation
+from neuralocks_core.rotation import from_vector, polar, to_vector
 
 G = 9.81
 """Size of gravity [m/s^2]."""
@@ -92,15 +92,14 @@ class Clip:
     def at(self, times) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) at any times (n,) [s].
 
-        Between samples, translation and scale go linearly and rotation along the shortest arc; outside, the nearest
+        Between samples, translation and stretch go linearly and rotation along the shortest arc; outside, the nearest
         sample is held (or the loop goes on).
         """
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
         low, fraction = self._bracket(times)
-        near = fraction < 1e-9
-        result = self.joints[low].copy()
-        for i in np.flatnonzero(~near):
-            result[i] = _blend(self.joints[low[i]], self.joints[low[i] + 1], fraction[i])
+        result, between = self.joints[low], fraction >= 1e-9
+        low = low[between]
+        result[between] = _blend(self.joints[low], self.joints[low + 1], fraction[between])
         return result
 
     def shape_at(self, times) -> np.ndarray:
@@ -130,14 +129,11 @@ class Clip:
         return low, fraction
 
 
-def _blend(a: np.ndarray, b: np.ndarray, fraction: float) -> np.ndarray:
-    """Transforms (J, 4, 4) between a and b; rotation, scale and translation each on their own."""
-    Rotation = scipy_rotation()
-    scale_a, scale_b = (np.linalg.norm(m[:, :3, :3], axis=1, keepdims=True) for m in (a, b))
-    turn_a = Rotation.from_matrix(a[:, :3, :3] / scale_a)
-    turn = (turn_a.inv() * Rotation.from_matrix(b[:, :3, :3] / scale_b)).as_rotvec() * fraction
+def _blend(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """Transforms (n, J, 4, 4) between a and b at fractions (n,); rotation, stretch and translation each on their own."""
+    fraction = fraction[:, None, None, None]
+    (turn_a, stretch_a), (turn_b, stretch_b) = (polar(m[..., :3, :3]) for m in (a, b))
+    turn = from_vector(fraction[..., 0] * to_vector(np.swapaxes(turn_a, -1, -2) @ turn_b))
     result = (1 - fraction) * a + fraction * b
-    result[:, :3, :3] = (turn_a * Rotation.from_rotvec(turn)).as_matrix() * (
-        (1 - fraction) * scale_a + fraction * scale_b
-    )
+    result[..., :3, :3] = turn_a @ turn @ ((1 - fraction) * stretch_a + fraction * stretch_b)
     return result

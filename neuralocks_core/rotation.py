@@ -167,6 +167,16 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
     return u @ vt
 
 
+def polar(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices (..., 3, 3) as the nearest rotation times a stretch, both (..., 3, 3). The stretch of a mirrored one is
+    turned inside out; a flat one has one, too: a joint may be scaled to nothing to hide what hangs on it.
+    """
+    u, _, vt = np.linalg.svd(linear)
+    turns = u @ vt
+    turns *= np.where(volumes(turns) < 0, -1.0, 1.0)[..., None, None]
+    return turns, np.swapaxes(turns, -1, -2) @ linear
+
+
 def scipy_rotation() -> type:
     """SciPy's rotations: they take longer to import than all else that a network needs to run."""
     from scipy.spatial.transform import Rotation

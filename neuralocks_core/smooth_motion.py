@@ -24,10 +24,9 @@ class SmoothMotion:
         self._clip = clip
         times, poses = extended(clip)
         linear = poses[..., :3, :3]
-        turns = _nearest_rotations(linear)
+        turns, stretch = rotation.polar(linear)
         quaternions = rotation.continuous(rotation.to_quaternion(turns))
-        stretch = (np.swapaxes(turns, -1, -2) @ linear).reshape(*linear.shape[:2], 9)
-        values = np.concatenate([poses[..., :3, 3], quaternions, stretch], axis=-1)
+        values = np.concatenate([poses[..., :3, 3], quaternions, stretch.reshape(*linear.shape[:2], 9)], axis=-1)
         self._spline = CubicSpline(times, values, bc_type="natural") if len(times) > 1 else None
         self._only = values[:1]
 
@@ -46,12 +45,3 @@ class SmoothMotion:
             drift = (clip.joints[-1] - clip.joints[0])[:, :3, 3].mean(axis=0)
             result[..., :3, 3] += laps[:, None, None] * drift
         return result
-
-
-def _nearest_rotations(linear: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) nearest to matrices (..., 3, 3), mirrored ones turned inside out; of flat ones, too: a joint
-    may be scaled to nothing to hide what hangs on it.
-    """
-    u, _, vt = np.linalg.svd(linear)
-    turns = u @ vt
-    return turns * np.where(rotation.volumes(turns) < 0, -1.0, 1.0)[..., None, None]

@@ -29,6 +29,17 @@ def test_a_loop_goes_on():
     assert np.allclose(clip.at([0.4]), clip.at([-1.6]))
 
 
+def test_mirrored_and_flat_joints_blend_too():
+    clip = moved([0.0, 1.0], head_turn=lambda t: rotation.from_vector(np.stack([0 * t, t, 0 * t], axis=-1)))
+    odd = clip.joints.copy()
+    odd[:, 4, :3, :3] = odd[:, HEAD, :3, :3] * [-1, 2, 1]
+    odd[:, 5, :3, :3] = 0
+    plain, found = clip.at([0.3])[0], Clip(clip.times, odd).at([0.3])[0]
+    np.testing.assert_allclose(found[4, :3, :3], plain[HEAD, :3, :3] * [-1, 2, 1], atol=1e-12)
+    assert not found[5, :3, :3].any()
+    np.testing.assert_allclose(found[:4], plain[:4], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("times", "change", "fact"),
     [([], None, "no samples"), ([0.0, 0.0], None, "ascend"), ([0.0, 1.0], np.nan, "NaN")],
