@@ -4,44 +4,37 @@
 import numpy as np
 
 from neuralocks_core import rotation
+from neuralocks_core.clip_spline import ClipSpline
 from neuralocks_core.motion import Clip
-from neuralocks_core.track import extended
 
 
 class SmoothMotion:
-    """A clip whose motion between its samples is that of a C2 spline, as `Track` has it of a few joints.
+    """A clip whose motion between its samples, and outside of them, is that of `ClipSpline`, as `Track` has it of a few
+    joints.
 
-    `Clip.at` goes along straight lines: what is simulated on them feels a blow at every sample. Outside of the clip, the
-    nearest sample is held; a loop goes on, and a character that walks in it gets ahead.
+    `Clip.at` goes along straight lines and stops where the samples end: what is simulated on it feels a blow at every
+    sample, and a stop that the shot does not have.
 
     Args:
         clip: without cuts.
+        head: index of the joint that all go on with outside of the clip.
     """
 
-    def __init__(self, clip: Clip):
-        from scipy.interpolate import CubicSpline  # as in `Track`
-
-        self._clip = clip
-        times, poses = extended(clip)
-        linear = poses[..., :3, :3]
-        turns, stretch = rotation.polar(linear)
-        quaternions = rotation.continuous(rotation.to_quaternion(turns))
-        values = np.concatenate([poses[..., :3, 3], quaternions, stretch.reshape(*linear.shape[:2], 9)], axis=-1)
-        self._spline = CubicSpline(times, values, bc_type="natural") if len(times) > 1 else None
-        self._only = values[:1]
+    def __init__(self, clip: Clip, head: int):
+        self._spline = ClipSpline(clip, head, _numbers)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) [m] at times (n,) [s]."""
-        clip, base = self._clip, self._clip.wrapped(times)
-        values = self._only.repeat(len(times), axis=0) if self._spline is None else self._spline(base)
+        values, moved = self._spline.at(times)
         result = np.tile(np.eye(4), (*values.shape[:2], 1, 1))
-        result[..., :3, :3] = rotation.from_quaternion(values[..., 3:7]) @ values[..., 7:].reshape(
-            *values.shape[:2], 3, 3
-        )
-        result[..., :3, 3] = values[..., :3]
-        if clip.loop:
-            laps = np.round((times - base) / max(clip.end - clip.start, 1e-9))
-            # One way for all joints, or what a loop's ends lack of being alike would add up.
-            drift = (clip.joints[-1] - clip.joints[0])[:, :3, 3].mean(axis=0)
-            result[..., :3, 3] += laps[:, None, None] * drift
+        stretch = values[..., 7:].reshape(*values.shape[:2], 3, 3)
+        result[..., :3, :3] = rotation.from_quaternion(values[..., 3:7]) @ stretch
+        result[..., :3, 3] = values[..., :3] + moved[:, None]
         return result
+
+
+def _numbers(poses: np.ndarray) -> np.ndarray:
+    """Places, quaternions and stretches (T, J, 16) of world transforms (T, J, 4, 4)."""
+    turns, stretch = rotation.polar(poses[..., :3, :3])
+    quaternions = rotation.continuous(rotation.to_quaternion(turns))
+    return np.concatenate([poses[..., :3, 3], quaternions, stretch.reshape(*poses.shape[:2], 9)], axis=-1)

@@ -91,3 +91,12 @@ def test_a_part_of_the_times_wanted_is_the_same():
     strands, wanted = lying_strands(character), np.arange(10) / 24
     whole, begun = (simulated(character, strands, Clip(times, joints), w) for w in (wanted, wanted[:6]))
     assert (whole[:6] == begun).all()
+
+
+def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
+    """Also before a cut: the solver's clock goes on past the last sample."""
+    character, times = person(HEAD.vertices + CENTRE, {}), np.arange(24) / 24
+    joints = np.tile(rigs.bind(), (24, 1, 1, 1))
+    joints[:, :, 0, 3] += times[:, None]
+    found = simulated(character, lying_strands(character), Clip(times, joints, cuts=times[[12]]), times)
+    np.testing.assert_allclose(found, found[:1].repeat(24, axis=0), atol=1e-5)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a clip holds of its joints as a C2 spline through its samples, and how the character goes on outside of them."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from neuralocks_core.motion import Clip
+
+
+class ClipSpline:
+    """Numbers made of a clip's poses, at any time.
+
+    Motion between samples has the accelerations of the motion and not those of its polyline, as a 24 fps shot needs it.
+    Outside of the clip the pose is held while the character goes on, as the head does: with its first or last velocity;
+    a loop is continued on both sides, and a character that walks in it gets ahead.
+
+    Args:
+        clip: without cuts.
+        head: index of the joint.
+        values: what is made of world transforms (T, J, 4, 4): (T, ...), which blends linearly.
+    """
+
+    def __init__(self, clip: Clip, head: int, values: Callable[[np.ndarray], np.ndarray]):
+        # Here, because it takes as long to import as all else that a runtime needs.
+        from scipy.interpolate import CubicSpline
+
+        times, poses = _extended(clip)
+        place, numbers = poses[:, head, :3, 3], values(poses)
+        self._clip = clip
+        self._drift = clip.joints[-1, head, :3, 3] - clip.joints[0, head, :3, 3]
+        if len(times) == 1:
+            self._spline = lambda t: numbers.repeat(len(t), axis=0)
+            self._speeds = np.zeros((2, 3))
+        else:
+            self._spline = CubicSpline(times, numbers, bc_type="natural")
+            self._speeds = CubicSpline(times, place, bc_type="natural")(times[[0, -1]], 1)
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers (n, ...) at times (n,) [s], and by how much all joints have then gone on (n, 3) [m]."""
+        clip, base = self._clip, self._clip.wrapped(times)
+        beyond = (times - base)[:, None]
+        if clip.loop:
+            moved = np.round(beyond / max(clip.end - clip.start, 1e-9)) * self._drift
+        else:
+            moved = beyond * np.where(beyond < 0, *self._speeds)
+        return self._spline(base), moved
+
+
+def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is
+    smooth.
+    """
+    if not clip.loop or len(clip.times) < 3:
+        return clip.times, clip.joints
+    pad = min(len(clip.times) - 1, 8)
+    period = clip.end - clip.start
+    drift = np.zeros((clip.joints.shape[1], 4, 4))
+    drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
+    times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])
+    return times, np.concatenate([clip.joints[-1 - pad : -1] - drift, clip.joints, clip.joints[1 : 1 + pad] + drift])
