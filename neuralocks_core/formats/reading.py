@@ -57,6 +57,8 @@ def read_with_look(
     wanted_axis = None if up is None else upward_axis(up)
     content = _content(path)
     raw = _reader(path, content)(content, str(path))
+    if not len(raw.points):
+        raise bad_file(str(path), "holds no points", "export one with hair in it")
     notes = list(raw.notes)
     points = raw.points.astype(np.float32, copy=False)
     _check_finite(points, path)

@@ -42,6 +42,7 @@ HOSTILE = {
     "terabytes.data": struct.pack("<iii", 2**31 - 1, 2**31 - 1, 0),
     "terabytes.bin": struct.pack("<iii", 1, 2**31 - 1, 0),
     "text.tfx": b"version 2.0\nis sorted 1\nstrand 0 numVerts 999999999 texcoord 0 0\n0 0 0\n",
+    "pointless.tfx": b"version 2.0\nis sorted 1\nstrand 0 numVerts 0 texcoord 0 0\n",
     "words.tfx": b"version 2.0\nis sorted 1\nstrand 0 numVerts 2\n0 0 0\nhair nan 1\n",
     "nan.tfx": b"version 2.0\nis sorted 1\nstrand 0 numVerts 2\n0 0 0\n0 nan 1\n",
     "nostrand.tfx": b"version 2.0\nis sorted 1\n",
