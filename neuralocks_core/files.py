@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
+
 from neuralocks_core.errors import NeuralocksError
 
 
@@ -31,6 +33,27 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
                 os.replace(part, path)
         except BaseException:
             remove_empty(made)
+            raise
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays at once under the final name; what is killed over it leaves `<stem>.<process>.tmp` beside it.
+
+    Raises:
+        NeuralocksError: the file system refuses.
+    """
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        try:
+            with open(temporary, "wb") as file:
+                np.savez(file, **arrays)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
             raise
     except OSError as error:
         raise cannot_write(path, error) from None

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import replace_npz
 
 
 def save(
@@ -25,6 +25,9 @@ def save(
         meta: plain JSON values.
         modules: by name; all their parameters and buffers are kept.
         optimisers: whose state is tensors and numbers, as that of all in torch.
+
+    Raises:
+        NeuralocksError: the file system refuses.
     """
     arrays = {"meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)}
     for name, module in modules.items():
@@ -34,13 +37,7 @@ def save(
         for index, values in optimiser.state_dict()["state"].items():
             for key, value in values.items():
                 arrays[f"optimiser/{place}/{index}/{key}"] = torch.as_tensor(value).detach().cpu().numpy()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".tmp")
-    with open(temporary, "wb") as file:
-        np.savez(file, **arrays)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    replace_npz(path, arrays)
 
 
 def load(

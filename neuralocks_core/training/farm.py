@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import replace_npz
 from neuralocks_core.training.rollouts import Rollout, RolloutMaker, TrainingScene
 
 
@@ -96,11 +98,12 @@ def _deaf_to_interrupts() -> Iterator[None]:
 
 
 def save(path: Path, rollout: Rollout) -> None:
-    """Write a rollout at once under its final name."""
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    with open(temporary, "wb") as file:
-        np.savez(file, **vars(rollout))
-    os.replace(temporary, path)
+    """Write a rollout at once under its final name.
+
+    Raises:
+        NeuralocksError: the file system refuses.
+    """
+    replace_npz(path, vars(rollout))
 
 
 def load(path: Path) -> Rollout:
@@ -128,6 +131,10 @@ def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
     for index in indices:
         path = _path(folder, index)
         if not path.exists():
-            save(path, maker.make(index))
+            rollout = maker.make(index)
+            try:
+                save(path, rollout)
+            except NeuralocksError as error:
+                raise SystemExit(f"error: {error}") from None
         if parent is not None and not parent.is_alive():
             return

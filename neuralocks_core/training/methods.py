@@ -134,8 +134,13 @@ def wait(farm: RolloutFarm, count: int, say: Callable[[str], None], numbered: bo
     Raises:
         NeuralocksError: a process of it failed.
     """
-    while (there := len(farm.files(count if numbered else None))) < count:
-        if farm.failed() or not farm.alive:
-            raise NeuralocksError("training: the solver's process ended early; free some memory and try again")
+    while True:
+        alive = farm.alive  # before the count: a process may save its last and end between the two
+        if (there := len(farm.files(count if numbered else None))) >= count:
+            return
+        if farm.failed() or not alive:
+            raise NeuralocksError(
+                "training: the solver's process ended early; unless it says why above, free some memory, and try again"
+            )
         say(f"{there} of {count}")
         time.sleep(0.2)

@@ -191,7 +191,8 @@ class _Run:
         for state in self.method.train(self.net, self._optimisers, step=meta["step"], done=min(spent, 1.0)):
             if farm.failed() or held_farm.failed():
                 raise NeuralocksError(
-                    "training: the solver's process ended early; free some memory and go on with --resume"
+                    "training: the solver's process ended early; unless it says why above, free some memory, and go on "
+                    "with --resume"
                 )
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT

@@ -130,7 +130,7 @@ def discard(work: Path) -> None:
     for name in ("rollouts", "held_out"):
         shutil.rmtree(work / name, ignore_errors=True)
     for name in ("checkpoint", "codes"):
-        for suffix in (".npz", ".tmp"):
-            (work / name).with_suffix(suffix).unlink(missing_ok=True)
+        for file in (work / f"{name}.npz", *work.glob(f"{name}.*tmp")):
+            file.unlink(missing_ok=True)
     for name in (BEGINNING, INPUTS):
         (work / name).unlink(missing_ok=True)

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
-from neuralocks_core.training import farm
+from neuralocks_core.training import farm, methods
 
 ASK = [sys.executable, "-c", "import signal; print(signal.getsignal(signal.SIGINT) == signal.SIG_IGN)"]
 
@@ -55,3 +55,22 @@ def test_one_that_cannot_start_leaves_nothing_behind(tmp_path, monkeypatch):
         pass
     assert workers._processes[0].ended
     assert "OMP_NUM_THREADS" not in os.environ and os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+class _Farm:
+    """Stands in for one whose process saves its last rollout and ends right after it has been counted."""
+
+    alive = True
+    there = 0
+
+    def files(self, first=None):
+        counted = [None] * self.there
+        self.alive, self.there = False, 1
+        return counted
+
+    def failed(self):
+        return False
+
+
+def test_the_last_rollout_is_waited_for_though_its_process_has_ended():
+    methods.wait(_Farm(), 1, lambda text: None)
