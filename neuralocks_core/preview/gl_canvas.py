@@ -67,7 +67,16 @@ class GlCanvas:
 
     def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
         self.size, self._width = (width, height), detail.width
-        self._context = context = _context()
+        self._context = _context()
+        try:
+            self._fit_out(triangles, strands, detail)
+        except BaseException:
+            self.close()
+            raise
+
+    def _fit_out(self, triangles: np.ndarray, strands: int, detail) -> None:
+        """Make all that a picture needs, in the context that is there."""
+        context, (width, height) = self._context, self.size
         large = (width * detail.scale, height * detail.scale)
         self._drawing = context.texture(large, 4)
         self._large = context.framebuffer([self._drawing], context.depth_renderbuffer(large))

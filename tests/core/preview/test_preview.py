@@ -103,6 +103,25 @@ def test_both_canvases_draw_the_same_picture():
     assert np.abs(pictures[0] - pictures[1])[covered[0] & covered[1]].mean() < 12
 
 
+def test_a_driver_that_gives_up_half_way_is_let_go(monkeypatch):
+    gl_canvas = pytest.importorskip("neuralocks_core.preview.gl_canvas", reason="moderngl is not installed")
+
+    class Driver:
+        released = False
+
+        def texture(self, *_):
+            raise RuntimeError("too large")
+
+        def release(self):
+            self.released = True
+
+    driver = Driver()
+    monkeypatch.setattr(gl_canvas, "_context", lambda: driver)
+    with pytest.raises(RuntimeError, match="too large"):
+        gl_canvas.GlCanvas(8, 8, np.zeros((0, 3), int), 1, SMALL)
+    assert driver.released
+
+
 def test_hair_in_front_dims_what_is_behind_it():
     near = np.random.default_rng(0).uniform(0, 0.1, (5000, 3)) * [1, 1, 0.2] + [0, 0, 0.2]
     shadow = shading.ShadowMap(near, np.full(5000, 1e-5))
