@@ -18,6 +18,8 @@ _AT_ONCE = 4
 """Rows of a layer that are added at a time."""
 _WIDTH = 8
 """Columns of a layer are a multiple of it: what vector units take at once."""
+HISTORY_BYTES = 10_304
+"""Size of the struct of history.h.in, of which a dynamic model needs one for each character."""
 MADE = "Made by `neuralocks rig export-c`"
 """What both files say in their first lines."""
 

@@ -13,6 +13,7 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
+from neuralocks_core.rig.export_c import HISTORY_BYTES
 from neuralocks_core.rig.kinematics import pose_chains, skin
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
@@ -166,7 +167,7 @@ def _teleports(rig, models, fit) -> dict:
 def _network_cost(model: RigModel) -> dict:
     """Of one avatar and frame; `benchmarks/rig_speed.py` prints times."""
     work = sum(weight.size for weight, _ in model.layers) + 10 * len(model.chains)
-    history = 10_296 if model.dynamic else 0  # the struct of rig/history.h.in
+    history = HISTORY_BYTES if model.dynamic else 0
     return {"multiply_adds": int(work), "square_roots": 2 * len(model.chains), "bytes_carried_on": history}
 
 

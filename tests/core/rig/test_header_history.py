@@ -6,7 +6,7 @@ import pytest
 
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, rig_spec
-from neuralocks_core.rig.export_c import export_c
+from neuralocks_core.rig.export_c import HISTORY_BYTES, export_c
 from neuralocks_core.rotation import from_vector, to_quaternion
 from tests.core.rig.builders import character, random_model
 from tests.core.rig.c_programs import COMPILERS, compiled, run_c
@@ -70,6 +70,19 @@ def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, opti
         rows[60, 0] += 1 / 60
         assert np.isfinite(felt := run_c(program, rows, felt.shape[1])).all(), damaged
         assert np.abs(felt[200:]).max() < 1e-5, damaged
+
+
+def test_a_report_gives_the_size_that_the_compiler_finds(tmp_path):
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    program = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  const float size = (float)sizeof(nl_hair_history);
+  fwrite(&size, sizeof size, 1, stdout);
+  return 0;
+}
+"""
+    assert run_c(compiled(tmp_path, program), [], 1).item() == HISTORY_BYTES
 
 
 CLOCK_HARNESS = """#include "hair.h"
