@@ -54,6 +54,8 @@ class BoundarySpec:
             raise NeuralocksError(
                 "model: its history has an impossible time step or bin; get an undamaged copy of the model"
             )
+        if not self.pose_joints:
+            raise NeuralocksError("model: it reads the pose of no joint; get an undamaged copy of the model")
         if not 0 <= self.taper <= 1 or not isinstance(self.chest, bool):
             raise NeuralocksError(
                 "model: its history has an impossible taper or chest; get an undamaged copy of the model"

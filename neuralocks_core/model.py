@@ -16,13 +16,15 @@ KINDS = {
     "strands": ("encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"),
     "rig": ("rig.onnx",),
 }
+CARD = (("training", dict, "table of values"), ("report", dict, "table of values"), ("credits", list, "list of lines"))
+"""What every model says of itself, empty where its file does not."""
 _LARGEST = 64 << 20
 """Bytes of one unpacked entry; a model has about one million, so a bomb is told from a model."""
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model as read from disk: `meta` is the JSON, `graphs` the ONNX files by name."""
+    """A model as read from disk: `meta` is the JSON with all of `CARD`, `graphs` the ONNX files by name."""
 
     path: Path
     meta: dict
@@ -158,9 +160,11 @@ def _check(meta, path: Path, kind: str | None) -> None:
         )
     if not isinstance(meta.get("kind"), str) or meta["kind"] not in KINDS:
         raise NeuralocksError(f"{path}: it holds a '{meta.get('kind')}', unknown here; update neuralocks")
-    for name in ("training", "report"):
-        if not isinstance(meta.get(name) or {}, dict):
-            raise NeuralocksError(f"{path}: its '{name}' is no table of values; get an undamaged copy of the model")
+    for name, kind_of, said in CARD:
+        if meta.get(name) is None:
+            meta[name] = kind_of()
+        if not isinstance(meta[name], kind_of):
+            raise NeuralocksError(f"{path}: its '{name}' is no {said}; get an undamaged copy of the model")
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}
         raise NeuralocksError(

@@ -34,7 +34,7 @@ class StrandModel:
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
         self.file = file
         self.meta = file.meta
-        self.spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
+        self.spec = BoundarySpec.from_json(file.meta.get("boundary"))
         self.anchored = bool(file.meta.get("anchored", False))
         self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")

@@ -172,7 +172,7 @@ class RigModel:
                 tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in meta["layers"]),
                 np.asarray(meta["limits"], np.float32),
                 float(meta["max_angle"]),
-                *(meta.get(name, empty) for name, empty in (("training", {}), ("report", {}), ("credits", []))),
+                *(meta[name] for name in ("training", "report", "credits")),
             )
         except NeuralocksError as error:
             raise NeuralocksError(f"{path}: {error}") from None

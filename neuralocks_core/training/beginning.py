@@ -40,11 +40,11 @@ class Beginning:
     @property
     def credits(self) -> list[str]:
         """Whose data it has learned from."""
-        return list(self._meta.get("credits", []))
+        return list(self._meta["credits"])
 
     def card(self) -> dict:
         """How the model was made, for the card of a training that begins with it."""
-        training = self._meta.get("training", {})
+        training = self._meta["training"]
         return {
             name: training[name]
             for name in ("command", "minutes", "steps", "mean", "began", "began with")

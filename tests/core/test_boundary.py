@@ -132,6 +132,7 @@ def test_unknown_description_asks_for_an_update():
         {"chest": 5},
         {"linear": []},
         {"pose_joints": [[]]},
+        {"pose_joints": []},
         {"pose_joints": 1},
         [],
     ],

@@ -161,6 +161,8 @@ def rewritten(path, target, **changes):
         ({"model_json": b'{"format": ' + b"1" * 5000 + b"}"}, "damaged"),
         ({"model_json": b"\xff"}, "damaged"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": 5})}, "boundary history"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands"})}, "boundary history"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "credits": "me"})}, "'credits' is no list"),
         ({"tail_onnx": b"nonsense"}, "cannot be loaded"),
     ],
 )
@@ -168,6 +170,12 @@ def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
     with pytest.raises(NeuralocksError, match=fact) as caught:
         StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
     assert "\n" not in str(caught.value)
+
+
+def test_what_a_model_does_not_say_of_itself_is_empty(path, tmp_path):
+    file = model.read(path)
+    quiet = model.write(tmp_path / "quiet.neuralocks", {**file.meta, "training": None, "credits": None}, file.graphs)
+    assert [model.read(quiet).meta[name] for name in ("training", "report", "credits")] == [{}, {}, []]
 
 
 def test_truncated_missing_and_foreign_files_are_refused(path, tmp_path):

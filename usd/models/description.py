@@ -76,8 +76,8 @@ SLIDERS = {
 
 def described(file: model_file.ModelFile) -> dict:
     """The content of `description.json`, but for a shot's grooms."""
-    spec = BoundarySpec.from_json(file.meta.get("boundary") or {})
-    training = {name: value for name, value in (file.meta.get("training") or {}).items() if name != "curve"}
+    spec = BoundarySpec.from_json(file.meta.get("boundary"))
+    training = {name: value for name, value in file.meta["training"].items() if name != "curve"}
     result = {"units": UNITS, "graphs": _graphs(file)}
     if file.kind == "strands":
         result["boundary vector"] = {
