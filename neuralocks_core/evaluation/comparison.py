@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair beside a trusted simulation of the same strands: the second half of the report card."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from neuralocks_core import metrics
-from neuralocks_core.character import Character
+from neuralocks_core.character import Body, Character
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
@@ -104,9 +106,8 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
-        part = resolver.body
-        body = np.stack([part.posed(j @ character.inverse_bind, s) for j, s in zip(joints, shapes, strict=True)])
-        triangles, bind = part.triangles, resolver.at_rest.points
+        body = _PosedBody(resolver.body, joints @ character.inverse_bind, shapes)
+        triangles, bind = resolver.body.triangles, resolver.at_rest.points
     rollout = simulate(
         strands.rest,
         character.canonical_to_world(joints),
@@ -119,6 +120,25 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
         **options,
     )
     return _between(clock, rollout.points, times) - strands.rest
+
+
+class _PosedBody(Sequence):
+    """World points (V, 3) [m] of a body in each of T frames, posed when they are asked for: of minutes they take gigabytes.
+
+    Args:
+        body: the part that hair can reach.
+        skinning: (T, J, 4, 4).
+        shapes: blend shape weights (T, B).
+    """
+
+    def __init__(self, body: Body, skinning: np.ndarray, shapes: np.ndarray):
+        self._body, self._skinning, self._shapes = body, skinning, shapes
+
+    def __len__(self) -> int:
+        return len(self._skinning)
+
+    def __getitem__(self, frame: int) -> np.ndarray:
+        return self._body.posed(self._skinning[frame], self._shapes[frame])
 
 
 def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray) -> np.ndarray:

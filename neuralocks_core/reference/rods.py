@@ -25,9 +25,9 @@ class Rollout:
 
     points: np.ndarray
     """(T, S, K, 3) float32 [m]."""
-    planes: np.ndarray
+    planes: np.ndarray | None
     """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; (0, 0, 0, -1e3) if
-    it is farther than 2 cm."""
+    it is farther than 2 cm. None where they are not asked for."""
     residual: np.ndarray
     """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity; neighbours
     and body planes as last looked at. Where rounding stops a strand before its tolerance it is not to be trusted."""
@@ -54,6 +54,7 @@ def simulate(
     collision: float = COLLISION,
     gravity: float = G,
     volume: float = 0.0,
+    planes: bool = False,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> Rollout:
@@ -65,7 +66,8 @@ def simulate(
     Args:
         rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.
         head: (T, 4, 4) canonical -> world, rigid, one per frame.
-        body: (T, V, 3) world points [m] of the body, or None for no contact.
+        body: (T, V, 3) world points [m] of the body, or None for no contact; without substeps each frame is looked at
+            once, in order.
         triangles: (F, 3) of the body, outward (counter-clockwise), closed where hair may touch it.
         material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `Material()`.
         dt: time between frames [s].
@@ -81,6 +83,7 @@ def simulate(
         collision: stiffness of the contact [1/(m s^2)].
         gravity: [m/s^2].
         volume: stiffness against strands crowding closer than at rest [m^2/s^2], 0 for none; see `volume`.
+        planes: return the body planes, more memory than the points.
         device: "cpu", "cuda" or "cuda:N".
         progress: called with frames done, all frames, message.
 
@@ -98,7 +101,7 @@ def simulate(
     away = way.origin[0]
     way = replace(way, origin=way.origin - away)
     material = check_material(material, strands)
-    result = _empty_rollout(frames, strands, vertices)
+    result = _empty_rollout(frames, strands, vertices, planes)
     if strands == 0:
         return result
     if start is not None and np.shape(start) != rods.points.shape:
@@ -130,19 +133,18 @@ def simulate(
             if body is not None:
                 stepper.move_body(_between(body, step, substeps) - away)
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
-        left = stepper.read(result.points[frame], result.planes[frame])
+        left = stepper.read(result.points[frame], result.planes[frame] if planes else None)
         result.residual[frame], result.iterations[frame] = left
         if progress:
             progress(frame + 1, frames, "simulating")
     return result
 
 
-def _empty_rollout(frames: int, strands: int, vertices: int) -> Rollout:
-    """Arrays to be filled in; no body is near."""
+def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> Rollout:
+    """Arrays to be filled in."""
     points = np.zeros((frames, strands, vertices, 3), np.float32)
-    planes = np.zeros((frames, strands, vertices, 4), np.float32)
-    planes[..., 3] = -1e3
-    return Rollout(points, planes, np.zeros(frames), np.zeros(frames))
+    near = np.zeros((*points.shape[:3], 4), np.float32) if planes else None
+    return Rollout(points, near, np.zeros(frames), np.zeros(frames))
 
 
 def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:

@@ -177,12 +177,13 @@ class Stepper:
         self.used.zero_()
         self._solve(dt, iterations, settling=0)
 
-    def read(self, points: np.ndarray, planes: np.ndarray) -> tuple[float, float]:
-        """Write (S, K, 3) and (S, K, 4) canonical; return residual and Newton steps as `rods.Rollout` has them."""
+    def read(self, points: np.ndarray, planes: np.ndarray | None) -> tuple[float, float]:
+        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `rods.Rollout` has them."""
         args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()
-        planes[:] = self.planes.numpy()
+        if planes is not None:
+            planes[:] = self.planes.numpy()
         residual = np.sqrt(np.mean(self.residual.numpy() ** 2)) / G
         return float(residual), float(self.used.numpy().mean())
 

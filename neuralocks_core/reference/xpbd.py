@@ -65,17 +65,16 @@ def simulate_xpbd(
         start, faces = check_body(body, triangles, frames)
         hair.attach_body((start - away) @ first if bind_body is None else np.asarray(bind_body), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
-    planes = np.empty((frames, strands, vertices, 4), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
         if body is not None:
             hair.look(np.asarray(body[t]) - away, a, b)
         if t:
             hair.go(a, b, step)
-        hair.read(head[t], b, points[t], planes[t])
+        hair.read(head[t], b, points[t])
         if progress:
             progress(t + 1, frames, "simulating")
-    return Rollout(points, planes, np.full(frames, np.nan), np.full(frames, float(substeps)))
+    return Rollout(points, None, np.full(frames, np.nan), np.full(frames, float(substeps)))
 
 
 class _Hair:
@@ -115,7 +114,7 @@ class _Hair:
         self.mesh = wp.Mesh(points=self.surface, indices=indices)
         still = (wp.quat_identity(), wp.vec3(), wp.quat_identity(), wp.vec3())
         self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *still, self.home, self.plane)
-        near = self._planes()
+        near = np.swapaxes(self.plane.numpy(), 0, 1)
         self.limit = self._reals(np.minimum(self.margin, (near[..., :3] * self.rods.points).sum(-1) - near[..., 3]))
 
     def look(self, body: np.ndarray, a: int, b: int) -> None:
@@ -136,14 +135,10 @@ class _Hair:
             self.old, self.velocity, self.twist, self.waiting,
         )  # fmt: skip
 
-    def read(self, head: np.ndarray, b: int, points: np.ndarray, planes: np.ndarray) -> None:
-        """Write (S, K, 3) and (S, K, 4) canonical, for the head (4, 4) of substep b."""
+    def read(self, head: np.ndarray, b: int, points: np.ndarray) -> None:
+        """Write (S, K, 3) canonical, for the head (4, 4) of substep b."""
         posed = np.swapaxes(self.x.numpy(), 0, 1) - self.way.origin[b]
         points[:] = posed @ np.asarray(head, float)[:3, :3]
-        planes[:] = self._planes()
-
-    def _planes(self) -> np.ndarray:
-        return np.swapaxes(self.plane.numpy(), 0, 1)
 
     def _carry(self, a: int, b: int):
         """The head's motion from substep a to substep b."""

@@ -145,9 +145,10 @@ class RolloutMaker:
             rest_support=scene.rest_support,
             neighbours=lock_mates(rest, groom.lock[draw.strands]),
             bind_body=None if self.body is None else scene.character.canonical(self.body.shaped(shape)),
+            planes=True,
         )
         moved = result.points - rest[None].astype(np.float32)
-        planes = result.planes.copy()
+        planes = result.planes
         planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
         vectors, bind = self.vectors(draw, scene.spec)
         return Rollout(

@@ -97,7 +97,7 @@ def test_planes_say_where_the_body_is():
     rest = groom(8)
     head = shaken(6)
     points, faces = sphere()
-    result = simulate(rest, head, carried(head, points), faces, bind_body=points)
+    result = simulate(rest, head, carried(head, points), faces, bind_body=points, planes=True)
     near = result.planes[..., 3] > -100
     assert near[:, :, 2:6].any()
     gap = (result.planes[..., :3] * result.points).sum(-1) - result.planes[..., 3]
