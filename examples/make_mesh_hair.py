@@ -25,7 +25,8 @@ from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import to_quaternion
 from usd.border.arrays import row_matrix
-from usd.border.units import Border, open_stage
+from usd.border.stage_files import open_stage
+from usd.border.units import Border
 from usd.skel.joints import JointSource
 from usd.skel.source import read_rig
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from usd.border.units import open_stage
+from usd.border.stage_files import open_stage
 
 JOINTS = (
     "hips", "hips/spine", "hips/spine/neck", "hips/spine/neck/head",

@@ -11,7 +11,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.rotation import relative_to_parents
 
 from ..border.arrays import integers, vectors
-from ..border.units import check_layer_name, write_stage
+from ..border.stage_files import check_layer_name, write_stage
 from .prims import author_influences, author_skeleton, bind_to
 
 ROOT = "/Body"

@@ -18,7 +18,8 @@ from neuralocks_core.strands.strand_set import root_uv
 from ..border.arrays import floats, integers, row_matrix
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.units import LAYERS, Border, check_not_input, open_stage, write_stage
+from ..border.stage_files import LAYERS, check_not_input, open_stage, write_stage
+from ..border.units import Border
 from ..shot.curves import find_curves, read_groom
 from ..skel.surface import rest_primvar
 from .prims import POLYLINES, Spline, author_curves

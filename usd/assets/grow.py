@@ -15,7 +15,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
 
-from ..border.units import check_not_input
+from ..border.stage_files import check_not_input
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from .groom import write_groom

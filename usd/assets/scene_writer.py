@@ -10,7 +10,7 @@ from pxr import Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.files import as_path
 
 from ..border.arrays import floats, integers, quaternions, row_matrix, vectors
-from ..border.units import write_stage
+from ..border.stage_files import write_stage
 from ..shot.recorded import KEY
 from .prims import Spline, author_curves, author_influences, author_skeleton, bind_to
 

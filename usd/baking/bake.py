@@ -14,8 +14,8 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
 
 from ..border.amounts import check_number
+from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts, time_codes
-from ..border.units import check_layer_name
 from ..shot.notes import written_notes
 from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot

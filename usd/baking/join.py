@@ -15,7 +15,8 @@ from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import first_line, named
-from ..border.units import Border, check_layer_name, check_not_input, one_file, open_stage
+from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
+from ..border.units import Border
 from ..shot.notes import composition_notes, out_of_place
 from ..shot.recorded import KEY
 from .override import deliver, relative, repeat_metadata

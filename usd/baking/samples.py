@@ -17,8 +17,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import names_damage
+from ..border.stage_files import check_not_input, used_files
 from ..border.stopping import stopped
-from ..border.units import check_not_input, used_files
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
 from .override import OverrideWriter, deliver

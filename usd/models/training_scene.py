@@ -16,7 +16,7 @@ from neuralocks_core.training.rollouts import TrainingScene
 from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.units import open_stage
+from ..border.stage_files import open_stage
 from ..shot.attach import attach
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves

@@ -17,7 +17,8 @@ from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 from ..assets.groom import USD
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.units import OTHERS, Border, open_stage
+from ..border.stage_files import OTHERS, open_stage
+from ..border.units import Border
 from ..rig.facing import facing_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint

@@ -8,8 +8,9 @@ from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.progress import Progress
 
 from ..border.damage import names_damage
+from ..border.stage_files import open_stage
 from ..border.stopping import deferred
-from ..border.units import Border, open_stage
+from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
 from ..shot.curves import find_curves

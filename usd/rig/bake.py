@@ -19,8 +19,8 @@ from neuralocks_core.rig.network import RigModel, RigSampler
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
+from ..border.stage_files import check_layer_name, check_not_input
 from ..border.time_codes import given_cuts, time_codes
-from ..border.units import check_layer_name, check_not_input
 from ..shot.notes import written_notes
 from ..shot.stage import check_cuts, frame_range
 from .layer import write_rig_layer

@@ -17,7 +17,8 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
-from ..border.units import Border, open_stage
+from ..border.stage_files import open_stage
+from ..border.units import Border
 from ..shot.character_notes import lies_down
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import another_head, unfound, unlikely_head

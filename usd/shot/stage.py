@@ -14,7 +14,8 @@ from neuralocks_core.groom import Groom
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.prim_paths import prim_path
-from ..border.units import Border, open_stage
+from ..border.stage_files import open_stage
+from ..border.units import Border
 from ..skel.source import StageRig, find_skeletons
 from .attach import Attachment, rig_joint
 from .character_notes import lies_down, without_body

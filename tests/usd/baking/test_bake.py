@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
-from usd.border.units import open_stage
+from usd.border.stage_files import open_stage
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 

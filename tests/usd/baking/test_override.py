@@ -12,7 +12,8 @@ from pxr import Sdf, Usd, UsdGeom
 
 from usd.baking.bake import bake
 from usd.baking.override import write_header
-from usd.border.units import Border, used_files
+from usd.border.stage_files import used_files
+from usd.border.units import Border
 
 from ..shots import samples, write_shot
 

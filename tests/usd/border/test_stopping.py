@@ -11,8 +11,8 @@ import pytest
 import typer
 
 from usd.__main__ import main
+from usd.border.stage_files import write_stage
 from usd.border.stopping import INTERRUPTED, deferred, stoppable
-from usd.border.units import write_stage
 from usd.cli import app as cli
 from usd.cli.command import command_of
 from usd.cli.progress import progress_bar

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""USD files: opening them, what may not be written over, and writing them whole."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from pxr import Ar, Tf, Usd
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.formats import EXTENSIONS
+
+from .damage import first_line, named
+from .stopping import check
+
+LAYERS = (".usd", ".usda", ".usdc")
+OTHERS = (".fbx", ".vrm", ".glb", ".gltf")
+"""Characters in other formats, which USD reads with plug-ins alone."""
+
+
+def open_stage(path) -> Usd.Stage:
+    """Open a USD file.
+
+    Raises:
+        NeuralocksError: it is missing, or no readable USD file.
+    """
+    path = as_path(path, "path")
+    if not path.exists():
+        raise NeuralocksError(f"{path}: no such file; check the path")
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    if path.suffix.lower() in EXTENSIONS:
+        raise NeuralocksError(
+            f"{path}: is a hair file; make a USD groom of it with 'neuralocks import' and add that to a shot"
+        )
+    check()  # USD swallows Ctrl-C while it loads its modules
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise NeuralocksError(f"{path}: not a readable USD file ({first_line(error)}); {_remedy(path)}") from None
+    if stage is None:
+        raise NeuralocksError(f"{path}: not a readable USD file; {_remedy(path)}")
+    return stage
+
+
+def _remedy(path: Path) -> str:
+    if path.suffix.lower() not in OTHERS:
+        return "export it again"
+    by = " (examples/vrm_to_usd.py does)" if path.suffix.lower() != ".fbx" else ""
+    return f"import it into Blender and export USD there{by}"
+
+
+def used_files(stage: Usd.Stage) -> list[str]:
+    """Files that the stage is composed of."""
+    # What lies inside a package is of the package's file.
+    paths = (layer.realPath for layer in stage.GetUsedLayers())
+    return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})
+
+
+def check_layer_name(out: Path) -> None:
+    """Refuse to write USD under a name that is no USD layer's.
+
+    Raises:
+        NeuralocksError: it has another ending, is a folder's, or says more to USD than a name.
+    """
+    if ":SDF_FORMAT_ARGS:" in str(out):
+        raise NeuralocksError(f"{out}: USD takes what follows :SDF_FORMAT_ARGS: for arguments; choose another name")
+    if out.suffix.lower() not in LAYERS:
+        raise NeuralocksError(f"{out}: is written as a USD layer; end its name with {', '.join(LAYERS)}")
+    if os.path.isdir(out):  # False of a name too long for a file, too, which is told when it is written
+        raise NeuralocksError(f"{out}: is a folder; give a file name")
+
+
+def check_not_input(out: Path, stage: Usd.Stage) -> None:
+    """Refuse to write over a file that the stage is composed of.
+
+    Raises:
+        NeuralocksError: `out` is one of them, by whatever name.
+    """
+    if any(one_file(out, path) for path in used_files(stage)):
+        raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
+
+
+def one_file(out: Path, path: str | Path) -> bool:
+    """Whether a file that will be written is one that there is; folders on the way to it may still be missing."""
+    if not os.path.exists(path):
+        return False
+    return os.path.realpath(out) == os.path.realpath(path) or (os.path.exists(out) and os.path.samefile(out, path))
+
+
+def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
+    """Write a new USD file at once under its final name, with what `author` puts into the stage.
+
+    Raises:
+        NeuralocksError: the path has another ending, or cannot be written.
+    """
+    check_layer_name(path)
+    with named(path), atomic_write(path) as part:
+        stage = Usd.Stage.CreateNew(str(part))
+        author(stage)
+        stage.GetRootLayer().Save()
+        del stage
+        check()
+    return path
