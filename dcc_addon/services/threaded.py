@@ -4,6 +4,7 @@
 import importlib
 import sys
 import threading
+import traceback
 
 from neuralocks_core.errors import NeuralocksError
 
@@ -66,7 +67,11 @@ class Threaded:
         try:
             self._result = self._function(self._say)
         except BaseException as error:
+            # Its frames would keep what lies in them open, a stage say, and lead back to this object.
+            traceback.clear_frames(error.__traceback__)
             self._error = error
+        finally:
+            del self
 
     def _say(self, done, total, _message="") -> None:
         if self._cancelled:

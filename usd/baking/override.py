@@ -14,6 +14,7 @@ from neuralocks_core.rotation import sizes, transformed
 
 from ..border.arrays import vectors
 from ..border.damage import named
+from ..border.stage_files import refresh_open
 from ..border.stopping import check
 from ..border.units import Border
 from ..shot.curves import rest_points, widest_sample
@@ -186,9 +187,7 @@ def deliver(spool: Spool) -> None:
             Sdf.Layer.FindOrOpen(str(spool.layer_path)).Export(str(text))
         os.replace(text, spool.layer_path)
     spool.finish()
-    layer = Sdf.Layer.Find(os.path.realpath(spool.out)) or Sdf.Layer.Find(str(spool.out))
-    if layer:
-        layer.Reload(force=True)
+    refresh_open(spool.out)
 
 
 class _Writable:

@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from pxr import Ar, Tf, Usd
+from pxr import Ar, Sdf, Tf, Usd
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
@@ -102,4 +102,14 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
         stage.GetRootLayer().Save()
         del stage
         check()
+    refresh_open(path)
     return path
+
+
+def refresh_open(path: Path) -> None:
+    """Let stages that this process has open see a file that was written anew, and those that it opens: USD keeps a layer as
+    long as anybody holds it.
+    """
+    layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
+    if layer:
+        layer.Reload(force=True)

@@ -12,6 +12,7 @@ from neuralocks_core.rotation import quaternion_product, relative_to_parents, ro
 
 from ..baking.override import apply_binding, over_prim, write_header
 from ..border.damage import named
+from ..border.stage_files import refresh_open
 from ..skel.joints import JointSource
 from .stage import BAKED, RiggedHair
 
@@ -130,3 +131,4 @@ def _save(layer: Sdf.Layer, out: Path) -> None:
     with named(out), atomic_write(out) as part:
         if not layer.Export(str(part), args={"format": "usda" if out.suffix.lower() == ".usda" else "usdc"}):
             raise NeuralocksError(f"{out}: cannot be written; check the folder and the space on its disk")
+    refresh_open(out)

@@ -359,3 +359,14 @@ def test_a_vrm_avatar_through_blender(tmp_path):
     named = done.stdout.strip().splitlines()[-1].replace("--chains", "").split()
     assert sorted(hair.rig.chains.names) == sorted(named) and len(named) == 7
     assert len(hair.rig.points) > 50
+
+
+def test_an_open_stage_sees_what_was_baked_last(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    result = bake_rig(shot, tmp_path / "bake.usda", model)
+    stage = Usd.Stage.Open(str(result.path))
+    turns = stage.GetAttributeAtPath(f"{result.animation}.rotations")
+    before = turns.GetNumTimeSamples()
+    bake_rig(shot, result.path, model, subframes=2)
+    assert turns.GetNumTimeSamples() > before

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work beside Blender that does not end well."""
+
+import gc
+import weakref
+
+import pytest
+
+from dcc_addon.services.threaded import Threaded
+
+
+class _Stage:
+    """Stands for what work opens."""
+
+
+@pytest.mark.parametrize("how", ["cancelled", "failed"])
+def test_what_stopped_work_had_open_is_closed_at_once(how):
+    """Not at the next garbage collection: an open stage gives whoever opens its file again what the file held before."""
+    opened = []
+
+    def work(say):
+        stage = _Stage()
+        opened.append(weakref.ref(stage))
+        if how == "failed":
+            raise ValueError
+        while True:
+            say(0, 1)
+
+    gc.disable()
+    try:
+        job = Threaded(work).start()
+        if how == "cancelled":
+            job.cancel()
+        job._thread.join()
+        del job
+        assert opened[0]() is None
+    finally:
+        gc.enable()
