@@ -69,14 +69,14 @@ def write_samples(
 
     Raises:
         NeuralocksError: the file cannot be written. Nothing is left then, neither under its name nor beside it; only a
-            stop by the user leaves the finished frames, to go on from.
+            stop by the user, or too little space to go on, leaves the finished frames, to go on from.
     """
     check_not_input(out, shot.stage)
-    _check_space(out, shot, len(codes), velocities)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
+    batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
+    _check_space(spool, batched, codes, velocities)
     try:
-        batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
         return _write(shot, codes, batched, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) or stopped():
@@ -196,12 +196,18 @@ class _Store:
             yield result
 
 
-def _check_space(out: Path, shot: Shot, count: int, velocities: bool) -> None:
-    # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
-    size = 1.03 * sum(item.point_count for item in shot.grooms) * 12 * (2 + velocities) * count
-    folder = next((p for p in [out.parent, *out.parent.parents] if p.is_dir()), None)
-    if folder is not None and size > (free := shutil.disk_usage(folder).free):
+def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bool) -> None:
+    """Refuse a bake for which the disk has no room, beside the frames that are there already, to go on from."""
+    size, left = 0.0, 0
+    for number, items in enumerate(batched):
+        points = sum(item.point_count for item in items)
+        frame = 12 * points
+        left += frame * sum(spool.holds(number, code, points) for code in codes)
+        # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
+        size += 1.03 * frame * (2 + velocities) * len(codes)
+    if size - left > (free := shutil.disk_usage(spool.folder).free):
+        spool.close()
         raise NeuralocksError(
-            f"{out}: needs {math.ceil(size / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "
+            f"{spool.out}: needs {math.ceil((size - left) / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "
             "free some, bake fewer frames or choose another folder"
         )

@@ -7,10 +7,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pxr import Sdf
 
+from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.shot.stage import read_shot
@@ -109,3 +112,33 @@ def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
                 with pytest.raises(KeyboardInterrupt):
                     make(path, **other, progress=stop)
                 assert (make(read_shot(path, **again)).resumed > 0) == taken
+
+
+def test_a_bake_that_goes_on_asks_for_the_space_that_it_still_needs(tmp_path, model, monkeypatch):
+    """Without what was left beside the finished frames, which is gone by then; where it is refused, these stay."""
+    shot, out = write_shot(tmp_path, Recipe(frames=10, strands=50, vertices=10)), tmp_path / "bake.usdc"
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    Sdf.CopySpec(layer, "/Hero/Hair", layer, "/Hero/Beard")
+    layer.Save()
+    spool, frame = tmp_path / ".bake.usdc.baking", 2 * 50 * 10 * 12
+    disk = 21 * frame  # the points of ten frames twice, and a little
+
+    def usage(_):
+        return SimpleNamespace(free=disk - sum(file.stat().st_size for file in spool.glob("*")))
+
+    def stop(done, total, message):
+        if done == 16:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("usd.baking.samples.shutil.disk_usage", usage)
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, velocities=False, progress=stop)
+    left = len(list(spool.glob("*.frame")))
+    (spool / "stray.part.usdc").write_bytes(bytes(5 * frame))
+    disk = 19 * frame
+    with pytest.raises(NeuralocksError, match="needs 1 MB while"):
+        bake(shot, out, model, velocities=False)
+    assert len(list(spool.glob("*.frame"))) == left >= 7
+    (spool / "stray.part.usdc").write_bytes(bytes(5 * frame))
+    disk = 21 * frame
+    assert bake(shot, out, model, velocities=False).resumed == 2 * left
