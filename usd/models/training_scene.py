@@ -4,6 +4,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from pxr import UsdSkel
+
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import whole_locks
@@ -17,11 +19,15 @@ from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import open_stage
+from ..border.units import Border
 from ..shot.attach import attach
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
+from ..shot.lacking import nothing_found
 from ..shot.notes import first_of, unfound, unlikely_head
 from ..shot.stage import StageRig, read_rigs
+from ..shot.unnamed_head import read_each_rig
+from ..skel.source import find_skeletons
 
 LIBRARY = "library"
 """A groom of this name stands for every style of the procedural library, grown on the character."""
@@ -99,6 +105,7 @@ def _strands(groom: Groom, character: Character) -> StrandSet:
     return strands.subset(whole_locks(strands, MOST_STRANDS))  # neighbours stay neighbours
 
 
+@names_damage
 def read_clip(path: str, character: Character) -> Clip:
     """Motion of a file on a character: BVH is retargeted, a skeleton of USD must have the same joints.
 
@@ -110,10 +117,17 @@ def read_clip(path: str, character: Character) -> Clip:
         from neuralocks_core.formats.bvh import read_bvh
 
         return retarget(read_bvh(path), character)
-    clips = [rig.clip for rig in read_rigs(path) if rig.character.skeleton.names == character.skeleton.names]
-    if not clips:
+    stage, names = open_stage(path), character.skeleton.names
+    prims = find_skeletons(stage)
+    if not prims:
+        raise nothing_found(stage, Path(path), "UsdSkel skeleton", "give motion of the character's joints, or BVH")
+    alike = [prim for prim in prims if tuple(UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()) == names]
+    if not alike:
         raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
-    moving = [clip for clip in clips if len(clip.times) > 1]
+    rigs, errors = read_each_rig(stage, alike, Border.of(stage), names[character.head], all_shapes=True)
+    if not rigs:
+        raise errors[0]
+    moving = [rig.clip for rig in rigs if len(rig.clip.times) > 1]
     if not moving:
         raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
     return moving[0]

@@ -16,6 +16,7 @@ from usd.assets.grow import grow
 from usd.cli.train import one_by_one
 from usd.models.train import begins_with
 from usd.models.training_scene import MOST_STRANDS, read_clip, training_scene
+from usd.shot.stage import read_rigs
 
 from ..shots import Recipe, write_shot
 
@@ -56,6 +57,25 @@ def test_what_a_training_should_know_is_told_before_it(tmp_path):
     stage.GetPrimAtPath("/Hero/Rig").GetRelationship("skel:animationSource").SetTargets([])
     layer.Save()
     assert len(read_clip(str(path), scene.character).times) > 1
+
+
+def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(tmp_path):
+    """The character's head is named with --head; what moves it are the same joints."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    for prim in ("/Hero/Rig", "/Hero/Rig/Motion"):
+        joints = layer.GetAttributeAtPath(f"{prim}.joints")
+        joints.default = [name.replace("neck/head", "b6/b7").replace("neck", "b6") for name in joints.default]
+    layer.Save()
+    character = read_rigs(path, head="b7")[0].character
+    del layer.GetPrimAtPath("/Hero").nameChildren["Hair"]
+    layer.Export(str(tmp_path / "clip.usda"))
+    clip = read_clip(str(tmp_path / "clip.usda"), character)
+    assert len(clip.times) > 1
+    layer.GetAttributeAtPath("/Hero/Rig.joints").default = [f"other{n}" for n in range(8)]
+    layer.Export(str(tmp_path / "other.usda"))
+    with pytest.raises(NeuralocksError, match="other.usda: its skeleton is not the character's"):
+        read_clip(str(tmp_path / "other.usda"), character)
 
 
 def test_options_take_as_many_words_as_follow():
