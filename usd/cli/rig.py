@@ -48,7 +48,6 @@ def train(
 
     model_file.named(out)
     changed = {"bend": bend, "weight": weight, "damping": damping}
-    _check_amounts(dynamic, seconds, steps, hidden, clips, changed)
     from ..rig.train import train_rig
 
     with progress_bar("training") as progress:
@@ -79,23 +78,6 @@ def train(
         )
         for line in report_lines(model.report):
             typer.echo(line)
-
-
-def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
-    """Refuse numbers that no training can use, before anything is read; None stands for a default."""
-    if (seconds is not None and not 1 <= seconds <= 86400) or (steps is not None and not 1 <= steps <= 10_000_000):
-        raise NeuralocksError(
-            "--seconds must lie between 1 and 86400, --steps between 1 and 10 million; leave them out for the defaults"
-        )
-    if hidden is not None and not 1 <= hidden <= 256:
-        raise NeuralocksError(f"--hidden {hidden}: must lie between 1 and 256")
-    if clips is not None and not 2 <= clips <= 10000:
-        raise NeuralocksError(f"--clips {clips}: must lie between 2 and 10000")
-    if not dynamic and (clips is not None or material["damping"] is not None):
-        raise NeuralocksError("--clips, --damping: have no effect on held poses; leave out --quasi-static")
-    for name, value in material.items():
-        if value is not None and not 1e-6 < value < 1e4:
-            raise NeuralocksError(f"--{name} {value}: must lie between 1e-6 and 1e4")
 
 
 @command("bake")

@@ -17,6 +17,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 
+from ..border.extras import check_training
+
 METHODS = ("rollouts", "selfsupervised")
 SHIPPED, NOTHING = "shipped", "nothing"
 """Words for what a training begins with."""
@@ -73,12 +75,9 @@ def train(
         raise NeuralocksError(f"--method {method}: is unknown; choose one of {', '.join(METHODS)}")
     if paper and method != "selfsupervised":
         raise NeuralocksError("--paper: goes with --method selfsupervised only; add it, or leave --paper out")
-    try:
-        import onnx  # noqa: F401  (reads and writes models)
-        import torch
-        import warp  # noqa: F401  (the solver's)
-    except ImportError as error:
-        raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+    check_training()
+    import torch
+
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
     from neuralocks_core.training.networks import MOTIONS, OUTPUTS
     from neuralocks_core.training.regression import RegressionOptions

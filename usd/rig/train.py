@@ -10,6 +10,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
 from neuralocks_core.progress import Progress
 
+from ..border.amounts import check_number
+from ..border.extras import check_training
 from .stage import check_patterns, read_rigged_hair, rigged_notes
 
 
@@ -51,12 +53,11 @@ def train_rig(
         the RigModel.
 
     Raises:
-        NeuralocksError: the rig cannot be used, or the extra `train` is missing.
+        NeuralocksError: the rig cannot be used, a number is out of its range, or the extra `train` is missing.
     """
-    try:
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+    material = material or {}
+    _check_amounts(dynamic, seconds, steps, hidden, clips, material)
+    check_training()
     from neuralocks_core.rig.rods import RigMaterial
 
     character, out = as_path(character, "character"), as_path(out, "out")
@@ -68,7 +69,7 @@ def train_rig(
         notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
     if tell:
         tell(notes)
-    values = RigMaterial(**(material or {}))
+    values = RigMaterial(**material)
     options = {"seconds": seconds, "steps": steps, "hidden": hidden}
     if dynamic:
         from neuralocks_core.training.rig.dynamic import train_dynamic as train
@@ -87,6 +88,21 @@ def train_rig(
     model.training["reads"] = {name: leaf(path) for name, path in read.items()}
     model.save(out)
     return model
+
+
+def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
+    """Refuse numbers that no training can use; None stands for a default."""
+    if not dynamic and (clips is not None or "damping" in material):
+        raise NeuralocksError("--clips, --damping: have no effect on held poses; leave out --quasi-static")
+    for name, value, low, high, whole in (
+        ("seconds", seconds, 1, 86_400, False),
+        ("steps", steps, 1, 10_000_000, True),
+        ("hidden", hidden, 1, 256, True),
+        ("clips", clips, 2, 10_000, True),
+        *((name, material.get(name), 1e-6, 1e4, False) for name in ("bend", "weight", "damping")),
+    ):
+        if value is not None:
+            check_number(f"--{name}", value, low, high, whole=whole)
 
 
 def _check_writable(out: Path) -> None:

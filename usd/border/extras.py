@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Packages that only some work needs, asked for before it begins: else they are missed after minutes of it."""
+
+from importlib import import_module
+
+from neuralocks_core.errors import NeuralocksError
+
+
+def check_training() -> None:
+    """Refuse to train without what learns, what writes the model, and what simulates.
+
+    Raises:
+        NeuralocksError: names the package.
+    """
+    for name in ("torch", "onnx", "warp"):
+        try:
+            import_module(name)
+        except ImportError as error:
+            raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
