@@ -116,11 +116,12 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     curves = find_curves(stage, grooms)
     if not curves:
         raise no_groom(stage, path)
-    rigs = _rigs(stage, border, skeleton, head, path, joints=joints, cuts=cuts)
+    rigs, unusable = _rigs(stage, border, skeleton, head, path, joints=joints, cuts=cuts)
+    notes += unusable
     _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
-    every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)
+    every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)[0]
     others = [rig for rig in every if skeleton and rig.path != skeleton]
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
     found = _grooms(search, curves, notes)
@@ -167,7 +168,9 @@ def read_rigs(
         joints: semantic joint -> joint, where names do not tell.
     """
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
-    return tuple(_rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints))
+    rigs, unusable = _rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints)
+    rigs[0].notes.extend(unusable)
+    return tuple(rigs)
 
 
 def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
@@ -215,7 +218,8 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     return moving
 
 
-def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> list[StageRig]:
+def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tuple[list[StageRig], list[str]]:
+    """The skeletons that can be used, and the notes on those that cannot."""
     if not isinstance(joints, dict | None):
         raise NeuralocksError(f"joints: {joints!r} is no dict; give one such as {{'left_upper_arm': 'arm_L'}}")
     prims = find_skeletons(stage)
@@ -229,9 +233,7 @@ def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> lis
     rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)
     if errors and (not rigs or skeleton):
         raise errors[0]
-    for error in errors:
-        rigs[0].notes.append(left_out(error))
-    return rigs
+    return rigs, [left_out(error) for error in errors]
 
 
 def _check_animated(rigs: list[StageRig]) -> None:

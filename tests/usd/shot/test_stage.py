@@ -296,3 +296,20 @@ def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
     UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))
     layer.Save()  # now it is somebody else
     assert not any("same character" in note for note in read_shot(path).notes)
+
+
+def test_why_a_skeleton_is_left_out_is_told_whoever_comes_first(tmp_path):
+    """Also where the first character of the stage carries no hair, so that nothing else is told of it."""
+    path = write_shot(tmp_path, Recipe(nesting="/Dog"))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    for name in ("Hero", "Villain"):
+        other = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting=f"/{name}"), name)))
+        Sdf.CopySpec(other, f"/{name}", layer, f"/{name}")
+    for name in ("Dog", "Villain"):
+        del layer.GetPrimAtPath(f"/{name}").nameChildren["Hair"]
+    layer.GetAttributeAtPath("/Villain/Rig.bindTransforms").default = Vt.Matrix4dArray(2)
+    layer.Save()
+    said = [note for note in read_shot(path).notes if note.startswith("/Villain/Rig")]
+    assert len(said) == 1 and said[0].endswith("(this skeleton is left out)")
+    assert said == [note for note in inspect(path)["spoils"] if note.startswith("/Villain/Rig")]
+    assert said[0] in read_rigs(path)[0].notes
