@@ -7,6 +7,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
+from usd.assets.groom import import_groom
 from usd.baking.bake import bake
 from usd.baking.spool import Spool
 from usd.review.inspect import inspect
@@ -229,6 +230,20 @@ def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
                 with pytest.raises(NeuralocksError, match=f"{place}.usdc: .*damaged"):
                     read_shot(joints={}, path=broken)
     assert True in found
+
+
+def test_a_primvar_that_cannot_be_unpacked_is_said_of_the_file_that_is_imported(tmp_path):
+    """It opens, and most of it are the numbers of one primvar."""
+    path, rng = write_shot(tmp_path, Recipe(extension="usdc")), np.random.default_rng(0)
+    stage = Usd.Stage.Open(str(path))
+    primvar = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath(HAIR)).CreatePrimvar("groom_x", Sdf.ValueTypeNames.IntArray)
+    primvar.Set(Vt.IntArray.FromNumpy(rng.integers(0, 3, 40_000, np.int32)))
+    stage.Export(str(tmp_path / "groom.usdc"))
+    whole = (tmp_path / "groom.usdc").read_bytes()
+    place, broken = len(whole) // 2, tmp_path / "broken.usdc"
+    broken.write_bytes(whole[:place] + b"\xff" * 9000 + whole[place + 9000 :])
+    with pytest.raises(NeuralocksError, match=r"broken.usdc: .*damaged"):
+        import_groom(broken, tmp_path / "out.usda")
 
 
 @pytest.mark.parametrize("end", [float("inf"), float("nan"), -3.0])

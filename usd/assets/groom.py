@@ -64,7 +64,7 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     Args:
         source: the hair file.
         out: USD file to write.
-        unit: "mm", "cm", "m" or metres per unit of the source; what the file says, or suits a head, if left out.
+        unit: "mm", "cm", "in", "m" or metres per unit of the source; what the file says, or suits a head, if left out.
         up: "Y" or "Z", the source's upward axis.
 
     Returns:
@@ -175,7 +175,6 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
     return tuple(found)
 
 
-@names_damage
 def _read_primvars(prim: Usd.Prim, groom: Groom) -> tuple["Primvar", ...]:
     """Those that go on with the curves, as far as they fit them."""
     found = []
