@@ -2,7 +2,7 @@
 """Join the bakes of parts of a range, as the machines of a farm make them, into the one bake of the whole range."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,7 +47,8 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
 
     Args:
-        parts: files that `bake` or `simulate` wrote, in any order. Of frames that several have the first file's count.
+        parts: files that `bake` or `simulate` wrote, in any order, or a lone one. Of frames that several have the first
+            file's count.
         out: `.usdc`, `.usd` or `.usda` to write.
         progress: called with (done, total, message).
 
@@ -57,7 +58,8 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     """
     out = as_path(out, "out")
     check_layer_name(out)
-    every = [_Part(as_path(part, "parts")) for part in parts]
+    alone = isinstance(parts, str) or not isinstance(parts, Iterable)
+    every = [_Part(as_path(part, "parts")) for part in ([parts] if alone else parts)]
     if not every:
         raise NeuralocksError("no parts: name the files that neuralocks bake wrote")
     first, say = every[0], progress or silent

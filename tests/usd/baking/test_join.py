@@ -152,6 +152,14 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
     assert not (tmp_path / "hair.usdc").exists() and not list(tmp_path.glob(".*"))
 
 
+def test_a_lone_part_needs_no_list(shot, tmp_path, model):
+    part = bake(shot, tmp_path / "part.usdc", model).path
+    for each in (str(part), part):
+        assert join(each, tmp_path / "hair.usdc").path.read_bytes() == part.read_bytes()
+    with pytest.raises(NeuralocksError, match="parts: 3 is no path"):
+        join(3, tmp_path / "hair.usdc")
+
+
 def test_a_stopped_join_leaves_nothing(shot, tmp_path, model):
     def stop(*_):
         raise KeyboardInterrupt
