@@ -19,7 +19,8 @@ from ..border.stage_files import check_layer_name, check_not_input, one_file, op
 from ..border.units import Border
 from ..shot.notes import composition_notes, out_of_place
 from ..shot.recorded import KEY
-from .override import deliver, relative, repeat_metadata
+from .header import relative, repeat_metadata
+from .override import deliver
 from .sample_layer import Lagging, SampleLayer
 from .spool import Spool, fingerprint
 

@@ -2,24 +2,22 @@
 """The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
 
 import os
-import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
+from pxr import Sdf, Usd, UsdGeom, Vt
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import sizes, transformed
 
 from ..border.arrays import vectors
 from ..border.damage import named
 from ..border.stage_files import refresh_open
 from ..border.stopping import check
-from ..border.units import Border
 from ..shot.curves import rest_points, widest_sample
 from ..shot.recorded import record
 from ..shot.stage import Shot, StageGroom
+from .header import apply_binding, over_prim, write_header
 from .sample_layer import SampleLayer
 from .spool import Spool
 
@@ -97,87 +95,6 @@ class OverrideWriter:
         self._file.close()
 
 
-def over_prim(layer: Sdf.Layer, prim: Usd.Prim) -> Sdf.PrimSpec:
-    """The over of a shot's prim. Instances around it become plain prims: nothing inside an instance can be overridden."""
-    for above in prim.GetPath().GetPrefixes():
-        if prim.GetStage().GetPrimAtPath(above).IsInstance():
-            _over(layer, above).instanceable = False
-    return _over(layer, prim.GetPath())
-
-
-def apply_binding(over: Sdf.PrimSpec, prim: Usd.Prim) -> None:
-    """Apply SkelBindingAPI to an over, where its prim has it not."""
-    if not prim.HasAPI("SkelBindingAPI"):
-        over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
-
-
-def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
-    """Sublayer the shot by a path relative to `out`, and repeat what USD reads of a stage's first layer only."""
-    ranged = stage.HasAuthoredTimeCodeRange()
-    facts = {
-        "metersPerUnit": border.metres_per_unit,
-        "upAxis": border.up_axis,
-        "timeCodesPerSecond": border.rate,
-        "framesPerSecond": stage.GetFramesPerSecond(),
-        "startTimeCode": stage.GetStartTimeCode() if ranged else codes[0],
-        "endTimeCode": stage.GetEndTimeCode() if ranged else codes[-1],
-    }
-    if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
-        facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
-    repeat_metadata(stage.GetRootLayer(), layer, out, facts)
-    layer.subLayerPaths.append(relative(shot, out))
-
-
-LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
-"""Metadata that is said of one layer, or that USD reads of sublayers, too."""
-
-
-def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict) -> None:
-    """Units, rates, range, default prim, render settings, and the variables without which references find nothing; with
-    `facts` in place of what is said otherwise.
-    """
-    root = source.pseudoRoot
-    said = {name: root.GetInfo(name) for name in root.ListInfoKeys() if name not in LAYERS_OWN}
-    for name, value in sorted((said | facts).items()):  # USD gives another order in each process
-        layer.pseudoRoot.SetInfo(name, value)
-
-    def placed(asset: str) -> str:
-        return relative(source.ComputeAbsolutePath(asset), out) if asset.startswith(("./", "../")) else asset
-
-    UsdUtils.ModifyAssetPaths(layer, placed)
-
-
-def relative(file, out: Path) -> str:
-    """Path of a file relative to a layer's folder, by the names it was given.
-
-    What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
-    folder's own path has a link, `..` must lead to the file both from there and from behind the link.
-    """
-    if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
-        raise NeuralocksError(f"{file}: its path holds a line break or the like, and no layer can name it; rename it")
-    if os.sep == "/" and "\\" in os.path.abspath(out):
-        raise NeuralocksError(f"{out}: USD takes the backslash in its path for a slash and finds no shot; rename it")
-    folder, behind = out.parent, os.path.realpath(out.parent)
-    try:
-        ways = [
-            os.path.relpath(os.path.abspath(file), os.path.abspath(folder)),
-            os.path.relpath(os.path.realpath(file), behind),
-        ]
-    except ValueError:  # another drive
-        return os.path.realpath(file).replace(os.sep, "/")
-    leading = (way for way in ways if all(_same(f"{start}/{way}", file) for start in (os.path.abspath(folder), behind)))
-    relative = next(leading, ways[0]).replace(os.sep, "/")
-    return relative if relative.startswith("../") else f"./{relative}"
-
-
-def _same(path: str, file) -> bool:
-    """Whether a path, read as USD does, without a look at links before `..`, is the file."""
-    try:
-        return os.path.samefile(os.path.normpath(path), file)
-    except OSError:
-        return False
-
-
 def deliver(spool: Spool) -> None:
     """Put an assembled layer under its final name, as text where that asks for it; stages that this process has open see it."""
     check()
@@ -219,10 +136,6 @@ def _at_default(item: StageGroom) -> np.ndarray:
     if attachment.at_default is None:
         return points
     return transformed(points, np.linalg.inv(attachment.at_default) @ attachment.to_bind).astype(np.float32)
-
-
-def _over(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.PrimSpec:
-    return layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
 
 
 def _unit(item: StageGroom) -> float:

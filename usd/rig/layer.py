@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import quaternion_product, relative_to_parents, rotation_part, to_quaternion
 
-from ..baking.override import apply_binding, over_prim, write_header
+from ..baking.header import apply_binding, over_prim, write_header
 from ..border.damage import named
 from ..border.stage_files import refresh_open
 from ..skel.joints import JointSource

@@ -11,7 +11,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom
 
 from usd.baking.bake import bake
-from usd.baking.override import write_header
+from usd.baking.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
 
