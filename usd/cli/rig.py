@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 
-from neuralocks_core.errors import NeuralocksError
-
 from .command import command_of, counted, note, print_json
 from .options import AsJson, Cuts, Head, Joints, Loop, Seed, Skeleton, cut_codes, pairs
 from .progress import progress_bar
@@ -142,30 +140,6 @@ def export_c(
 
     path = write(RigModel.load(model), out, prefix)
     typer.echo(f"{path} and {example_beside(path)}")
-
-
-@command("export-onnx", usd=False)
-def export_onnx(
-    model: Model = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="ONNX file to write.")] = Path("hair.onnx"),
-) -> None:
-    """Write the network as ONNX with a batch axis, for crowds."""
-    from neuralocks_core import model as model_file
-    from neuralocks_core.files import atomic_write
-    from neuralocks_core.rig import RigModel
-    from neuralocks_core.runtime import graph_session
-
-    if out.suffix.lower() != ".onnx":
-        raise NeuralocksError(f"{out}: a graph ends in .onnx; choose such a name")
-    RigModel.load(model)  # says what is wrong with the file
-    file = model_file.read(model or model_file.shipped("rig"), "rig")
-    graph_session(file, "rig.onnx")
-    with atomic_write(out) as part:
-        part.write_bytes(file.graphs["rig.onnx"])
-    typer.echo(
-        f"{out}: input features (avatars, F), output turns (avatars, joints, 4) wxyz; neuralocks export writes a description "
-        "of both and the joints' names beside it, neuralocks rig export-c the code that makes the features"
-    )
 
 
 @command("inspect")

@@ -167,8 +167,6 @@ def test_what_is_exported_without_a_name_is_the_shipped_model(tmp_path, capsys):
     assert len(description) < 20_000 and "curve" not in json.loads(description)["model"]["training"]
     assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model_file.shipped()).graphs["tail.onnx"]
     assert status("export", "-o", tmp_path, "--groom", "/Hair") == 1 and "--shot" in capsys.readouterr().err
-    assert status("rig", "export-onnx", "-o", tmp_path / "rig") == 1
-    assert "ends in .onnx" in capsys.readouterr().err and not (tmp_path / "rig").exists()
 
 
 def test_a_model_is_unpacked_with_its_description(tmp_path, capsys):
