@@ -19,7 +19,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
-from .curve_ends import ends
+from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, ways
 from .seat_notes import lies_off_skin, moved_away, not_pinned, upside_down
@@ -95,8 +95,9 @@ def attach(
         else:
             found = _by_name(prim, rigs, placement, head)
             notes += [] if found.far else lies_off_skin(prim, found.rig, placement)
-    found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind))
-    notes += not_pinned(prim, found.rig, found.drawn)
+    beyond = beyond_ends(prim)
+    found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind, beyond))
+    notes += not_pinned(prim, found.rig, found.drawn, beyond)
     name = rig_joint(found)
     asked = found.rig.by_hand.get("head")
     if asked and leaf(name) != leaf(asked):

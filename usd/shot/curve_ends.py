@@ -13,8 +13,7 @@ from pxr import Usd, UsdGeom
 
 from neuralocks_core.groom import Groom
 
-from ..skel.surface import rest_value
-from .curves import read_groom, rest_points
+from .curves import read_groom, rest_counts, rest_points
 
 LEAST = 4
 """Points of a cubic segment; shorter strands are not drawn, and all their points are taken for hair."""
@@ -59,7 +58,7 @@ def beyond_ends(prim: Usd.Prim) -> Beyond | None:
         return None
     if curves.GetBasisAttr().Get() not in (tokens.catmullRom, tokens.bspline):
         return None
-    points, counts = rest_points(prim), _counts(prim)
+    points, counts = rest_points(prim), rest_counts(prim)
     if counts.sum() != len(points) or counts.min(initial=0) < 0:
         return None
     drawn = counts >= LEAST
@@ -72,17 +71,13 @@ def beyond_ends(prim: Usd.Prim) -> Beyond | None:
     return None if hair.all() else Beyond(before, after, hair)
 
 
-def ends(prim: Usd.Prim, *, last: bool = False, drawn: bool = False) -> np.ndarray:
-    """Which points (n,) are strands' first or last ones, of all or of those drawn; the very first one alone where the counts
+def ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = None) -> np.ndarray:
+    """Which points (n,) are strands' first or last ones, of all but those `beyond`; the very first one alone where the counts
     do not fit the points.
     """
-    points, counts = len(rest_points(prim)), _counts(prim)
+    points, counts = len(rest_points(prim)), rest_counts(prim)
     found = np.cumsum(counts) - (1 if last else counts)
     found = found[(counts > 0) & (found >= 0) & (found < points)]
-    if drawn and (beyond := beyond_ends(prim)) is not None:
+    if beyond is not None:
         found = found - np.isin(found, beyond.after) if last else found + np.isin(found, beyond.before)
     return found if len(found) else np.zeros(1, np.int64)
-
-
-def _counts(prim: Usd.Prim) -> np.ndarray:
-    return np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)

@@ -62,6 +62,11 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
     return np.asarray(points, np.float32) if kept is None else kept
 
 
+def rest_counts(prim: Usd.Prim) -> np.ndarray:
+    """Points of each strand at rest (S,)."""
+    return np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
+
+
 def moment(prim: Usd.Prim) -> float | None:
     """Time code of the points at rest, where they are taken from one sample of a moving cache."""
     if _kept(prim) is not None:
@@ -110,7 +115,7 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         notes.append(f"{path}: was exported from Blender while Live was on; primvars:{rest_copy.NAME} {fact}")
     if (when := moment(prim)) is not None:
         notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
-    counts = _counts(curves)
+    counts = _steady_counts(prim)
     scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
     uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)
     guides = _per_strand(prim, ("groom_guide",), counts, 1)
@@ -144,15 +149,14 @@ def _copy(prim: Usd.Prim) -> UsdGeom.Primvar | None:
     return primvar if primvar and primvar.HasValue() else None
 
 
-def _counts(curves: UsdGeom.BasisCurves, most: int = 16) -> np.ndarray:
+def _steady_counts(prim: Usd.Prim, most: int = 16) -> np.ndarray:
     """Points of each strand (S,), which some caches write anew for each frame."""
-    attribute = curves.GetCurveVertexCountsAttr()
-    counts = np.asarray(rest_value(attribute) or [], np.int64)
+    attribute, counts = UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr(), rest_counts(prim)
     times = attribute.GetTimeSamples()
     for time in times[:: max(1, len(times) // most)]:
         if not np.array_equal(counts, attribute.Get(time)):
             raise NeuralocksError(
-                f"{curves.GetPath()}: its curveVertexCounts at time code {time:g} are not those at rest; "
+                f"{prim.GetPath()}: its curveVertexCounts at time code {time:g} are not those at rest; "
                 "hair must keep its strands, remove the other samples"
             )
     return counts
@@ -198,8 +202,8 @@ def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes
 
 
 def _knots(curves: UsdGeom.BasisCurves, counts: np.ndarray) -> list[np.ndarray]:
-    """How many varying values each cubic strand has, (S,): one for every end of a segment. Of strands with pinned ends
-    some tools take the ones that pinning adds for none.
+    """How many varying values each cubic strand has, (S,): one for every end of a segment. Of Catmull-Rom curves and
+    B-splines of n points that is n - 2 values, also in pinned curves, where USD wants n.
     """
     if curves.GetTypeAttr().Get() != UsdGeom.Tokens.cubic:
         return []

@@ -19,7 +19,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import StageMesh
-from .curve_ends import beyond_ends, ends
+from .curve_ends import Beyond, beyond_ends, ends
 from .curves import moment, rest_points
 
 NEAR = 0.03
@@ -61,18 +61,18 @@ class Seat:
 
 def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf) -> Seat | None:
     """A groom on a rig's nearest skin; None where the rig has no skin, or none `within` so far [m]."""
-    roots = [some_ends(prim)]
-    if beyond_ends(prim) is not None:
-        roots.append(some_ends(prim, drawn=True))
+    roots, beyond = [some_ends(prim)], beyond_ends(prim)
+    if beyond is not None:
+        roots.append(some_ends(prim, beyond=beyond))
     seats = [_find_seat(each, moment(prim), rig, placement, within) for each in roots]
     return min((seat for seat in seats if seat is not None), key=lambda seat: seat.distance, default=None)
 
 
-def begins_where_drawn(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> bool:
-    """Whether hair begins where its curves are drawn, rather than at points before: skin says which of them are the roots."""
-    if beyond_ends(prim) is None or not rig.skins:
+def begins_where_drawn(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray, beyond: Beyond | None) -> bool:
+    """Whether hair begins where its curves are drawn, rather than at points `beyond`: skin says which of them are the roots."""
+    if beyond is None or not rig.skins:
         return False
-    return off_skin(some_ends(prim, drawn=True), rig, to_bind) <= off_skin(some_ends(prim), rig, to_bind)
+    return off_skin(some_ends(prim, beyond=beyond), rig, to_bind) <= off_skin(some_ends(prim), rig, to_bind)
 
 
 def off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
@@ -152,13 +152,13 @@ def kinship(prim: Usd.Prim, rig: StageRig) -> int:
     return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
 
 
-def some_ends(prim: Usd.Prim, *, last: bool = False, drawn: bool = False) -> np.ndarray:
+def some_ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = None) -> np.ndarray:
     """About SOME_ROOTS finite `ends` (n, 3) in the prim's own space.
 
     Raises:
         NeuralocksError: none is finite.
     """
-    every = ends(prim, last=last, drawn=drawn)
+    every = ends(prim, last=last, beyond=beyond)
     found = rest_points(prim)[every[:: max(1, len(every) // SOME_ROOTS)]]
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):

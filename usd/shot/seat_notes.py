@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
-from .curve_ends import beyond_ends
+from .curve_ends import Beyond
 from .seat import NEAR, find_seat, off_skin, some_ends
 
 MOVES = 0.002
@@ -39,9 +39,8 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     ]
 
 
-def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool) -> list[str]:
+def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool, beyond: Beyond | None) -> list[str]:
     """The note on curves that begin on skin but are drawn from above it, for they lack the points beyond their ends."""
-    beyond = beyond_ends(prim)
     if drawn or beyond is None or not len(beyond.before) or not rig.skins:
         return []
     return [
