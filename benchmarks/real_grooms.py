@@ -88,9 +88,10 @@ def rows(paths, model=None, frames=None, training: dict | None = None):
 
 def write_scene(path: Path, groom: Groom, character) -> Path:
     """The shipped shot with another hair, skinned to its head."""
-    from pxr import Gf, Usd, UsdSkel
+    from pxr import Usd, UsdSkel
 
     from usd.assets.groom import author_groom
+    from usd.assets.prims import bind_rigidly
 
     stage = Usd.Stage.CreateNew(str(path))
     shipped = Usd.Stage.Open(str(SHOT))
@@ -99,13 +100,8 @@ def write_scene(path: Path, groom: Groom, character) -> Path:
     for key in ("startTimeCode", "endTimeCode", "timeCodesPerSecond", "framesPerSecond", "metersPerUnit", "upAxis"):
         stage.SetMetadata(key, shipped.GetMetadata(key))
     stage.SetDefaultPrim(stage.OverridePrim("/Body"))
-    binding = UsdSkel.BindingAPI.Apply(author_groom(stage, "/Body/Hair", groom).GetPrim())
-    skeleton = next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Skeleton))
-    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
-    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
-    binding.CreateJointsAttr([character.skeleton.names[character.head]])
-    binding.CreateJointIndicesPrimvar(True, 1).Set([0])
-    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    skeleton = UsdSkel.Skeleton(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Skeleton)))
+    bind_rigidly(skeleton, author_groom(stage, "/Body/Hair", groom).GetPrim(), np.eye(4), character.head)
     stage.GetRootLayer().Save()
     return path
 

@@ -17,14 +17,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.animation.puppet import Puppet
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.motion import Clip
-from neuralocks_core.rotation import to_quaternion
-from usd.border.arrays import row_matrix
+from usd.assets.animation import write_animation
+from usd.assets.prims import author_influences, bind_to
+from usd.border.arrays import row_matrices
 from usd.border.stage_files import open_stage
 from usd.border.units import Border
 from usd.skel.joints import JointSource
@@ -99,8 +100,9 @@ def make_character(path: Path, body_path: Path) -> None:
     rig = read_rig(body_stage, skeleton_prim, Border.of(body_stage))
     hair = _hair(body_stage, rig.character)
     stage = _layer_over(path, body_path)
-    _add_joints(stage, skeleton_prim.GetPath(), rig.source, hair)
-    _add_mesh(stage, skeleton_prim.GetPath(), hair)
+    skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_prim.GetPath()))
+    _add_joints(skeleton, rig.source, hair)
+    _add_mesh(stage, skeleton, hair)
     stage.GetRootLayer().Save()
 
 
@@ -126,19 +128,18 @@ def _hair(body_stage, character) -> Hair:
     return hair
 
 
-def _add_joints(stage, skeleton_path, body: JointSource, hair: Hair) -> None:
+def _add_joints(skeleton: UsdSkel.Skeleton, body: JointSource, hair: Hair) -> None:
     """Put the hair's joints behind the body's."""
-    skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_path))
     bind = np.concatenate([body.bind, hair.bind])
     rest = [*body.rest, *(np.linalg.inv(bind[parent]) @ matrix for parent, matrix in zip(hair.parents, hair.bind))]
     skeleton.GetJointsAttr().Set([*body.names, *hair.names])
-    skeleton.GetBindTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in bind]))
-    skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray([row_matrix(m) for m in rest]))
+    skeleton.GetBindTransformsAttr().Set(row_matrices(bind))
+    skeleton.GetRestTransformsAttr().Set(row_matrices(rest))
 
 
-def _add_mesh(stage, skeleton_path, hair: Hair) -> None:
+def _add_mesh(stage, skeleton: UsdSkel.Skeleton, hair: Hair) -> None:
     """The skinned mesh, beside the skeleton."""
-    mesh = UsdGeom.Mesh.Define(stage, skeleton_path.GetParentPath().AppendChild("Hair"))
+    mesh = UsdGeom.Mesh.Define(stage, skeleton.GetPath().GetParentPath().AppendChild("Hair"))
     world = hair.points.astype(np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(world))
     mesh.CreateFaceVertexCountsAttr([len(f) for f in hair.faces])
@@ -147,11 +148,7 @@ def _add_mesh(stage, skeleton_path, hair: Hair) -> None:
     mesh.CreateExtentAttr([Gf.Vec3f(*map(float, world.min(0))), Gf.Vec3f(*map(float, world.max(0)))])
     mesh.CreateDisplayColorAttr([Gf.Vec3f(0.35, 0.16, 0.10)])
     mesh.CreateDoubleSidedAttr(True)
-    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([skeleton_path])
-    binding.CreateJointIndicesPrimvar(False, 2).Set(Vt.IntArray.FromNumpy(hair.indices.astype(np.int32).ravel()))
-    binding.CreateJointWeightsPrimvar(False, 2).Set(Vt.FloatArray.FromNumpy(hair.weights.astype(np.float32).ravel()))
-    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
+    author_influences(bind_to(skeleton, mesh.GetPrim(), np.eye(4)), hair.indices, hair.weights)
 
 
 def make_shot(path: Path, character_path: Path) -> None:
@@ -161,11 +158,13 @@ def make_shot(path: Path, character_path: Path) -> None:
     rig = read_rig(source, skeleton_prim, Border.of(source))
     clip = _motion(rig.character)
     stage = _layer_over(path, character_path)
-    _add_animation(stage, skeleton_prim.GetPath(), rig.source.names, clip, rig.character.skeleton.parents)
     stage.SetStartTimeCode(1)
     stage.SetEndTimeCode(len(clip.times))
     stage.SetTimeCodesPerSecond(RATE)
     stage.SetFramesPerSecond(RATE)
+    animation = write_animation(stage, skeleton_prim.GetPath().AppendChild("Motion"), rig.character, clip)
+    binding = UsdSkel.BindingAPI.Apply(stage.OverridePrim(skeleton_prim.GetPath()))
+    binding.CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     stage.GetRootLayer().Save()
 
 
@@ -187,26 +186,6 @@ def _motion(character) -> Clip:
     hop = np.clip((t - 6.6) / 0.5, 0, 1)
     puppet.position[:, 1] += 4 * 0.25 * hop * (1 - hop) - 0.06 * (bump(6.2, 0.5) + bump(7.05, 0.5))
     return puppet.clip()
-
-
-def _add_animation(stage, skeleton_path, names, clip: Clip, parents) -> None:
-    """The clip as a SkelAnimation below the skeleton, one sample a frame from 1 on."""
-    animation = UsdSkel.Animation.Define(stage, skeleton_path.AppendChild("Motion"))
-    animation.CreateJointsAttr(list(names))
-    for attribute in (
-        animation.CreateTranslationsAttr(),
-        animation.CreateRotationsAttr(),
-        animation.CreateScalesAttr(),
-    ):
-        attribute.SetVariability(Sdf.VariabilityVarying)
-    animation.GetScalesAttr().Set(Vt.Vec3hArray([Gf.Vec3h(1)] * len(parents)))
-    for frame, joints in enumerate(clip.joints):
-        local = np.stack([np.linalg.inv(joints[p]) @ m if p >= 0 else m for p, m in zip(parents, joints)])
-        turns = [Gf.Quatf(*map(float, q)) for q in to_quaternion(local[:, :3, :3])]
-        animation.GetRotationsAttr().Set(Vt.QuatfArray(turns), frame + 1)
-        animation.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(local[:, :3, 3].astype(np.float32)), frame + 1)
-    binding = UsdSkel.BindingAPI.Apply(stage.OverridePrim(skeleton_path))
-    binding.CreateAnimationSourceRel().SetTargets([animation.GetPath()])
 
 
 def _layer_over(path: Path, below: Path) -> Usd.Stage:

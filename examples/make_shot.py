@@ -23,7 +23,8 @@ from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.strands.arclength import resample
 from usd.assets.animation import write_animation
 from usd.assets.body import MESH, ROOT, SKELETON, write_body
-from usd.shot.stage import read_rigs
+from usd.assets.prims import POLYLINES, author_curves, bind_rigidly
+from usd.shot.stage import StageRig, read_rigs
 
 RATE = 24.0
 VERTICES = 24
@@ -44,9 +45,9 @@ def main() -> None:
     body = folder / "body.usdc"
     if options.body or not body.exists():
         write_body(body)
-    character = read_rigs(body)[0].character
-    write_motion(folder / "motion.usdc", character)
-    write_groom(folder / "groom.usdc", grow_groom(body, options.style, options.strands), character)
+    rig = read_rigs(body)[0]
+    write_motion(folder / "motion.usdc", rig.character)
+    write_groom(folder / "groom.usdc", grow_groom(body, options.style, options.strands), rig)
     write_shot(folder / "shot.usda")
     for name in ("body.usdc", "motion.usdc", "groom.usdc", "shot.usda"):
         print(f"{folder / name}: {(folder / name).stat().st_size / 1e6:.2f} MB")
@@ -94,28 +95,17 @@ def write_motion(path: Path, character) -> None:
     stage.Save()
 
 
-def write_groom(path: Path, groom: Groom, character) -> None:
+def write_groom(path: Path, groom: Groom, rig: StageRig) -> None:
     """The hair at rest as linear curves, skinned rigidly to the head."""
     stage = _layer(path)
-    curves = UsdGeom.BasisCurves.Define(stage, HAIR)
-    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
-    curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
-    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.int32(groom.counts)))
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.float32(groom.points)))
-    curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.float32(groom.widths)))
-    curves.SetWidthsInterpolation(_interpolation(len(groom.widths), groom))
-    curves.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(curves.GetPointsAttr().Get(), curves.GetWidthsAttr().Get()))
+    curves = author_curves(stage, HAIR, groom.points, groom.counts, groom.widths, POLYLINES)
     curves.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*HAIR_COLOR)])
     primvars = UsdGeom.PrimvarsAPI(curves)
     if groom.root_uv is not None:
         uv = primvars.CreatePrimvar("groom_root_uv", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.uniform)
         uv.Set(Vt.Vec2fArray.FromNumpy(np.float32(groom.root_uv)))
-    binding = UsdSkel.BindingAPI.Apply(curves.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([Sdf.Path(SKELETON)])
-    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
-    binding.CreateJointsAttr([character.skeleton.names[character.head]])
-    binding.CreateJointIndicesPrimvar(True, 1).Set([0])
-    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    binding = bind_rigidly(UsdSkel.Skeleton(rig.source.prim), curves.GetPrim(), np.eye(4), 0)
+    binding.CreateJointsAttr([rig.source.names[rig.character.head]])
     stage.Save()
 
 
@@ -147,11 +137,6 @@ def _layer(path: Path) -> Usd.Stage:
     stage.SetEndTimeCode(1 + round(SECONDS * RATE))
     stage.SetDefaultPrim(stage.OverridePrim(ROOT))
     return stage
-
-
-def _interpolation(count: int, groom: Groom):
-    by_count = {1: UsdGeom.Tokens.constant, len(groom.counts): UsdGeom.Tokens.uniform}
-    return by_count.get(count, UsdGeom.Tokens.vertex)
 
 
 def _looking(eye: Gf.Vec3d, at: Gf.Vec3d) -> Gf.Matrix4d:

@@ -75,6 +75,14 @@ def bind_to(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndarray) 
     return binding
 
 
+def bind_rigidly(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndarray, joint: int) -> UsdSkel.BindingAPI:
+    """`bind_to`, and all of the prim to one joint: of the skeleton's, or of those that the binding is given of its own."""
+    binding = bind_to(skeleton, prim, bind_place)
+    binding.CreateJointIndicesPrimvar(True, 1).Set([joint])
+    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    return binding
+
+
 def author_influences(binding: UsdSkel.BindingAPI, indices: np.ndarray, weights: np.ndarray) -> None:
     """Joint indices and weights (V, I) of a mesh's vertices."""
     width = indices.shape[1]

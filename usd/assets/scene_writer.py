@@ -12,7 +12,7 @@ from neuralocks_core.files import as_path
 from ..border.arrays import floats, integers, quaternions, row_matrix, vectors
 from ..border.stage_files import write_stage
 from ..shot.recorded import KEY
-from .prims import Spline, author_curves, author_influences, author_skeleton, bind_to
+from .prims import Spline, author_curves, author_influences, author_skeleton, bind_rigidly, bind_to
 
 ROOT = "/Character"
 
@@ -168,6 +168,4 @@ def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdS
     if (np.abs(hair.places - hair.places[0]) > 1e-9).any():
         for frame, place in zip(map(float, frames), hair.places, strict=True):
             op.Set(row_matrix(place), frame)
-    binding = bind_to(skeleton, curves.GetPrim(), hair.bind_place)
-    binding.CreateJointIndicesPrimvar(True, 1).Set([hair.joint])
-    binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
+    bind_rigidly(skeleton, curves.GetPrim(), hair.bind_place, hair.joint)
