@@ -23,9 +23,10 @@ PLATFORMS = {
 }
 PYTHONS = ("3.11", "3.13")
 """Of Blender 4.2 to 5.0, and of 5.1 and later."""
-COMPILED = ("onnxruntime==1.31.1", "usd-core==26.11", "scipy==1.15.3")
-"""scipy: the newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons. numpy is Blender's own.
-"""
+PINNED = ("onnxruntime", "usd-core")
+"""Packages that come along as `constraints.txt` has them. numpy is Blender's own."""
+HELD_BACK = {"scipy": "1.15.3"}
+"""The newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons."""
 OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}}
 """The last with wheels for a platform; on Linux it gives the same points as the newest, bit for bit."""
 ENDED = {"macos-x64": ("3.13",)}
@@ -48,15 +49,15 @@ def main() -> int:
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
     pythons = args.python or PYTHONS
-    own = own_wheel(args.cache / "own")
+    own, versions = own_wheel(args.cache / "own"), compiled()
     for platform in PLATFORMS if args.platform == "all" else [args.platform]:
         wheels = [own]
         for python in [p for p in pythons if p not in ENDED.get(platform, ())]:
-            wheels += download(args.cache / platform / python, COMPILED, platform, python)
+            wheels += download(args.cache / platform / python, versions, platform, python)
         print(extension(args.output, platform, wheels))
     if not args.no_legacy:
         platform, python = LEGACY
-        wheels = [own, *download(args.cache / platform / python, COMPILED, platform, python)]
+        wheels = [own, *download(args.cache / platform / python, versions, platform, python)]
         print(legacy(args.output, wheels))
     return 0
 
@@ -68,12 +69,18 @@ def own_wheel(folder: Path) -> Path:
     return next(folder.glob("neuralocks-*.whl"))
 
 
-def download(folder: Path, requirements, platform: str, python: str) -> list[Path]:
-    """Wheels of these requirements, fetched once."""
+def compiled() -> dict[str, str]:
+    """Package -> version of what comes along."""
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = dict(line.split("==") for line in lines if "==" in line)
+    return {name: pins[name] for name in PINNED} | HELD_BACK
+
+
+def download(folder: Path, versions: dict[str, str], platform: str, python: str) -> list[Path]:
+    """Wheels of these packages, fetched once."""
     folder.mkdir(parents=True, exist_ok=True)
     found = []
-    for requirement in requirements:
-        name, version = requirement.split("==")
+    for name, version in versions.items():
         version = OLDER.get(platform, {}).get(name, version)
         pattern = f"{name.replace('-', '_')}-{version}-*.whl"
         if not list(folder.glob(pattern)):

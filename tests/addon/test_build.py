@@ -19,6 +19,12 @@ def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
     assert not any("__pycache__" in name for name in listed)
 
 
+def test_wheels_are_those_that_the_tests_pass_with():
+    """But for what Blender's own numpy asks for."""
+    kept, own = (build.ROOT / "constraints.txt").read_text("utf-8").split(), build.compiled()
+    assert {f"{name}=={version}" for name, version in own.items()} - set(kept) == {f"scipy=={build.HELD_BACK['scipy']}"}
+
+
 def test_zips_hold_what_blender_expects(tmp_path):
     """The manifest lists the wheels that are in the zip, and the legacy zip has one folder with the packages in it."""
     import tomllib
