@@ -4,19 +4,15 @@
     python benchmarks/inference.py [MODEL] [--threads 2]
 
 Times are medians of repeated calls, all in one run; compare the ratios, not the milliseconds of two machines. Run it
-on an idle machine.
+on an idle machine. It needs the extra `train`, which has onnx.
 """
 
 import argparse
 import logging
-import os
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 HIDDEN, OUTPUTS, CHUNK = 256, 72, 512
 MATRICES = ("middle", "out")
@@ -34,8 +30,6 @@ def main() -> None:
     arguments = parser.parse_args()
     global clock
     clock = time.process_time if arguments.cpu_time else time.perf_counter
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = str(arguments.threads)
 
     from neuralocks_core.runtime import StrandModel
 
@@ -53,7 +47,7 @@ def main() -> None:
         session = Inputs(model, real, strands)
         a, whole_ms = timed(lambda s=session, v=vector: s.whole(whole, v))
         b, split_ms = timed(lambda s=session, v=vector: s.split(model, v))
-        c, int8_ms = timed(lambda s=session, v=vector: s.split(model, v, eight)) if eight else (b, float("nan"))
+        c, int8_ms = timed(lambda s=session, v=vector: s.split(model, v, eight))
         floor_ms = floor(strands, arguments.threads)
         print(
             f"{strands:8d} {whole_ms:9.2f} {split_ms:9.2f} {int8_ms:9.2f} {floor_ms:9.2f} | "
@@ -172,18 +166,15 @@ def own_weights(node, make) -> list:
 
 
 def quantised(model, vector):
-    """The tail with dynamic 8-bit matrix products for one frame, or None where onnxruntime's tools are missing."""
+    """The tail with dynamic 8-bit matrix products for one frame."""
     import tempfile
 
     import onnx
     import onnxruntime
     from onnx import numpy_helper
+    from onnxruntime.quantization import QuantType, quantize_dynamic
 
     logging.disable(logging.WARNING)
-    try:
-        from onnxruntime.quantization import QuantType, quantize_dynamic
-    except ImportError:
-        return None
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "tail.onnx", Path(folder) / "tail8.onnx"
         proto = onnx.load_from_string(model.file.graphs["tail.onnx"])

@@ -67,11 +67,11 @@ def rows(paths, model=None, frames=None, training: dict | None = None):
     character = shot.grooms[0].attachment.character
     fitted = on_head(paths, character, character.canonical(roots(shot.grooms[0].groom)))
     with tempfile.TemporaryDirectory() as folder:
-        for path, groom in fitted.items():
-            scene = write_scene(Path(folder) / f"{path.stem}.usda", groom, character)
-            baked = Path(folder) / f"{path.stem}_hair.usdc"
+        for number, (path, groom) in enumerate(fitted.items()):  # files of several folders may have one name
+            scene = write_scene(Path(folder) / f"{number}.usda", groom, character)
+            baked = Path(folder) / f"{number}_hair.usdc"
             if training:
-                own = Path(folder) / f"{path.stem}.neuralocks"
+                own = Path(folder) / f"{number}.neuralocks"
                 model = train(scene, [], [], own, {"minutes": training["minutes"]}, begin=training["begin"])
             bake(scene, baked, model, frames=frames, velocities=False)
             card = evaluate(baked, reference=True, model=model)

@@ -8,24 +8,20 @@ Poses, body shapes and motion are held out: their seed is not that of training, 
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from neuralocks_core import model as model_file
+from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import RigModel, rig_spec
+from neuralocks_core.rig.rods import RigMaterial
+from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
+from neuralocks_core.training.rig.report import hair_points, no_turns, static_report
+from usd.rig.stage import read_rigged_hair
 
-from neuralocks_core import model as model_file  # noqa: E402
-from neuralocks_core.animation.random_motion import KINDS, scripted_clip  # noqa: E402
-from neuralocks_core.motion import Clip  # noqa: E402
-from neuralocks_core.rig import RigModel, rig_spec  # noqa: E402
-from neuralocks_core.rig.rods import RigMaterial  # noqa: E402
-from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions  # noqa: E402
-from neuralocks_core.training.rig.report import hair_points, no_turns, static_report  # noqa: E402
-from usd.rig.stage import read_rigged_hair  # noqa: E402
-
-EXAMPLE = ROOT / "examples" / "mesh_hair"
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "mesh_hair"
 
 
 def main() -> None:
