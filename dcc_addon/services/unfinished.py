@@ -6,28 +6,32 @@ import shutil
 from contextlib import contextmanager
 from pathlib import Path
 
-from neuralocks_core.files import remove_empty
+from neuralocks_core.files import cannot_write, remove_empty
 
 
 @contextmanager
 def undone_on_failure(*paths: Path):
     """Meanwhile files may be written, each whole or not at all; what was there before, or nothing, comes back unless all
     ends well.
+
+    Raises:
+        NeuralocksError: what is there cannot be kept meanwhile.
     """
     made = [folder for path in paths for folder in path.parents if not folder.exists()]
     kept = {path: path.with_name(f".{path.name}.before") for path in paths if path.is_file()}
     try:
         for path, before in kept.items():
             _keep(path, before)
-        yield
-    except BaseException:
-        for path in paths:
-            if path not in kept:
-                path.unlink(missing_ok=True)
-            elif kept[path].exists():
-                os.replace(kept[path], path)
-        remove_empty(made)
-        raise
+        try:
+            yield
+        except BaseException:
+            for path in paths:
+                if path not in kept:
+                    path.unlink(missing_ok=True)
+                elif kept[path].exists():
+                    os.replace(kept[path], path)
+            remove_empty(made)
+            raise
     finally:
         for before in kept.values():
             before.unlink(missing_ok=True)
@@ -39,4 +43,7 @@ def _keep(path: Path, before: Path) -> None:
     try:
         os.link(path, before)
     except OSError:  # not on this file system
-        shutil.copy2(path, before)
+        try:
+            shutil.copy2(path, before)
+        except OSError as error:
+            raise cannot_write(path, error) from None
