@@ -9,7 +9,7 @@ import bpy
 
 from .live import carriers, needs_sampling, refresh
 from .scene.redraw import redraw
-from .scene.sampling import sample, stepping
+from .scene.sampling import in_slices
 from .scene.up_to_date import notice
 from .session import session
 
@@ -70,8 +70,8 @@ def look() -> float | None:
             session.sampling = None
             redraw()
             return None
-        _work.append((scene.name_full, todo[0].name_full, sample(context, todo[0])))
-    _go_on(scene)
+        _work.append((scene.name_full, todo[0].name_full, in_slices(context, todo[0], SLICE)))
+    _go_on()
     if not _work:
         session.sampling = None
         refresh(scene)
@@ -79,16 +79,13 @@ def look() -> float | None:
     return 0.01
 
 
-def _go_on(scene) -> None:
+def _go_on() -> None:
     """Sample the armature in work for SLICE; afterwards `_work` is empty if it is done, or has failed."""
-    _, name, frames = _work[0]
-    end = time.perf_counter() + SLICE
+    _, name, slices = _work[0]
     try:
-        with stepping(scene):
-            for done, total in frames:
-                session.sampling = done / total
-                if time.perf_counter() > end:
-                    return
+        for done, total in slices:
+            session.sampling = done / total
+            return
     except Exception as error:
         session.tell(name, error)
         session.failed.add(name)
@@ -97,4 +94,4 @@ def _go_on(scene) -> None:
 
 def _busy(context) -> bool:
     playing = any(w.screen.is_animation_playing for w in context.window_manager.windows)
-    return playing or bpy.app.is_job_running("RENDER")
+    return playing or bool(session.working) or bpy.app.is_job_running("RENDER")

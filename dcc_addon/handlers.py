@@ -152,6 +152,7 @@ def _layer_of(scene):
 def _mark_stale() -> None:
     for sampled in session.rigs.values():
         sampled.stale = True
+    session.edits += 1
     session.failed.clear()
     session.wanting = True
 

@@ -96,6 +96,8 @@ class Session:
 
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
     """First and last frame of each scene when its file was opened."""
+    edits: int = 0
+    """How often animation was edited: what was sampled meanwhile is out of date."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since somebody last saw to it."""
     remade: object = None

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all operators share: errors as reports, and long work with progress and cancel."""
 
+import math
 import time
 import traceback
 
@@ -8,12 +9,13 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from .. import background
 from ..live import refresh
-from ..scene.sampling import sample, stepping
+from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
 from ..session import session
 
-SLICE = 0.06
+SLICE = 0.1
 """Longest time between two chances to cancel [s]."""
 
 _running: list["Stepwise"] = []
@@ -60,19 +62,12 @@ class Stepwise(Hardened):
     """Long work as a generator `steps(context)` of (done, total, message): at once from scripts, with progress and
     Esc from the panel.
 
-    A subclass with `steps_frames = True` moves the scene's frame; the frame comes back between slices and at the end.
+    Between two slices, in which the artist may do anything, the scene is at the artist's frame.
     """
-
-    steps_frames = False
 
     def work(self, context):
         """All at once."""
-        if not self.steps_frames:
-            return self._drain(self.steps(context))
-        with stepping(context.scene):
-            return self._drain(self.steps(context))
-
-    def _drain(self, steps):
+        steps = self.steps(context)
         try:
             while True:
                 next(steps)
@@ -85,12 +80,10 @@ class Stepwise(Hardened):
         if session.working:
             self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
             return {"CANCELLED"}
-        self._steps, self._scene = None, context.scene
-        problem = self.guarded(lambda: setattr(self, "_steps", self.steps(context)))
-        if problem == {"CANCELLED"}:
-            return problem
+        self._steps = self.steps(context)
         session.working = self.bl_label
         _running[:] = [self]
+        background.request()  # what is half sampled begins anew afterwards
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0, 1000)
@@ -105,8 +98,8 @@ class Stepwise(Hardened):
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        self._message, self._done = None, False
-        result = self.guarded(lambda: self._stepped(context))
+        self._done = False
+        result = self.guarded(lambda: self._slice(context))
         if result == {"CANCELLED"} or self._done:
             self._end(context)
             return result
@@ -120,18 +113,13 @@ class Stepwise(Hardened):
     def _close(self):
         try:
             self._steps.close()
-        except ReferenceError:  # the scene whose frame would come back is gone
+        except ReferenceError:  # what would be put back is gone
             pass
-
-    def _stepped(self, context):
-        if not self.steps_frames:
-            return self._slice(context)
-        with stepping(self._scene):  # another one may be shown by now
-            return self._slice(context)
 
     def _slice(self, context):
         end = time.perf_counter() + SLICE
         try:
+            done, total, message = next(self._steps)
             while time.perf_counter() < end:
                 done, total, message = next(self._steps)
             context.window_manager.progress_update(1000 * done / max(total, 1))
@@ -143,7 +131,7 @@ class Stepwise(Hardened):
 
     def _end(self, context):
         self._finish(context)
-        refresh(context.scene)  # nothing that was moved meanwhile has been followed
+        refresh(context.scene)  # with what was sampled
 
     def _finish(self, context):
         session.working = ""
@@ -156,13 +144,12 @@ class Stepwise(Hardened):
 
 
 def sampling(context, armature, share: float = 1.0):
-    """Steps (done, total, message) of sampling an armature's motion, the first `share` of longer work; returns its
-    `SampledRig`.
+    """Steps (done, total, message) of sampling an armature's motion, the first `share` of longer work, at once where nobody
+    can do anything meanwhile; returns its `SampledRig`.
     """
     name = armature.name_full
-    with stepping(context.scene):
-        for done, total in sample(context, armature):
-            yield share * done, total, f"Sampling the motion of {name}"
+    for done, total in in_slices(context, armature, SLICE if _running else math.inf):
+        yield share * done, total, f"Sampling the motion of {name}"
     return session.rigs[name]
 
 

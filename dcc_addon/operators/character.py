@@ -10,9 +10,8 @@ from ..scene import armature as armature_reader
 from ..scene.attach import check_own
 from ..scene.binding import carrier
 from ..scene.instances import check_real
-from ..scene.sampling import sample
 from ..services import rig as rig_service
-from .base import Hardened, Stepwise, shown_armature
+from .base import Hardened, Stepwise, sampling, shown_armature
 
 
 class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
@@ -74,13 +73,11 @@ class NEURALOCKS_OT_sample(Stepwise, bpy.types.Operator):
     bl_idname = "neuralocks.sample_motion"
     bl_label = "Sample Motion"
     bl_options = {"REGISTER"}
-    steps_frames = True
 
     def steps(self, context):
         armature = shown_armature(context)
         name = armature.name_full
-        for done, total in sample(context, armature):
-            yield done, total, f"Sampling the motion of {name}"
+        yield from sampling(context, armature)
         return f"{name}: motion sampled"
 
     def execute(self, context):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sampling a rig's motion by stepping through the frames, so that constraints, IK, drivers and NLA count."""
 
+import math
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -89,14 +91,25 @@ def posture_of(armature, scene) -> int:
     return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], own)
 
 
-def sample(context, armature) -> Iterator[tuple[int, int]]:
-    """Step through the frames; yields (done, total) and puts the result into the session at the end.
-
-    The current frame is put back between the yields only by the caller (see `stepping`), and always at the end.
+def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
+    """Sample an armature's motion, `seconds` at a time, and put it into the session at the end; yields (done, total) between
+    two slices, when the scene is as it was before, to be looked at and edited.
 
     Raises:
         NeuralocksError: the armature cannot be sampled, in plain words.
     """
+    scene, frames = context.scene, _sample(context, armature)
+    while True:
+        end = time.perf_counter() + seconds
+        with stepping(scene):
+            reached = next((each for each in frames if time.perf_counter() > end), None)
+        if reached is None:
+            return
+        yield reached
+
+
+def _sample(context, armature) -> Iterator[tuple[int, int]]:
+    """Step through the frames; yields (done, total)."""
     recording = _Recording(context, armature)
     total = len(recording.frames)
     yield 0, total
@@ -128,7 +141,7 @@ class _Recording:
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
-        self._posture = posture_of(armature, self._scene)
+        self._posture, self._edits = posture_of(armature, self._scene), session.edits
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._rate = self._scene.render.fps / self._scene.render.fps_base
         self._unit = self._scene.unit_settings.scale_length
@@ -146,6 +159,8 @@ class _Recording:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
         anew, since handlers may have changed them.
         """
+        if row and abs(shown_frame(self._scene) - self.frames[row - 1]) > 1e-3:
+            step(self._scene, self.frames[row - 1])  # a simulation goes on from the frame before it only
         step(self._scene, self.frames[row])
         armature = named(self.name)
         layer = layer_of(armature, self._scene)
@@ -231,6 +246,7 @@ class _Recording:
             self._trim,
             self._key,
             binds,
+            stale=self._edits != session.edits,
             bind_metres=metres,
             drawn=self._drawn,
             own=self._own,
@@ -264,5 +280,6 @@ class stepping:
             for name, turned in self._live.items():
                 if (armature := find(name)) is not None:
                     rotations.give_back(armature, turned)
+            bpy.context.view_layer.update()  # what is put back is no edit of the artist's
         finally:
             session.paused -= 1

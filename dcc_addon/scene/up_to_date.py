@@ -8,7 +8,7 @@ from ..session import SampledRig, session
 from .carried import hairs_of
 from .layers import layer_of, working_in
 from .lookup import named
-from .sampling import key_of, posture_of, rigging_of, sample, step, stepping
+from .sampling import in_slices, key_of, posture_of, rigging_of, step, stepping
 
 
 def ensure(context, armature, looking: bool = False) -> SampledRig:
@@ -19,9 +19,8 @@ def ensure(context, armature, looking: bool = False) -> SampledRig:
     found = session.rigs.get(armature.name_full)
     known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
     if not known or (looking and not _as_sampled(context, armature, found)):
-        with stepping(context.scene):
-            for _ in sample(context, armature):
-                pass
+        for _ in in_slices(context, armature):
+            pass
         found = session.rigs[armature.name_full]
     return found
 

@@ -171,9 +171,9 @@ def _hidden(hair, others: list, shown: np.ndarray, folder: Path) -> None:
 
 def _deleted(rig, skin, strands, other) -> None:
     """The body is deleted while it is sampled, hair while it is live; what is left gets other names."""
-    from dcc_addon.scene.sampling import sample
+    from dcc_addon.scene.sampling import in_slices
 
-    steps = sample(bpy.context, rig)
+    steps = in_slices(bpy.context, rig, 0.0)
     next(steps)
     bpy.data.objects.remove(skin)
     refused(lambda: list(steps), "deleted")

@@ -246,7 +246,7 @@ def sampled_beside(_folder: Path) -> None:
             pass
         assert session.sampling is None
 
-    def broken(_context, _armature):
+    def broken(_context, _armature, _seconds):
         yield 1, 2
         raise KeyError("a bone")
 
@@ -255,7 +255,7 @@ def sampled_beside(_folder: Path) -> None:
             sample()
         again = session.rigs["Rig"].motion
         assert again is not motion and apart(again.world(), motion.world()) < 1e-12, "in blocks of some frames"
-    with patch.object(background, "sample", broken):
+    with patch.object(background, "in_slices", broken):
         sample()
     assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
     sample()
@@ -284,7 +284,11 @@ def sampled_beside(_folder: Path) -> None:
 
     session.rigs["Rig"].stale, scene = True, bpy.context.scene
     background.look()
-    assert session.sampling is not None
+    assert session.sampling == 0.0
+    with patch.object(session, "working", "Bake to USD"):
+        assert background.look() == background.PAUSE and session.sampling == 0.0, "it steps frames beside an operator"
+    background.look()
+    assert session.sampling > 0.0
     bpy.context.window.scene = bpy.data.scenes.new("Other")
     assert background.look() is None and session.sampling is None, "nobody looks at what was sampled"
     bpy.context.window.scene = scene

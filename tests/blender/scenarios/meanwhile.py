@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist does while longer work goes on, which takes events as ever."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import bpy
+import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at, refused
+from tests.blender.checks import SAME, apart, baked_points, choose, make_live, messages, points_at, refused
 
 
 def touched_meanwhile(folder: Path) -> None:
@@ -39,6 +42,7 @@ def touched_meanwhile(folder: Path) -> None:
     refused(lambda: bake(filepath=str(folder / "gone.usdc")), "deleted or renamed")
 
 
+@patch("dcc_addon.operators.base.SLICE", 0.0)
 def disabled_meanwhile(folder: Path) -> None:
     """The add-on is disabled while a bake is at work: it ends, and enabled anew all works."""
     import dcc_addon
@@ -50,7 +54,7 @@ def disabled_meanwhile(folder: Path) -> None:
     make_live(rig, scenes.hair(rig, 20))
     bpy.context.scene.frame_set(9)
     _begun(bake_steps(bpy.context, rig, [bpy.data.objects["Hair"]], str(folder / "bake.usdc")))
-    assert session.paused and session.working
+    assert session.working
     dcc_addon.unregister()
     assert not session.paused and not session.working and bpy.context.scene.frame_current == 9
     dcc_addon.register()
@@ -59,12 +63,14 @@ def disabled_meanwhile(folder: Path) -> None:
     assert apart(points_at(strands, 9), points_at(strands, 14)) > 1e-3 and not messages(), messages()
 
 
-def slider_meanwhile(folder: Path) -> None:
-    """A slider that is moved while a bake samples is followed when it has ended; frames are those of the scene that it
-    began in, whichever is shown by then.
+@patch("dcc_addon.operators.base.SLICE", 0.0)
+def edited_meanwhile(folder: Path) -> None:
+    """While a bake samples, the artist's frame is shown, a slider is followed at once, and a bone without keys that is turned
+    stays so; the motion is out of date afterwards. Frames are those of the scene that it began in, whichever is shown by
+    then.
     """
     from dcc_addon.operators.bake import bake_steps
-    from dcc_addon.scene import curves
+    from dcc_addon.scene import curves, up_to_date
     from dcc_addon.session import session
 
     rig, scene = scenes.armature(), bpy.context.scene
@@ -72,29 +78,87 @@ def slider_meanwhile(folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
     scene.frame_set(9)
-    before = curves.shown(strands.data)
-    work = _begun(bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc")))
-    assert session.paused
-    strands.neuralocks_hair.motion = 0.2
-    assert apart(curves.shown(strands.data), before) == 0.0
-    _ended(work)
-    after = scenes.points(strands)
-    assert apart(curves.shown(strands.data), before) > 1e-3 and apart(after, points_at(strands, 9)) == 0.0
 
-    other = bpy.data.scenes.new("Other")
-    work = _begun(_numbered(scene))
-    work.steps_frames = True
-    scene.frame_set(9)
+    def begun():
+        session.rigs["Rig"].stale = False
+        return _begun(bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc")))
+
+    before, work = curves.shown(strands.data), begun()
+    assert scene.frame_current == 9 and not session.paused
+    strands.neuralocks_hair.motion = 0.2
+    followed = curves.shown(strands.data)
+    assert apart(followed, before) > 1e-3
+    _ended(work)
+    assert apart(curves.shown(strands.data), followed) == 0.0 and not session.rigs["Rig"].stale
+
+    work, arm = begun(), rig.pose.bones["upper_arm.R"]
+    arm.rotation_euler.z = 0.4
+    bpy.context.view_layer.update()
+    _ended(work)
+    up_to_date.notice(rig, scene)
+    assert abs(arm.rotation_euler.z - 0.4) < 1e-6 and session.rigs["Rig"].stale
+
+    work, head = begun(), rig.pose.bones["head"]
+    head.rotation_euler.y += 0.5
+    head.keyframe_insert("rotation_euler", frame=9)
+    bpy.context.view_layer.update()
+    _ended(work)
+    assert session.rigs["Rig"].stale
+
+    other, work = bpy.data.scenes.new("Other"), begun()
     bpy.context.window.scene = other
     _ended(work)
-    assert scene.frame_current == 9 and other.frame_current == 1
+    assert scene.frame_current == 9 and other.frame_current == 1 and not messages(), messages()
 
 
-def _numbered(scene):
-    """Work that leaves the scene at another frame with each step."""
-    for frame in range(10, 15):
-        scene.frame_set(frame)
-        yield frame, 15, "Counting"
+def simulated_in_slices(_folder: Path) -> None:
+    """A rigid body falls through all frames, although the artist's frame is shown between them."""
+    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.session import session
+
+    drawn = []
+    for seconds in (math.inf, 0.0):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        body = scenes.body(rig)
+        body.modifiers.clear()
+        body.parent = None
+        bpy.ops.rigidbody.world_add()
+        choose(body)
+        bpy.ops.rigidbody.object_add()
+        rig.pose.bones["neck"].constraints.new("COPY_LOCATION").target = body
+        list(in_slices(bpy.context, rig, seconds))
+        drawn.append(session.rigs["Rig"].drawn[:, rig.data.bones.find("head"), 2, 3])
+    assert np.ptp(drawn[0]) > 1.0 and apart(*drawn) == 0.0
+
+
+@patch("dcc_addon.background.SLICE", 0.0)
+def posed_without_a_key(_folder: Path) -> None:
+    """A shape key that was turned up, and has no key of that yet, is put back after each slice: no edit that would let
+    sampling begin anew.
+    """
+    from dcc_addon import background
+    from dcc_addon.session import session
+
+    rig = scenes.armature()
+    scenes.dance(rig)
+    skin = scenes.body(rig)
+    skin.shape_key_add(name="Basis")
+    wide = skin.shape_key_add(name="wide")
+    for frame in (1, 24):
+        wide.value = frame / 24
+        wide.keyframe_insert("value", frame=frame)
+    make_live(rig, scenes.hair(rig, 10))
+    bpy.context.scene.frame_set(9)
+    wide.value = 0.9
+    bpy.context.view_layer.update()
+    session.rigs["Rig"].stale = True
+    for _ in range(60):
+        if background.look() is None:
+            break
+        bpy.context.view_layer.update()
+    assert not session.rigs["Rig"].stale and session.sampling is None and abs(wide.value - 0.9) < 1e-6
 
 
 def _begun(steps):
@@ -110,7 +174,7 @@ def _begun(steps):
 
     work, manager = Work(), bpy.context.window_manager
     work._timer, work._steps = manager.event_timer_add(0.01, window=bpy.context.window), steps
-    work._scene, session.working = bpy.context.scene, work.bl_label
+    session.working = work.bl_label
     base._running[:] = [work]
     while next(steps)[2] == "Loading USD":
         pass
