@@ -12,6 +12,9 @@ from .armature import matrix
 from .lookup import find
 from .placing import world
 
+CARRYING = {"ARMATURE", "CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS"}
+"""Constraints by which an object goes where a bone goes; others turn it, or hold it at a distance."""
+
 
 def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str, np.ndarray]:
     """World transforms (4, 4) of objects, by full name, as they are when the rig that carries them is in its rest pose
@@ -90,9 +93,9 @@ def carrying_bone(thing, armature) -> str | None:
     if thing.parent == armature and thing.parent_type == "BONE":
         return thing.parent_bone
     for constraint in thing.constraints:
-        target = None if constraint.mute else getattr(constraint, "target", None)
-        if target == armature and getattr(constraint, "subtarget", ""):
-            return constraint.subtarget
+        for target in _targets(constraint) if constraint.type in CARRYING and not constraint.mute else ():
+            if target.target == armature and target.subtarget:
+                return target.subtarget
     return carrying_bone(thing.parent, armature) if thing.parent is not None else None
 
 
@@ -108,7 +111,15 @@ def _reached(thing, seen: set) -> set:
     found = {thing} if thing.type == "ARMATURE" else set()
     found |= {modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object}
     for constraint in thing.constraints:
-        several = [target.target for target in getattr(constraint, "targets", ())]
-        for target in (getattr(constraint, "target", None), *several):
-            found |= _reached(target, seen)
+        for target in _targets(constraint):
+            found |= _reached(target.target, seen)
     return found | _reached(thing.parent, seen)
+
+
+def _targets(constraint) -> list:
+    """What has `target` and `subtarget`: the constraint itself, or the targets of one that has several, the strongest
+    first.
+    """
+    if hasattr(constraint, "targets"):
+        return sorted(constraint.targets, key=lambda target: -target.weight)
+    return [constraint] if hasattr(constraint, "target") else []

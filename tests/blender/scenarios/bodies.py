@@ -7,6 +7,7 @@ import bmesh
 import bpy
 import numpy as np
 
+from dcc_addon.scene import binding
 from dcc_addon.services.axes import to_core
 from dcc_addon.session import session
 from neuralocks_core.rotation import transformed
@@ -53,6 +54,44 @@ def body_as_drawn(_folder: Path) -> None:
     scene.collection.objects.link(mirror.mirror_object)
     mirror.mirror_object.parent, mirror.mirror_object.location = rig, (0.02, 0, 0)
     assert _same(rig, body) == 2 * half
+
+
+def rigid_bodies(_folder: Path) -> None:
+    """A chosen body that rides on a bone as a whole moves with it, by whatever constraint; one that only turns towards a
+    bone does not ride on it.
+    """
+    rig = scenes.armature()
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    bpy.ops.mesh.primitive_cube_add(size=0.2)
+    skull = bpy.context.object
+    rig.neuralocks_character.body = skull
+
+    def constrained(kind, bone):
+        constraint = skull.constraints.new(kind)
+        constraint.target, constraint.subtarget = rig, bone
+
+    def rides(*weights):
+        skull.parent, constraint = rig, skull.constraints.new("ARMATURE")
+        for bone, weight in weights:
+            target = constraint.targets.new()
+            target.target, target.subtarget, target.weight = rig, bone, weight
+
+    for place, ride in (
+        ((0, 0, 0), lambda: constrained("COPY_TRANSFORMS", "head")),
+        ((0, 0, 0), lambda: (constrained("COPY_LOCATION", "head"), constrained("COPY_ROTATION", "head"))),
+        ((0, 0, 1.66), lambda: rides(("head", 1.0))),
+        ((0, 0, 1.66), lambda: rides(("spine", 0.0), ("head", 1.0))),
+    ):
+        skull.constraints.clear()
+        skull.location = place
+        ride()
+        _same(rig, skull)
+    skull.constraints.clear()
+    constrained("DAMPED_TRACK", "upper_arm.L")
+    assert binding.carrying_bone(skull, rig) is None
+    rides(("head", 1.0))
+    assert binding.carrying_bone(skull, rig) == "head"
 
 
 def no_faces(folder: Path) -> None:
