@@ -13,7 +13,7 @@ from operator import index
 import numpy as np
 
 from neuralocks_core import rotation
-from neuralocks_core.anatomy.humanoid import SEMANTIC, Humanoid
+from neuralocks_core.anatomy.humanoid import SEMANTIC
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import MEASURES, measures_read
@@ -126,9 +126,10 @@ class BoundarySpec:
         return 0.5 + 0.5 * np.cos(np.pi * into)
 
 
-def joints_read(humanoid: Humanoid, pose_joints=POSE_JOINTS) -> list[int]:
-    """The head, the upper chest and the pose joints, or what a rig has in place of them."""
-    return [humanoid["head"], *(humanoid.nearest(name) for name in ("upper_chest", *pose_joints))]
+def joints_read(character: Character, pose_joints=POSE_JOINTS) -> list[int]:
+    """The joint that carries the hair, the upper chest and the pose joints, or what a rig has in place of them."""
+    others = ("upper_chest", *pose_joints)
+    return [character.carrying_joint, *(character.humanoid.nearest(name) for name in others)]
 
 
 class BoundarySampler:
@@ -153,8 +154,7 @@ class BoundarySampler:
 
     def __init__(self, spec: BoundarySpec, character: Character, clip: Clip):
         self.spec, self.character, self.clip = spec, character, clip
-        humanoid = character.humanoid
-        self.joints = joints_read(humanoid, spec.pose_joints)
+        self.joints = joints_read(character, spec.pose_joints)
         self.stance = np.stack([_stance(character, name) for name in spec.pose_joints])
         parts = clip.parts if spec.bins else [clip]
         self._cuts = np.array([part.start for part in parts[1:]])

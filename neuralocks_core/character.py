@@ -124,11 +124,14 @@ class Character:
         skeleton: the joints.
         body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
         humanoid: semantic names of joints; found by name and hierarchy where left out.
+        carrier: joint that carries the hair, where it is not the head but hangs below it: the jaw of a beard, say. The head
+            goes with it then, as far as this hair is concerned: canonical space is that of the head all the same.
     """
 
     skeleton: Skeleton
     body: Body | None = None
     humanoid: Humanoid = None
+    carrier: int | None = None
 
     def __post_init__(self):
         if self.humanoid is None:
@@ -137,8 +140,13 @@ class Character:
 
     @property
     def head(self) -> int:
-        """Index of the joint that carries the hair."""
+        """Index of the head's joint."""
         return self.humanoid["head"]
+
+    @property
+    def carrying_joint(self) -> int:
+        """Index of the joint that carries the hair."""
+        return self.head if self.carrier is None else self.carrier
 
     @cached_property
     def inverse_bind(self) -> np.ndarray:
@@ -190,12 +198,18 @@ class Character:
         return points @ self.bind_to_canonical[:3, :3].T + self.bind_to_canonical[:3, 3]
 
     def carrying(self, joints: np.ndarray) -> np.ndarray:
-        """Rigid transforms (..., 4, 4), bind world to posed world, with which the head carries the groom.
+        """Rigid transforms (..., 4, 4), bind world to posed world, with which its joint carries the groom.
 
         `joints` (..., J, 4, 4) are world transforms.
         """
         joints = np.asarray(joints, float)
-        return joints[..., self.head, :, :] @ self.inverse_bind[self.head]
+        return joints[..., self.carrying_joint, :, :] @ self.inverse_bind[self.carrying_joint]
+
+    def head_place(self, joints: np.ndarray) -> np.ndarray:
+        """Where the head's joint is (..., 3) [m], as the hair is carried, for world joint transforms (..., J, 4, 4)."""
+        if self.carrier is None:
+            return joints[..., self.head, :3, 3]
+        return self.canonical_to_world(joints)[..., :3, 3]
 
     def canonical_to_world(self, joints: np.ndarray) -> np.ndarray:
         """Transforms (..., 4, 4) from canonical to world space for world joint transforms (..., J, 4, 4)."""

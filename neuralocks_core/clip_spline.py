@@ -17,24 +17,25 @@ class ClipSpline:
 
     Args:
         clip: without cuts.
-        head: index of the joint.
+        place: where the head is (T, 3) [m] in world transforms (T, J, 4, 4).
         values: what is made of world transforms (T, J, 4, 4): (T, ...), which blends linearly.
     """
 
-    def __init__(self, clip: Clip, head: int, values: Callable[[np.ndarray], np.ndarray]):
+    def __init__(self, clip: Clip, place: Callable, values: Callable[[np.ndarray], np.ndarray]):
         # Here, because it takes as long to import as all else that a runtime needs.
         from scipy.interpolate import CubicSpline
 
         times, poses = _extended(clip)
-        place, numbers = poses[:, head, :3, 3], values(poses)
+        numbers = values(poses)
         self._clip = clip
-        self._drift = clip.joints[-1, head, :3, 3] - clip.joints[0, head, :3, 3]
+        first, last = place(clip.joints[[0, -1]])
+        self._drift = last - first
         if len(times) == 1:
             self._spline = lambda t: numbers.repeat(len(t), axis=0)
             self._speeds = np.zeros((2, 3))
         else:
             self._spline = CubicSpline(times, numbers, bc_type="natural")
-            self._speeds = CubicSpline(times, place, bc_type="natural")(times[[0, -1]], 1)
+            self._speeds = CubicSpline(times, place(poses), bc_type="natural")(times[[0, -1]], 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers (n, ...) at times (n,) [s], and by how much all joints have then gone on (n, 3) [m]."""

@@ -4,6 +4,7 @@
 import numpy as np
 
 from neuralocks_core import rotation
+from neuralocks_core.character import Character
 from neuralocks_core.clip_spline import ClipSpline
 from neuralocks_core.motion import Clip
 
@@ -16,12 +17,12 @@ class SmoothMotion:
     sample, and a stop that the shot does not have.
 
     Args:
+        character: whose motion it is; all joints go on with its head outside of the clip.
         clip: without cuts.
-        head: index of the joint that all go on with outside of the clip.
     """
 
-    def __init__(self, clip: Clip, head: int):
-        self._spline = ClipSpline(clip, head, _numbers)
+    def __init__(self, character: Character, clip: Clip):
+        self._spline = ClipSpline(clip, character.head_place, _numbers)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) [m] at times (n,) [s]."""

@@ -22,9 +22,9 @@ class Track:
     def __init__(self, character: Character, clip: Clip, joints: list[int]):
         def values(poses):
             quaternions = rotation.continuous(rotation.to_quaternion(character.relative_rotations(poses, joints)))
-            return np.concatenate([poses[:, character.head, :3, 3], quaternions.reshape(len(poses), -1)], axis=1)
+            return np.concatenate([character.head_place(poses), quaternions.reshape(len(poses), -1)], axis=1)
 
-        self._spline = ClipSpline(clip, character.head, values)
+        self._spline = ClipSpline(clip, character.head_place, values)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Head positions (m, 3) [m] and rotations (m, n, 3, 3) of the joints at times (m,) [s]."""

@@ -266,8 +266,15 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
 
     arms = [joints[n] for n in ("left_upper_arm", "right_upper_arm") if n in joints]
     legs = [joints[n] for n in ("left_upper_leg", "right_upper_leg") if n in joints]
+    meeting = meet(*arms) if arms else None
+    if meeting is not None and ("neck" in keys[meeting] or meeting == joints.get("neck")):
+        # Biped hangs the collar bones from the neck.
+        trunk = [joint for joint in head_way[head_way.index(meeting) + 1 :] if "neck" not in keys[joint]]
+        if trunk:
+            put("neck", meeting, f"where the ways from head and arms meet, '{leaf(names[meeting])}'")
+            put("upper_chest", trunk[0], f"below the neck '{leaf(names[meeting])}'")
     if arms:
-        put("upper_chest", meet(*arms), "where the ways from head and arms meet")
+        put("upper_chest", meeting, "where the ways from head and arms meet")
     if legs:
         put("hips", meet(*legs), "where the ways from head and legs meet")
     between = head_way[1:]

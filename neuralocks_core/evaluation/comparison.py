@@ -102,7 +102,7 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
 
     # One step more than the last time needs: how hair goes on there is known, whichever times are wanted.
     clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
-    joints, shapes = _unscaled(character, SmoothMotion(clip, character.head).at(clock)), clip.shape_at(clock)
+    joints, shapes = _unscaled(character, SmoothMotion(character, clip).at(clock)), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:

@@ -6,9 +6,10 @@ import pytest
 
 from neuralocks_core import rotation
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
-from tests.core.rigs import bind, moved, person
+from tests.core.rigs import HEAD, bind, moved, person
 
 SPEC = BoundarySpec(bins=(1,) * 30, taper=0.0)
 
@@ -51,6 +52,28 @@ def test_frame_rates_agree(rate):
         return BoundarySampler(BoundarySpec(), person(), clip).vectors([1.5, 2.0])
 
     assert np.abs(sample(rate) - sample(240)).max() < 0.01
+
+
+def test_what_is_read_of_hair_on_a_joint_below_the_head_is_the_heads_as_that_joint_has_it():
+    """A jaw that stands still against the head changes nothing, one that turns little changes little."""
+    jaw, times = [0.0, -0.05, 0.08], np.arange(0, 2, 1 / 24)
+    plain = moved(times, lambda t: np.stack([0.2 * np.sin(5 * t), 0 * t, 0 * t], -1), swing)
+    skeleton = person().skeleton
+    at = np.eye(4)
+    at[:3, 3] = jaw
+    names, parents = (*skeleton.names, f"{skeleton.names[HEAD]}/jaw"), (*skeleton.parents, HEAD)
+    bound = Skeleton(names, parents, np.concatenate([skeleton.bind, skeleton.bind[[HEAD]] @ at]))
+
+    def read(carrier, angle):
+        turn = np.tile(np.eye(4), (len(times), 1, 1))
+        turn[:, :3, :3] = rotation.from_vector(np.outer(angle * np.sin(3 * times), [1.0, 0, 0]))
+        joints = np.concatenate([plain.joints, plain.joints[:, [HEAD]] @ (at @ turn)[:, None]], axis=1)
+        return BoundarySampler(SPEC, Character(bound, carrier=carrier), Clip(times, joints)).vectors([0.2, 1.0])
+
+    head = read(None, 0.0)
+    assert np.abs(head - BoundarySampler(SPEC, person(), plain).vectors([0.2, 1.0])).max() < 1e-6
+    assert np.abs(read(6, 0.0) - head).max() < 1e-5
+    assert 1e-4 < np.abs(read(6, 0.001) - head).max() < 0.02
 
 
 def test_a_rig_turned_or_with_other_joint_axes_reads_the_same():

@@ -28,14 +28,14 @@ def test_the_head_goes_as_the_network_reads_it(loop):
     character, motion = rigs.person(), clip(loop)
     times = np.linspace(-1.2, 3.3, 200)
     place, turn = Track(character, motion, [rigs.HEAD]).at(times)
-    found = SmoothMotion(motion, rigs.HEAD).at(times)[:, rigs.HEAD]
+    found = SmoothMotion(rigs.person(), motion).at(times)[:, rigs.HEAD]
     np.testing.assert_allclose(found[:, :3, 3], place, atol=1e-12)
     np.testing.assert_allclose(found[:, :3, :3], 1.5 * turn[:, 0], atol=1e-9)
 
 
 def test_samples_come_back_and_outside_of_them_all_goes_on_without_turning():
     motion = clip()
-    smooth = SmoothMotion(motion, rigs.HEAD)
+    smooth = SmoothMotion(rigs.person(), motion)
     np.testing.assert_allclose(smooth.at(TIMES), motion.joints, atol=1e-12)
     outside, step = smooth.at(np.array([-1.0, -0.5, 1.5, 2.0])), smooth.at(np.array([0.0, 1e-6, 1 - 1e-6, 1.0]))
     np.testing.assert_allclose(outside[..., :3, :3], motion.joints[[0, 0, -1, -1], :, :3, :3], atol=1e-12)
@@ -43,7 +43,7 @@ def test_samples_come_back_and_outside_of_them_all_goes_on_without_turning():
     np.testing.assert_allclose(gone / 0.5, speed / 1e-6, atol=1e-5)
     alone = Clip(TIMES[:1], motion.joints[:1])
     np.testing.assert_allclose(
-        SmoothMotion(alone, rigs.HEAD).at(TIMES), motion.joints[:1].repeat(25, axis=0), atol=1e-12
+        SmoothMotion(rigs.person(), alone).at(TIMES), motion.joints[:1].repeat(25, axis=0), atol=1e-12
     )
 
 
@@ -53,7 +53,7 @@ def test_mirrored_and_flat_joints_keep_nobody_from_moving():
     odd[:, 4, :3, :3] = odd[:, rigs.HEAD, :3, :3] * [1, 1, -1]
     odd[:, 5, :3, :3] = 0
     between = TIMES[:-1] + 0.4 / 24
-    found, plain = (SmoothMotion(Clip(TIMES, joints), rigs.HEAD).at(between) for joints in (odd, motion.joints))
+    found, plain = (SmoothMotion(rigs.person(), Clip(TIMES, joints)).at(between) for joints in (odd, motion.joints))
     np.testing.assert_allclose(found[:, 4, :3, :3], plain[:, rigs.HEAD, :3, :3] * [1, 1, -1], atol=1e-3)
     assert not found[:, 5, :3, :3].any()
     np.testing.assert_allclose(found[:, :4], plain[:, :4], atol=1e-12)

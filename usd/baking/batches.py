@@ -26,4 +26,4 @@ def batches(grooms: Sequence[StageGroom]) -> list[list[StageGroom]]:
 
 
 def _head(item: StageGroom) -> tuple[str, int]:
-    return item.attachment.rig.path, item.attachment.character.head
+    return item.attachment.rig.path, item.attachment.character.carrying_joint

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pxr import Usd
 
-from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -38,7 +38,8 @@ class Attachment:
 
     Attributes:
         rig: the skeleton that carries it.
-        character: the rig's character with the carrying joint as its head.
+        character: the rig's character, with the joint that carries the groom: its head, one below it, or else the one that
+            takes the head's part.
         to_bind: the prim's own space to bind world [m], (4, 4).
         how: the carrying joint and how it was found, in words.
         skinned: whether UsdSkel would deform the prim itself.
@@ -82,7 +83,7 @@ def attach(
         notes += _spread(rig, path, joint, shares)
         found = Attachment(
             rig=rig,
-            character=_with_head(rig, joint),
+            character=_carried_by(rig, joint),
             to_bind=rig.to_bind @ geom_bind(prim),
             how=f"{why} (its own skel binding)",
             skinned=True,
@@ -98,7 +99,7 @@ def attach(
     beyond = beyond_ends(prim)
     found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind, beyond))
     notes += not_pinned(prim, found.rig, found.drawn, beyond)
-    name = rig_joint(found)
+    name = found.rig.source.names[found.character.head]
     asked = found.rig.by_hand.get("head")
     if asked and leaf(name) != leaf(asked):
         option = "--head " if head else "--joint head="
@@ -133,7 +134,7 @@ def of_another(
 
 def rig_joint(found: Attachment) -> str:
     """Path of the carrying joint."""
-    return found.rig.source.names[found.character.head]
+    return found.rig.source.names[found.character.carrying_joint]
 
 
 def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
@@ -148,7 +149,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     notes += _spread(rig, path, joint, shares) + moved_away(path, rig, seat.roots)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
-    return Attachment(rig, _with_head(rig, joint), seat.to_bind, how, False, at_default)
+    return Attachment(rig, _carried_by(rig, joint), seat.to_bind, how, False, at_default)
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -266,10 +267,24 @@ def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
     return bool(np.abs(relative - relative[0]).max() < 1e-4)
 
 
-def _with_head(rig: StageRig, joint: int) -> Character:
-    if rig.character.humanoid.get("head") == joint:
+def _carried_by(rig: StageRig, joint: int) -> Character:
+    head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
+    if head == joint:
         return rig.character
+    if head is not None and skeleton.below(head)[joint] and joint != _head_by_name(rig):
+        return replace(rig.character, carrier=joint)
+    return replace(rig.character, humanoid=_humanoid(rig, head=skeleton.names[joint]))
+
+
+def _head_by_name(rig: StageRig) -> int | None:
+    """The head, whatever was given by hand."""
+    try:
+        return _humanoid(rig)["head"]
+    except NoHead:
+        return None
+
+
+def _humanoid(rig: StageRig, **head: str) -> Humanoid:
     skeleton = rig.character.skeleton
-    by_hand = {**rig.by_hand, "head": skeleton.names[joint]}
-    humanoid = find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
-    return replace(rig.character, humanoid=humanoid)
+    by_hand = {name: joint for name, joint in rig.by_hand.items() if name != "head"} | head
+    return find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)

@@ -191,10 +191,10 @@ def without_turn(rig: StageRig) -> list[str]:
     """What stops a bake of strands: joints that the network reads and that have no rotation, hidden by a scale of zero or
     mirrored.
     """
-    humanoid, found = rig.character.humanoid, []
-    if "head" not in humanoid:
-        return []
-    for joint in dict.fromkeys(joints_read(humanoid)):
+    found: list[str] = []
+    if "head" not in rig.character.humanoid:
+        return found
+    for joint in dict.fromkeys(joints_read(rig.character)):
         linear = rig.clip.joints[:, joint, :3, :3]
         flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
         for fact, bad, remedy in (

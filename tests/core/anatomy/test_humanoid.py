@@ -123,6 +123,11 @@ RIGS = {
             "neck": "neckLower",
         },
     ),
+    "Biped, collar bones on the neck": (
+        "Bip001\n Bip001_Pelvis\n  Bip001_Spine\n   Bip001_Spine1\n    Bip001_Spine2\n     Bip001_Neck\n      Bip001_Head\n"
+        "      Bip001_L_Clavicle\n       Bip001_L_UpperArm\n      Bip001_R_Clavicle\n       Bip001_R_UpperArm",
+        {"neck": "Bip001_Neck", "upper_chest": "Bip001_Spine2", "head": "Bip001_Head"},
+    ),
     "Rigify": (
         "DEF-spine\n DEF-spine.001\n  DEF-spine.002\n   DEF-spine.003\n    DEF-spine.004\n     DEF-spine.005\n"
         "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",

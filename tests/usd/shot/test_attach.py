@@ -38,6 +38,37 @@ def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
         assert sum("--joint head=neck is not used, the groom is carried by" in note for note in notes) == count
 
 
+def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_path):
+    path = write_shot(tmp_path, Recipe())
+    stage = Usd.Stage.Open(str(path))
+    skeleton, motion = UsdSkel.Skeleton.Get(stage, "/Hero/Rig"), UsdSkel.Animation.Get(stage, "/Hero/Rig/Motion")
+    joints = [*skeleton.GetJointsAttr().Get(), "hips/spine/neck/head/jaw"]
+    down = Gf.Matrix4d().SetTranslate((0, -0.05, 0.08))
+    for attribute, matrix in (
+        (skeleton.GetBindTransformsAttr(), down * skeleton.GetBindTransformsAttr().Get()[HEAD]),
+        (skeleton.GetRestTransformsAttr(), down),
+    ):
+        attribute.Set([*attribute.Get(), matrix])
+    skeleton.GetJointsAttr().Set(joints)
+    motion.GetJointsAttr().Set(joints)
+    for code in motion.GetRotationsAttr().GetTimeSamples():
+        turn = Gf.Quatf(Gf.Rotation((1, 0, 0), 4.0 * code).GetQuat())
+        for attribute, own in (
+            (motion.GetRotationsAttr(), turn),
+            (motion.GetTranslationsAttr(), (0, -0.05, 0.08)),
+        ):
+            attribute.Set([*attribute.Get(code), own], code)
+    motion.GetScalesAttr().Set([*motion.GetScalesAttr().Get(), (1, 1, 1)])
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair")).GetJointIndicesPrimvar().Set([len(joints) - 1])
+    stage.Save()
+    found = read_shot(path).grooms[0]
+    character, posed = found.attachment.character, found.attachment.rig.joints_at(5.0)
+    assert found.joint.endswith("head/jaw") and character.skeleton.names[character.head].endswith("head")
+    assert character.canonical_to_bind[:3, 3] == pytest.approx(character.skeleton.bind[HEAD, :3, 3])
+    assert np.allclose(character.carrying(posed) @ character.skeleton.bind[-1], posed[-1])
+    assert not np.allclose(character.carrying(posed) @ character.skeleton.bind[HEAD], posed[HEAD], atol=1e-3)
+
+
 def _without_a_head_by_name(path):
     path.write_text(path.read_text().replace("spine/neck", "spine/Hals").replace("Hals/head", "Hals/Kopf"))
     return path
