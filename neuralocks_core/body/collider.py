@@ -13,8 +13,8 @@ MOST_SAMPLES = 400_000
 THREADED = 2_000
 """From so many points on, a search is shared with other threads."""
 
-ROWS = 20_000
-"""Points measured at a time, to bound the memory: a grid around a giant's head has millions."""
+CANDIDATES = 160_000
+"""Triangles looked at together, those of some points, to bound the memory: a grid around a giant's head has millions."""
 
 
 class Collider:
@@ -76,16 +76,13 @@ class Collider:
         closest, normal, triangle = closest.copy(), normal.copy(), triangle.copy()
         pending, k = near, 8 if proven else 4
         while len(pending):
-            count = min(k, self._tree.n)
-            asked = points[pending]
-            far, found = self._tree.query(asked, k=np.arange(1, count + 1), workers=_workers(asked))
-            best = np.empty(len(asked))
-            for low in range(0, len(asked), ROWS):
-                rows = slice(low, low + ROWS)
-                here, candidates = pending[rows], self._owner[found[rows]]
-                closest[here], normal[here], triangle[here], best[rows] = self._nearest(asked[rows], candidates)
-            done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
-            pending, k = pending[~done], 4 * k
+            count, left = min(k, self._tree.n), []
+            for here in np.split(pending, range(0, len(pending), max(1, CANDIDATES // count))[1:]):
+                far, found = self._tree.query(points[here], k=np.arange(1, count + 1), workers=_workers(here))
+                closest[here], normal[here], triangle[here], best = self._nearest(points[here], self._owner[found])
+                done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
+                left.append(here[~done])
+            pending, k = np.concatenate(left), 4 * k
         offset = points - closest
         length = np.linalg.norm(offset, axis=1)
         sign = np.where((offset * normal).sum(axis=1) < 0, -1.0, 1.0)

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from neuralocks_core.body import collider
 from neuralocks_core.body.collider import Collider, closest_on_triangle
 from neuralocks_core.errors import NeuralocksError
 
@@ -20,22 +21,41 @@ def test_distance_agrees_with_trimesh():
     """Two implementations, on points near, far, inside and outside."""
     mesh, rng = bumpy(), np.random.default_rng(1)
     points = rng.uniform(-0.25, 0.25, (1500, 3))
-    collider = Collider(mesh.vertices, mesh.faces)
-    distance, direction = collider.distance(points, limit=1.0)
+    ours = Collider(mesh.vertices, mesh.faces)
+    distance, direction = ours.distance(points, limit=1.0)
     np.testing.assert_allclose(distance, -trimesh.proximity.signed_distance(mesh, points), atol=1e-7)
     on_surface = points - distance[:, None] * direction
-    np.testing.assert_allclose(collider.distance(on_surface)[0], 0, atol=1e-9)
+    np.testing.assert_allclose(ours.distance(on_surface)[0], 0, atol=1e-9)
 
 
 def test_limit_keeps_near_points_exact_and_far_points_signed():
     mesh, rng = bumpy(2), np.random.default_rng(2)
-    collider, points = Collider(mesh.vertices, mesh.faces), rng.uniform(-0.3, 0.3, (2000, 3))
-    exact, _ = collider.distance(points, limit=1.0)
-    limited, _ = collider.distance(points, limit=0.02)
+    ours, points = Collider(mesh.vertices, mesh.faces), rng.uniform(-0.3, 0.3, (2000, 3))
+    exact, _ = ours.distance(points, limit=1.0)
+    limited, _ = ours.distance(points, limit=0.02)
     near = np.abs(exact) < 0.02
     np.testing.assert_array_equal(limited[near], exact[near])
     assert np.abs(limited - exact).max() < 0.01
     assert (np.sign(limited) == np.sign(exact)).mean() > 0.999
+
+
+def test_memory_is_bounded_though_many_points_need_many_triangles(monkeypatch):
+    """From the middle of a ball all triangles are about as far."""
+    ball, rng = trimesh.creation.icosphere(subdivisions=3, radius=0.1), np.random.default_rng(4)
+    points = rng.normal(0, 1e-5, (200, 3))
+    told = Collider(ball.vertices, ball.faces).distance(points)[0]
+    asked = []
+
+    class Tree(collider.cKDTree):
+        def query(self, x, k=1, **options):
+            asked.append(len(x) * np.size(k))
+            return super().query(x, k, **options)
+
+    monkeypatch.setattr(collider, "cKDTree", Tree)
+    monkeypatch.setattr(collider, "CANDIDATES", 5000)
+    found = Collider(ball.vertices, ball.faces).distance(points)[0]
+    assert len(asked) > 10 and max(asked) <= 5000
+    np.testing.assert_array_equal(found, told)
 
 
 def test_points_far_beyond_a_sharp_rim_are_not_inside():
