@@ -105,9 +105,11 @@ class Body:
 
     def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
         """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
-        if weights is None or not len(self.shapes) or not len(weights):
-            return self.points
-        return self.points + np.einsum("b,bvc->vc", np.asarray(weights, float), np.stack(list(self.shapes.values())))
+        points = self.points
+        for offsets, weight in zip(self.shapes.values(), () if weights is None else weights):
+            if weight:  # a face has hundreds, of which a frame shows a few
+                points = points + weight * offsets
+        return points
 
     def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
         """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""

@@ -7,6 +7,7 @@ import scipy.sparse
 from neuralocks_core.body.head_field import head_field
 from neuralocks_core.body.moving_skin import Box, PosedSkin, Skin
 from neuralocks_core.character import Body
+from neuralocks_core.rotation import transformed
 
 HEAD, SKIN = 1, 2
 CURVED = 0.004
@@ -24,7 +25,7 @@ class NearBody:
     """
 
     def __init__(self, body: Body, to_canonical: np.ndarray, still: np.ndarray, low: np.ndarray, high: np.ndarray):
-        points = body.points @ to_canonical[:3, :3].T + to_canonical[:3, 3]
+        points = transformed(body.points, to_canonical)
         self.head = head_field(points, body.triangles, still)
         self.box = Box(low, high)
         self.marks = np.zeros(self.box.count, np.uint8)
@@ -39,8 +40,7 @@ class NearBody:
             columns, weights = body.joint_indices[used].ravel(), body.joint_weights[used].ravel()
             count = int(body.joint_indices.max()) + 1
             self._weights = scipy.sparse.csr_array((weights, (rows, columns)), shape=(len(used), count))
-            self._points = body.points[used]
-            self._shapes = {name: offsets[used] for name, offsets in body.shapes.items()}
+            self._moving = body.part(used, triangles.reshape(-1, 3))
 
     def posed(self, skinning: np.ndarray, shape: np.ndarray | None, low: np.ndarray, high: np.ndarray) -> "PosedBody":
         """The body in a pose.
@@ -53,10 +53,7 @@ class NearBody:
         marks = self.marks.copy()
         if self.skin is None:
             return PosedBody(self, None, marks)
-        points = self._points
-        for offsets, weight in zip(self._shapes.values(), () if shape is None else shape):
-            if weight:
-                points = points + weight * offsets
+        points = self._moving.shaped(shape)
         blended = self._weights @ skinning[: self._weights.shape[1], :3].reshape(-1, 12)
         x, y, z = points.T[:, :, None]
         points = blended[:, 0::4] * x + blended[:, 1::4] * y + blended[:, 2::4] * z + blended[:, 3::4]
