@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from neuralocks_core.physics.rest_support import rest_support
+from neuralocks_core.strands.rest_support import rest_force
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,12 @@ def rods(rest: Tensor, *, supported: bool = True) -> Rods:
         supported: whether the groom carries its own weight in the bind pose (docs/architecture.md, Physics);
             else it is stress free and droops, as in the paper.
     """
-    length = rest.diff(dim=-2).square().sum(-1).clamp_min(1e-18).sqrt()
+    edge = rest.diff(dim=-2)
+    length = edge.square().sum(-1).clamp_min(1e-18).sqrt()
     padded = torch.nn.functional.pad(length, (1, 1))
     mass = 0.5 * (padded[..., 1:] + padded[..., :-1])
     voronoi = 0.5 * (length[..., 1:] + length[..., :-1])
-    support = rest_support(rest, mass) if supported else torch.zeros_like(rest)
+    support = torch.zeros_like(rest)
+    if supported:
+        support = torch.from_numpy(rest_force((edge / length[..., None]).numpy(), mass.numpy()))
     return Rods(rest, length, voronoi, mass, support)

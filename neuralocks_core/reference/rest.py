@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import GRAVITY
 from neuralocks_core.strands.bends import bends
+from neuralocks_core.strands.rest_support import rest_force
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,7 @@ def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
     direction = edge / edge_length[..., None]
     length = np.concatenate([np.zeros_like(edge_length[:, :1]), edge_length], 1)
     mass = 0.5 * (length + np.concatenate([edge_length, np.zeros_like(edge_length[:, :1])], 1))
-    support = _support(direction, mass) if rest_support else np.zeros_like(points)
+    support = rest_force(direction, mass) if rest_support else np.zeros_like(points)
     curl = np.zeros_like(points)
     curl[:, 1:-1] = bends(direction)
     return RestRods(points, length, mass, curl, support)
-
-
-def _support(direction: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    """The part of each vertex's own weight that tension along the strand cannot carry, (S, K, 3)."""
-    support = np.zeros((*mass.shape, 3))
-    pull = np.zeros((len(mass), 3))
-    for i in range(mass.shape[1] - 1, 0, -1):
-        load = pull + mass[:, i, None] * GRAVITY
-        edge = direction[:, i - 1]
-        carried = np.maximum((load * edge).sum(-1, keepdims=True), 0.0) * edge
-        support[:, i] = carried - load
-        pull = carried
-    return support
