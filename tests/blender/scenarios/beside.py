@@ -121,8 +121,9 @@ def _in_a_window(strands, shown, groomed) -> None:
     assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
 
 
+@patch.multiple("dcc_addon.operators.base", SLICE=0.0, _running=["as in a window"])
 def loaded_meanwhile(folder: Path) -> None:
-    """Another file is opened while frames are stepped, or Blender ends a bake that the panel shows: live goes on."""
+    """Another file is opened while a bake samples, or Blender ends a bake that the panel shows: live goes on."""
     from types import SimpleNamespace
 
     from dcc_addon.operators.bake import bake_steps
@@ -135,9 +136,15 @@ def loaded_meanwhile(folder: Path) -> None:
     make_live(rig, strands)
     shown = points_at(strands, 9)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
-    steps = bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
-    while not session.paused:
+
+    def begun():
+        steps = bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
+        while "Sampling" not in next(steps)[2]:
+            pass
         next(steps)
+        return steps
+
+    steps = begun()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     try:
         steps.close()
@@ -151,10 +158,7 @@ def loaded_meanwhile(folder: Path) -> None:
     ended = []
     manager = SimpleNamespace(event_timer_remove=ended.append, progress_end=lambda: ended.append("progress"))
     running = Stepwise()
-    running._timer, running._steps = "timer", bake_steps(bpy.context, rig, [strands], str(folder / "bake.usdc"))
-    while not session.paused:
-        next(running._steps)
-    assert session.paused == 1
+    running._timer, running._steps = "timer", begun()
     running.cancel(SimpleNamespace(window_manager=manager, workspace=None))
     assert session.paused == 0 and ended == ["timer", "progress"]
     assert apart(points_at(strands, 9), shown) == 0.0

@@ -2,6 +2,7 @@
 """Hair bones."""
 
 from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -118,6 +119,7 @@ def keyed_bones(folder: Path) -> None:
             assert apart(turns(frame), matrices) < 1e-6
 
 
+@patch.multiple("dcc_addon.operators.base", SLICE=0.0, _running=["as in a window"])
 def keyed_anew(folder: Path) -> None:
     """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
     not takes its place, and finds the bones as they were before the first.
@@ -156,6 +158,8 @@ def keyed_anew(folder: Path) -> None:
     steps = NEURALOCKS_OT_bake_keys.steps(SimpleNamespace(), bpy.context)
     next(steps)
     assert not same()
+    bpy.context.view_layer.update()
+    next(steps)
     steps.close()
     assert same() and own.rig_live and not messages(), messages()
     own.rig_live = False
