@@ -138,7 +138,9 @@ def _training(layout, settings, kind: str) -> None:
         column = layout.column(align=True)
         column.operator("neuralocks.train", icon="MODIFIER").kind = kind
         column.prop(settings, "train_minutes")
-        message(layout, "training")
+        if session.trained is not None:
+            text, well = session.trained
+            words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")
         return
     left = running.seconds_left
     box = layout.box()

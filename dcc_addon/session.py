@@ -82,6 +82,8 @@ class Session:
     weights: dict[str, tuple] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     messages: dict[str, str] = field(default_factory=dict)
+    trained: tuple[str, bool] | None = None
+    """What became of the last training, and whether that is good news."""
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""

@@ -11,6 +11,7 @@ from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..live import refresh
 from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
@@ -102,6 +103,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
         _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder))
+        session.trained = None
         bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
         return f"Training a model for {target.name_full} in the background"
 
@@ -150,13 +152,11 @@ def finish() -> str | None:
     """Take over the result of an ended training: the model goes to what it was trained for. A message for the panel, or
     None while it runs.
     """
-    from ..live import refresh
-
     running = job()
     if running is None or running.running:
         return None
     wanted = _running[0].target
-    name, target = wanted.name, wanted.found()
+    name, target, well = wanted.name, wanted.found(), False
     if not running.succeeded:
         message = f"{name}: training failed: {running.failure()}"
     elif target is None:
@@ -167,8 +167,8 @@ def finish() -> str | None:
         else:
             target.neuralocks_character.rig_model = running.out
         _remember()
-        message = f"{target.name_full}: trained"
-    session.messages["training"] = message
+        message, well = f"{target.name_full}: trained", True
+    session.trained = message, well
     stop()
     refresh(bpy.context.scene)
     return message

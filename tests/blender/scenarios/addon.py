@@ -42,8 +42,8 @@ def _menu_entries() -> list:
 class _Layout:
     """Stands in for Blender's layout, which only a window has: what it is asked for must exist in this Blender."""
 
-    def __init__(self, said: list):
-        self.said = said
+    def __init__(self, said: list, icon: str = ""):
+        self.said, self.icon = said, icon
 
     def __getattr__(self, name):
         known = bpy.types.UILayout.bl_rna.functions[name].parameters
@@ -56,24 +56,27 @@ class _Layout:
                 described = getattr(bpy.ops.neuralocks, given[0].split(".")[1]).get_rna_type()
                 self.said.append(options.get("text", described.name))
                 return SimpleNamespace(**dict.fromkeys(described.properties.keys()))
-            self.said += [options["text"]] if options.get("text") else []
-            return _Layout(self.said)
+            if options.get("text") and self.icon in options.get("icon", ""):
+                self.said.append(options["text"])
+            return _Layout(self.said, self.icon)
 
         return asked
 
 
-def _drawn() -> list[str]:
-    """Everything that the panels and the menu say now."""
+def _drawn(icon: str = "") -> list[str]:
+    """Everything that the panels and the menu say now; what stands beside this icon, if one is given."""
     from dcc_addon import menu, panels
 
     said = []
     for cls in (*panels.CLASSES, *menu.CLASSES):
-        cls.draw(SimpleNamespace(layout=_Layout(said)), bpy.context)
+        cls.draw(SimpleNamespace(layout=_Layout(said, icon)), bpy.context)
     return said
 
 
 def panel(folder: Path) -> None:
     """The panel can be drawn at every step of an artist's work, and says what is found and what is wrong."""
+    from dcc_addon.session import session
+
     scene = bpy.context.scene
     assert "Find Character and Hair" in _drawn()
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
@@ -103,6 +106,9 @@ def panel(folder: Path) -> None:
     assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
     said = " ".join(_drawn())
     assert "differs from" in said and "no such" in said and "2 bones" in said, said
+    for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
+        session.trained = "Hair: said", well
+        assert _drawn(icon).count("Hair: said") == 2
 
 
 def words(_folder: Path) -> None:

@@ -22,7 +22,7 @@ def training(folder: Path) -> None:
     exported = Path(tempfile.tempdir)
     assert len(list(exported.iterdir())) == 1
     refused(bpy.ops.neuralocks.train, "one is running already")
-    assert _ended() == "Hair: trained"
+    assert _ended() == ("Hair: trained", True)
     assert not list(exported.iterdir())
     assert Path(strands.neuralocks_hair.model).parent == folder
     strands.neuralocks_hair.live = True
@@ -38,22 +38,24 @@ def training_meanwhile(folder: Path) -> None:
 
     strands = _in_training(folder)
     strands.name = "H" * 255
-    assert _ended() == f"{strands.name}: trained"
+    assert _ended() == (f"{strands.name}: trained", True)
     assert strands.neuralocks_hair.model == str(folder / "Hair_1.neuralocks")
     assert bpy.ops.neuralocks.train() == {"FINISHED"}
     bpy.data.objects.remove(strands)
-    assert "not in this file" in _ended() and "HHH_1.neuralocks" in messages()["training"]
+    said, well = _ended()
+    assert "not in this file" in said and "HHH_1.neuralocks" in said and not well
 
     _in_training(folder)
     scenes.empty()
     strands = scenes.hair(scenes.armature(), 20)
     assert strands.name == "Hair" and bpy.app.timers.is_registered(operator.watch)
-    assert "Hair: trained" in _ended() and str(folder / "Hair_2.neuralocks") in messages()["training"]
+    said, well = _ended()
+    assert "Hair: trained" in said and str(folder / "Hair_2.neuralocks") in said and not well
     assert not strands.neuralocks_hair.model
 
     _in_training(folder)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "train.blend"))
-    assert _ended() == "Hair: trained"
+    assert _ended() == ("Hair: trained", True)
     assert bpy.data.objects["Hair"].neuralocks_hair.model == str(folder / "Hair_3.neuralocks")
 
 
@@ -88,20 +90,23 @@ def _in_training(folder: Path):
     return strands
 
 
-def _ended() -> str:
-    """What is said at the end of the training that runs."""
+def _ended() -> tuple[str, bool]:
+    """What is said at the end of the training that runs, and whether that is good news."""
     from dcc_addon.operators import training as operator
+    from dcc_addon.session import session
 
     end = time.monotonic() + 60
     while operator.finish() is None and time.monotonic() < end:
         time.sleep(0.1)
-    return messages()["training"]
+    assert not messages(), messages()
+    return session.trained
 
 
 def trained_for_real(folder: Path) -> None:
     """Train from the panel's own operator in a real second Python, with progress, cancel, and a model at the end."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services.training_job import problem
+    from dcc_addon.session import session
 
     trouble = problem(operator.training_python())
     if trouble:
@@ -138,7 +143,7 @@ def trained_for_real(folder: Path) -> None:
 
     wait(follow, 400)
     print(sorted(said))
-    assert "trained" in messages()["training"], messages()
+    assert session.trained == ("Hair: trained", True)
     assert len(said) > 3 and shares == sorted(shares)
     assert Path(strands.neuralocks_hair.model).parent == folder and Path(strands.neuralocks_hair.model).exists()
     strands.neuralocks_hair.live = True
