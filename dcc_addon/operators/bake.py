@@ -82,6 +82,10 @@ def bake_steps(context, armature, hairs, path: str):
         looks.setdefault(_look(hair), []).append(hair.name_full)
     stem = Path(full)
     outs = [stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{n + 1}{stem.suffix}") for n in range(len(looks))]
+    groups = [(out, *group) for out, group in zip(outs, sorted(looks.items()))]
+    for out, _, names in groups:
+        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
+            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     character, subframes = armature.name_full, scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
     from usd.assets.own_layers import is_own
@@ -91,15 +95,9 @@ def bake_steps(context, armature, hairs, path: str):
     sampled = yield from sampling(context, named(character), share=0.5)
     baked = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
-        for number, (look, names) in enumerate(sorted(looks.items())):
-            group, out = [named(name) for name in names], outs[number]
-            others = [thing.name_full for thing in attach.players(str(out)) if thing not in group]
-            if others:
-                raise NeuralocksError(
-                    f"{out}: {others[0]} plays this file, and is not in this bake; choose another file"
-                )
+        for number, (out, look, names) in enumerate(groups):
             shot = shot_beside(out)
-            prims = write_shot(shot, named(character), scene, sampled, group)
+            prims = write_shot(shot, named(character), scene, sampled, [named(name) for name in names])
             job = Threaded(
                 lambda say, shot=shot, out=out, look=look: bake(
                     shot,

@@ -239,6 +239,7 @@ def _equal_when_exported(folder: Path, strands, **options) -> None:
 def attached(folder: Path) -> None:
     """Bake and Attach: the cache on each hair object shows what was live, without the add-on."""
     import dcc_addon
+    from dcc_addon.session import session
 
     needs_usd()
     rig = scenes.armature()
@@ -256,8 +257,9 @@ def attached(folder: Path) -> None:
         assert apart(points_at(strands, f), points) < SAME
     assert apart(points_at(fringe, 17), beside) < SAME, "both play the file of the panel"
     fringe.neuralocks_hair.armature = None
-    in_use = str(folder / "cache_Fringe_L.usdc")
+    in_use, sampled = str(folder / "cache_Fringe_L.usdc"), session.rigs["Rig"]
     refused(lambda: bpy.ops.neuralocks.bake(filepath=in_use), "Fringe.L plays this file")
+    assert session.rigs["Rig"] is sampled, "refused only after minutes of sampling"
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "farm.blend"))
     dcc_addon.unregister()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "farm.blend"))
