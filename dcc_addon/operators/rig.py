@@ -15,13 +15,13 @@ from ..models import model_path
 from ..scene import actions
 from ..scene.attach import check_own
 from ..scene.export import write_shot
-from ..scene.lookup import find, named
+from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
 from ..scene.up_to_date import ensure
 from ..services.bones import chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.overwriting import check_ours
-from ..services.threaded import loading
+from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range, output_path, shot_beside
@@ -106,7 +106,9 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
 
     def steps(self, context):
-        name, scene = shown_armature(context).name_full, context.scene
+        armature, scene = shown_armature(context), context.scene
+        name, model = armature.name_full, model_path(armature, "rig")
+        strength = armature.neuralocks_character.rig_motion
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
@@ -116,13 +118,16 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         from usd.rig.bake import bake_rig
 
         check_ours([out, shot], is_own)
-        sampled = yield from sampling(context, named(name))
-        bind(find(name), sampled)  # says what is wrong before anything is written
-        head, model = sampled.character.skeleton.names[sampled.character.head], model_path(find(name), "rig")
-        settings = find(name).neuralocks_character
+        sampled = yield from sampling(context, named(name), share=0.5)
+        bind(named(name), sampled)  # says what is wrong before anything is written
+        head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
-            write_shot(shot, find(name), scene, sampled, [])
-            bake_rig(shot, out, model, head=head, strength=settings.rig_motion, loop=settings.loop)
+            write_shot(shot, named(name), scene, sampled, [])
+            job = Threaded(
+                lambda say: bake_rig(shot, out, model, head=head, strength=strength, loop=loop, progress=say),
+                "Baking the hair bones",
+            )
+            yield from job.steps(0.5)
         return f"{name}: hair bones written to {out}"
 
 
