@@ -200,14 +200,8 @@ def _arrived(name: str) -> None:
 
 
 def material(settings) -> np.ndarray:
-    """Log-ratios (4,) of the sliders."""
-    base = Material()
-    return Material(
-        base.bend * typed(settings, "bend"),
-        base.weight * typed(settings, "weight"),
-        base.damping * typed(settings, "damping"),
-        base.clumping * typed(settings, "clumping"),
-    ).log_ratios()
+    """Log-ratios (4,) of the sliders, read as a bake reads them."""
+    return Material.parse(material_words(settings)).log_ratios()
 
 
 def typed(settings, name: str) -> float:
