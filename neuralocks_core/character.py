@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A character: skeleton, body surface, and which joint is which."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -92,6 +93,25 @@ class Body:
     joint_indices: np.ndarray
     joint_weights: np.ndarray
     shapes: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def joined(cls, parts: Sequence["Body"]) -> "Body | None":
+        """Several bodies as one, whose shapes of one name are one shape; None where there are none."""
+        if not parts:
+            return None
+        ends = np.cumsum([0] + [len(part.points) for part in parts])
+        width, shapes = max(part.joint_indices.shape[1] for part in parts), {}
+        wider = [((0, 0), (0, width - part.joint_indices.shape[1])) for part in parts]
+        for part, start, end in zip(parts, ends, ends[1:]):
+            for name, offsets in part.shapes.items():
+                shapes.setdefault(name, np.zeros((ends[-1], 3)))[start:end] = offsets
+        return cls(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.triangles + start for part, start in zip(parts, ends)]),
+            np.concatenate([np.pad(part.joint_indices, by) for part, by in zip(parts, wider)]),
+            np.concatenate([np.pad(part.joint_weights, by) for part, by in zip(parts, wider)]),
+            shapes,
+        )
 
     def part(self, vertices: np.ndarray, triangles: np.ndarray) -> "Body":
         """Some of the vertices (v,), with triangles (f, 3) whose corners are counted among these."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender rig, read as arrays, as the core's character; and in plain words what is wrong with it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -125,8 +125,9 @@ def character(
     core = to_core(metres)
     humanoid = rig.humanoid()
     skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
-    parts = [_body(body, body_place, core, rig.bones) for body, body_place in bodies]
-    return Character(skeleton, _merged(parts), humanoid)
+    labels = iter(shape_names([body for body, _ in bodies]))
+    parts = [_body(body, body_place, core, rig.bones, labels) for body, body_place in bodies]
+    return Character(skeleton, Body.joined(parts), humanoid)
 
 
 def same(a: Character, b: Character) -> bool:
@@ -193,35 +194,16 @@ def skin(body: BodyArrays, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, d
     return points, triangles[:, ::-1] if inside_out(points, triangles) else triangles, shapes
 
 
-def _body(body: BodyArrays, place: np.ndarray, core: np.ndarray, bones: tuple[str, ...]) -> Body:
+def _body(body: BodyArrays, place: np.ndarray, core: np.ndarray, bones: tuple[str, ...], labels: Iterator[str]) -> Body:
+    """A part of the body, whose shapes take the next of `labels`: two parts may call theirs the same."""
     points, triangles, shapes = skin(body, place)
-    shapes = {name: offsets @ core[:3, :3].T for name, offsets in shapes.items()}
+    shapes = {next(labels): offsets @ core[:3, :3].T for offsets in shapes.values()}
     return Body(transformed(points, core), triangles, *joint_weights(body, bones), shapes)
 
 
 def shape_names(bodies: Sequence[BodyArrays]) -> list[str]:
     """Identifiers of all shape keys, body after body, in their order."""
     return names.unique([name for body in bodies for name in body.shapes])
-
-
-def _merged(parts: list[Body]) -> Body | None:
-    if not parts:
-        return None
-    starts = np.cumsum([0] + [len(part.points) for part in parts])
-    shapes = {}
-    labels = iter(names.unique([name for part in parts for name in part.shapes]))
-    for part, start in zip(parts, starts):
-        for offsets in part.shapes.values():
-            whole = np.zeros((starts[-1], 3))
-            whole[start : start + len(part.points)] = offsets
-            shapes[next(labels)] = whole
-    return Body(
-        np.concatenate([part.points for part in parts]),
-        np.concatenate([part.triangles + start for part, start in zip(parts, starts)]),
-        np.concatenate([part.joint_indices for part in parts]),
-        np.concatenate([part.joint_weights for part in parts]),
-        shapes,
-    )
 
 
 def groom(

@@ -167,29 +167,21 @@ def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | N
         to_bind: authored bind space to bind world [m], (4, 4).
         keep: blend shapes wanted; all if None. Each of their knots is a shape of the Body.
     """
-    if not meshes:
-        return None
-    width = max(m.indices.shape[1] for m in meshes)
-    ends = np.cumsum([0] + [len(m.points) for m in meshes])
-    placed = [m.in_bind(to_bind) for m in meshes]
-    points = np.concatenate([own for own, _ in placed])
-    triangles = np.concatenate([faces + start for (_, faces), start in zip(placed, ends)])
-    pad = [((0, 0), (0, width - m.indices.shape[1])) for m in meshes]
-    shapes = {}
-    for name, knots in knot_weights([mesh.shapes for mesh in meshes]).items():
-        for knot in knots if keep is None or name in keep else ():
-            offsets = shapes.setdefault(name if knot == 1 else f"{name} at {knot:g}", np.zeros((len(points), 3)))
-            for mesh, start, end in zip(meshes, ends, ends[1:]):
-                if name in mesh.shapes:
-                    turn = (to_bind @ mesh.geom_bind)[:3, :3]
-                    offsets[start:end] = at_knot(mesh.shapes[name], knot) @ turn.T
-    return Body(
-        points,
-        triangles,
-        np.concatenate([np.pad(m.indices, p) for m, p in zip(meshes, pad)]),
-        np.concatenate([np.pad(m.weights, p) for m, p in zip(meshes, pad)]),
-        shapes,
-    )
+    knots = knot_weights([mesh.shapes for mesh in meshes])
+    knots = {name: own for name, own in knots.items() if keep is None or name in keep}
+    return Body.joined([_body(mesh, to_bind, knots) for mesh in meshes])
+
+
+def _body(mesh: StageMesh, to_bind: np.ndarray, knots: dict[str, list[float]]) -> Body:
+    """One mesh as a Body; `knots` are those of the blend shapes wanted, of all meshes."""
+    turn = (to_bind @ mesh.geom_bind)[:3, :3]
+    shapes = {
+        name if knot == 1 else f"{name} at {knot:g}": at_knot(mesh.shapes[name], knot) @ turn.T
+        for name in knots
+        if name in mesh.shapes
+        for knot in knots[name]
+    }
+    return Body(*mesh.in_bind(to_bind), mesh.indices, mesh.weights, shapes)
 
 
 def _ever_visible(prim: Usd.Prim) -> bool:
