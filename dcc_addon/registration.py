@@ -3,10 +3,10 @@
 
 import bpy
 
-from . import background, handlers, live_rig, live_strands, menu, operators, panels, preparing, properties
+from . import background, handlers, live_rig, live_strands, menu, operators, panels, preferences, preparing, properties
 from .session import session
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)
+CLASSES = (*properties.CLASSES, *preferences.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)
 
 
 def register() -> None:

@@ -114,7 +114,7 @@ def panel(folder: Path) -> None:
 def words(_folder: Path) -> None:
     """Every operator is found by Blender's search, and everything has a name and a tooltip."""
     import dcc_addon
-    from dcc_addon import operators, properties
+    from dcc_addon import operators, preferences, properties
 
     assert dcc_addon.bl_info["name"] == "Neuralocks"
     for cls in operators.CLASSES:
@@ -125,7 +125,7 @@ def words(_folder: Path) -> None:
         assert operator.poll(), "search hides what cannot run, and then nobody hears why"
         for prop in described.properties:
             assert prop.identifier == "rna_type" or prop.description, (cls.bl_idname, prop.identifier)
-    for cls in properties.CLASSES:
+    for cls in (*properties.CLASSES, *preferences.CLASSES):
         for prop in cls.bl_rna.properties:
             if prop.identifier in cls.__annotations__:
                 assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier

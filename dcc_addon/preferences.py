@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is saved with Blender's preferences, for all files."""
+
+import bpy
+from bpy.props import StringProperty
+
+from .operators.training import known_problem
+
+
+class Preferences(bpy.types.AddonPreferences):
+    """Where training runs: torch is too large to ship, and is not needed for anything else."""
+
+    bl_idname = __package__
+
+    python: StringProperty(
+        name="Python for training",
+        description="A Python with torch, in which Neuralocks trains (python3 -m pip install 'neuralocks[train]')",
+        subtype="FILE_PATH",
+    )
+
+    def draw(self, _context):
+        column = self.layout.column()
+        column.prop(self, "python")
+        problem = known_problem()
+        if problem is None:
+            column.label(text="Looking for what training needs", icon="TIME")
+        else:
+            column.label(text=problem or "Ready to train", icon="INFO" if problem else "CHECKMARK")
+
+
+CLASSES = (Preferences,)
