@@ -4,6 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
+from ..live import refresh
 from ..scene import particles
 from ..scene.attach import check_own
 from ..scene.binding import carrier
@@ -49,8 +50,6 @@ class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
         settings = hair.neuralocks_hair
         for name in ("bend", "weight", "damping", "clumping", "motion"):
             settings.property_unset(name)
-        from ..live import refresh
-
         refresh(context.scene)
 
 

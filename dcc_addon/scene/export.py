@@ -10,20 +10,20 @@ from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from . import body as body_reader
 from . import curves
-from .carried import bodies_of, hairs_of
+from .carried import bodies_of
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """What strands of a type are in USD, where they are more than straight lines."""
 
 
-def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str]:
-    """Write the armature's motion, its body and its hair at rest.
+def write_shot(path: Path, armature, scene, sampled, hairs) -> dict[str, str]:
+    """Write the armature's motion, its body and hair at rest.
 
     Args:
         path: the USD file.
         armature, scene: what to write.
         sampled: its `SampledRig`.
-        hairs: hair objects to write; all that the armature carries if left out.
+        hairs: hair objects to write, which it carries.
 
     Returns:
         prim path of each hair object, by name.
@@ -35,14 +35,13 @@ def write_shot(path: str, armature, scene, sampled, hairs=None) -> dict[str, str
 
     motion, rig = sampled.motion, sampled.rig
     bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
-    hairs = hairs_of(armature, scene) if hairs is None else hairs
     labels = names.unique([f"Hair_{h.name}" for h in hairs])
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
             rest[joint] = np.linalg.inv(bind[parent]) @ bind[joint]
     write_scene(
-        Path(path),
+        path,
         SceneArrays(
             metres_per_unit=motion.metres_per_unit,
             rate=motion.rate,
