@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
 
+from typing import NamedTuple
+
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
@@ -10,6 +12,20 @@ from .scene import rotations
 from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
+
+
+class Bound(NamedTuple):
+    """A rig model bound to an armature.
+
+    Attributes:
+        bones: the hair bones.
+        modes: by bone, the rotation mode in which it is turned.
+        file: the model file, and a stamp that changes when it is replaced.
+    """
+
+    bones: LiveBones
+    modes: dict[str, str]
+    file: tuple
 
 
 def live_armatures(scene) -> list:
@@ -31,14 +47,14 @@ def _update(armature, scene, graph, moved) -> None:
     if sampled is None:
         session.wanting = True
         raise NeuralocksError(f"{armature.name_full}: its motion is not sampled yet; press Sample Motion")
-    bones = bind(armature, sampled)
+    bones, modes, _ = bind(armature, sampled)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
     turns = bones.turns([shown_frame(scene) / sampled.motion.rate], settings.rig_motion, joints[None])[0]
     if not settings.rig_kept:
         settings.rig_kept = rotations.kept(armature, bones.bones)
     own = armature.pose.bones
-    changed = [rotations.turn(own[name], bones.modes[name], turn) for name, turn in zip(bones.bones, turns.tolist())]
+    changed = [rotations.turn(own[name], modes[name], turn) for name, turn in zip(bones.bones, turns.tolist())]
     if any(changed):  # a tag is an update, which calls here again: it must end when nothing changes any more
         if graph.mode == "RENDER":
             # What is tagged is copied for the render as it is in the viewport, at another frame: it is animated again.
@@ -48,20 +64,18 @@ def _update(armature, scene, graph, moved) -> None:
     session.messages.pop(armature.name_full, None)
 
 
-def bind(armature, sampled) -> LiveBones:
+def bind(armature, sampled) -> Bound:
     """The rig model bound to this armature, once."""
-    bones, settings = session.chains.get(armature.name_full), armature.neuralocks_character
-    path = model_path(armature, "rig")
+    bound, path = session.chains.get(armature.name_full), model_path(armature, "rig")
     file = path, stamp(path)
-    if bones is None or bones.file != file:
-        model = RigModel.load(path)
-        bones = session.chains[armature.name_full] = LiveBones.of(
-            model, sampled.rig, sampled.character, settings.chains
-        )
-        bones.modes, bones.file = rotations.free_modes(armature, bones.bones), file
-    rotations.check_free(armature, bones.bones)
-    bones.follow(sampled.character, sampled.clip)
-    return bones
+    if bound is None or bound.file != file:
+        patterns = armature.neuralocks_character.chains
+        bones = LiveBones.of(RigModel.load(path), sampled.rig, sampled.character, patterns)
+        bound = Bound(bones, rotations.free_modes(armature, bones.bones), file)
+        session.chains[armature.name_full] = bound
+    rotations.check_free(armature, bound.bones.bones)
+    bound.bones.follow(sampled.character, sampled.clip)
+    return bound
 
 
 def rest(armature) -> None:

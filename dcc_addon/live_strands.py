@@ -2,6 +2,7 @@
 """Live strands: the points of one hair object for the frame that is shown, a function of the scene as it is now."""
 
 import zlib
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -27,6 +28,23 @@ from .services.motion import TOLERANCE
 from .session import session
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
+
+
+class Prepared(NamedTuple):
+    """A hair object bound to its model.
+
+    Attributes:
+        hair: what gives its points.
+        made_of: tells that it must be made again; first the checksum of `rest`.
+        rest: points (P, 3) of the groom in the object's space.
+        of, file: tell quickly that the object has other curves (`_which`), or that the model file was replaced.
+    """
+
+    hair: LiveHair
+    made_of: tuple
+    rest: np.ndarray
+    of: tuple
+    file: tuple
 
 
 def live_hairs(scene) -> list:
@@ -84,7 +102,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
     if prepared is None:
         show_rest(hair)
         return
-    points = prepared.points(*wanted)
+    points = prepared.hair.points(*wanted)
     curves.keep_rest(hair.data)
     mute_deformers(hair)
     edited.write(hair, points, place, prepared.rest)
@@ -105,7 +123,7 @@ def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:
     return any(np.abs(at - places[name][row]).max() > TOLERANCE for name, at in now.items() if name in places)
 
 
-def prepare(hair, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
+def prepare(hair, sampled, wanted: tuple, wait: bool) -> Prepared | None:
     """The hair bound to its model, prepared once; again where an undo or an edit has changed what it was prepared from.
 
     Args:
@@ -126,17 +144,17 @@ def prepare(hair, sampled, wanted: tuple, wait: bool) -> LiveHair | None:
     path = model_path(hair)
     if prepared is not None and prepared.file != (path, stamp(path)):
         session.doubtful.add(name)
-    if prepared is None or name in session.doubtful or prepared.character is not sampled.character:
+    if prepared is None or name in session.doubtful or prepared.hair.character is not sampled.character:
         made_of, make = _recipe(hair, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
             session.forget(name)
             if not wait:
                 preparing.start(name, make, _arrived)
                 return None
-            prepared = session.hairs[name] = make(lambda done, total: None)
-        prepared.of = _which(hair)
+            prepared = make(lambda done, total: None)
+        prepared = session.hairs[name] = prepared._replace(of=_which(hair))
         session.doubtful.discard(name)
-    prepared.follow(sampled.clip)
+    prepared.hair.follow(sampled.clip)
     return prepared
 
 
@@ -179,13 +197,12 @@ def _recipe(hair, sampled, wanted: tuple):
     file = path, stamp(path)
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(sampled.character)
 
-    def make(say) -> LiveHair:
+    def make(say) -> Prepared:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
-        prepared = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
-        prepared.made_of, prepared.rest, prepared.of, prepared.file = made_of, own, of, file
-        prepared.follow(sampled.clip)
-        prepared.points(*wanted)
-        return prepared
+        live = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
+        live.follow(sampled.clip)
+        live.points(*wanted)
+        return Prepared(live, made_of, own, of, file)
 
     return made_of, make
 

@@ -112,7 +112,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         row.use_property_split = False
         row.prop(own, "live", toggle=True, icon="PAUSE" if own.live else "PLAY")
         if hair.name_full in session.preparing:
-            done = session.preparing[hair.name_full].done
+            done = session.preparing[hair.name_full][0].done
             progress(layout, done, f"Preparing the hair {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
         if off := off_meanwhile(hair):

@@ -19,8 +19,7 @@ def start(name: str, make, then) -> None:
         make: called with a progress callback, gives the prepared hair; calls nothing of Blender.
         then: called with the name when the hair is in the session.
     """
-    job = session.preparing[name] = Threaded(make, leave=True).start()
-    job.then = then
+    session.preparing[name] = Threaded(make, leave=True).start(), then
     if not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=LOOK)
 
@@ -34,13 +33,14 @@ def stop() -> None:
 
 def look() -> float | None:
     """Take over what is ready; the time until the next look, None when nothing is being prepared any more."""
-    for name, job in list(session.preparing.items()):
-        if job.running or session.preparing.get(name) is not job:  # showing one may have stopped or begun others
+    for name, entry in list(session.preparing.items()):
+        job, then = entry
+        if job.running or session.preparing.get(name) is not entry:  # showing one may have stopped or begun others
             continue
         del session.preparing[name]
         try:
             session.hairs[name] = job.result()
-            job.then(name)
+            then(name)
         except Exception as error:
             session.tell(name, error)
     redraw()

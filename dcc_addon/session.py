@@ -4,9 +4,13 @@
 Blender objects are looked up by name each time: a pointer kept over an undo or a file load is invalid.
 """
 
+from __future__ import annotations
+
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +20,17 @@ from neuralocks_core.motion import Clip
 
 from .services.motion import Motion
 from .services.rig import RigArrays
-from .services.threaded import Threaded
+
+if TYPE_CHECKING:
+    from neuralocks_core.runtime import StrandModel
+
+    from .edited import Followed, Written
+    from .joined import Stood
+    from .live_rig import Bound
+    from .live_strands import Prepared
+    from .scene.armature import PoseReader
+    from .scene.save_as import Remade
+    from .services.threaded import Threaded
 
 
 @dataclass(eq=False)
@@ -67,19 +81,19 @@ class Session:
     """Sampled rigs and prepared hair, by object name; messages for the panel."""
 
     rigs: dict[str, SampledRig] = field(default_factory=dict)
-    hairs: dict[str, object] = field(default_factory=dict)
-    written: dict[str, object] = field(default_factory=dict)
+    hairs: dict[str, Prepared] = field(default_factory=dict)
+    written: dict[str, Written] = field(default_factory=dict)
     """What the live view wrote to each hair object last; see `edited`."""
-    followed: list = field(default_factory=list)
+    followed: list[Followed] = field(default_factory=list)
     """What was done to the points of live hair; see `edited`."""
-    stood: dict[object, object] = field(default_factory=dict)
+    stood: dict[object, Stood] = field(default_factory=dict)
     """How live hair objects stood then, by identity, those that are gone too; see `joined`."""
-    preparing: dict[str, Threaded] = field(default_factory=dict)
-    """Hair objects that a thread is preparing."""
-    readers: dict[str, object] = field(default_factory=dict)
-    chains: dict[str, object] = field(default_factory=dict)
-    models: dict[str, tuple] = field(default_factory=dict)
-    weights: dict[str, tuple] = field(default_factory=dict)
+    preparing: dict[str, tuple[Threaded, Callable[[str], None]]] = field(default_factory=dict)
+    """Hair objects that a thread is preparing, with what is called with the name when that is done."""
+    readers: dict[str, PoseReader] = field(default_factory=dict)
+    chains: dict[str, Bound] = field(default_factory=dict)
+    models: dict[str, tuple[tuple, StrandModel]] = field(default_factory=dict)
+    weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     messages: dict[str, str] = field(default_factory=dict)
     trained: tuple[str, bool] | None = None
@@ -102,7 +116,7 @@ class Session:
     """How often animation was edited: what was sampled meanwhile is out of date."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since somebody last saw to it."""
-    remade: object = None
+    remade: Remade | None = None
     """Paths that were written anew for the save that goes on; see `scene.save_as`."""
     doubtful: set[str] = field(default_factory=set)
     """Prepared hair whose groom or choices may have changed."""
@@ -158,9 +172,8 @@ class Session:
 
     def stop_preparing(self, name: str) -> None:
         """Cancel the thread that prepares a hair object, if there is one."""
-        job = self.preparing.pop(name, None)
-        if job is not None:
-            job.cancel()
+        if name in self.preparing:
+            self.preparing.pop(name)[0].cancel()
 
     def stop_preparing_all(self) -> None:
         """Cancel every thread that prepares hair."""

@@ -64,7 +64,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
             with actions.without(armature):
                 sampled = yield from sampling(context, armature)
                 armature = named(name)
-                bones = bind(armature, sampled)
+                bones = bind(armature, sampled).bones
                 actions.check_mode_left(armature, bones.bones)
         finally:  # whatever keeps the new keys from being made leaves earlier ones, and Live, as they were
             refresh(scene)

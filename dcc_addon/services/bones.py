@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair bones: which they are, and how they turn at any time."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,16 +53,12 @@ class LiveBones:
         bones: names of the hair bones, (N), as in Blender.
         joints: their places in the skeleton, (N,).
         chains: this rig's, which have every joint of the model's.
-        modes: by bone, the rotation mode in which it is turned.
-        file: whatever tells its maker that the model file was replaced.
     """
 
     model: RigModel
     bones: tuple[str, ...]
     joints: np.ndarray
     chains: HairChains
-    modes: dict[str, str] = field(default_factory=dict)
-    file: object = None
 
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":

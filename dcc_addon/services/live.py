@@ -24,17 +24,7 @@ class LiveHair:
         character: whose head carries them.
         model: the network.
         say: told the share that is done; what it raises ends the work.
-
-    Attributes:
-        made_of: whatever tells its maker that it must be made again.
-        rest: whatever its maker made the groom's points of.
-        of, file: whatever tells its maker quickly that it is of other curves, or of a model file that was replaced.
     """
-
-    made_of: object = None
-    rest: object = None
-    of: object = None
-    file: object = None
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model

@@ -19,10 +19,7 @@ class Threaded:
 
     Attributes:
         done: share that is done, from 0 to 1.
-        then: what its maker does with the result.
     """
-
-    then = None
 
     def __init__(self, function, title: str = "Baking the hair", leave: bool = False):
         self._function, self._title, self._leave = function, title, leave
