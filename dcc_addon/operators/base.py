@@ -15,8 +15,10 @@ from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
 from ..session import session
 
-SLICE = 0.1
-"""Longest time between two chances to cancel [s]."""
+SLICE = 0.06
+"""Time after which there is a chance to cancel [s]."""
+SAMPLED = 0.1
+"""The same while frames are stepped [s]: to the artist's frame and back takes two frames more each time."""
 
 _running: list["Stepwise"] = []
 """The operator at work over several slices, one at most."""
@@ -148,7 +150,7 @@ def sampling(context, armature, share: float = 1.0):
     can do anything meanwhile; returns its `SampledRig`.
     """
     name = armature.name_full
-    for done, total in in_slices(context, armature, SLICE if _running else math.inf):
+    for done, total in in_slices(context, armature, SAMPLED if _running else math.inf):
         yield share * done, total, f"Sampling the motion of {name}"
     return session.rigs[name]
 

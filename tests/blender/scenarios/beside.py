@@ -123,7 +123,7 @@ def _in_a_window(strands, shown, groomed) -> None:
     assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
 
 
-@patch.multiple("dcc_addon.operators.base", SLICE=0.0, _running=["as in a window"])
+@patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
 def loaded_meanwhile(folder: Path) -> None:
     """Another file is opened while a bake samples, or Blender ends a bake that the panel shows: live goes on."""
     from types import SimpleNamespace

@@ -137,7 +137,7 @@ def export_cancelled(folder: Path) -> None:
     assert not out.parent.exists()
 
 
-@patch.multiple("dcc_addon.operators.base", SLICE=0.0, _running=["as in a window"])
+@patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
 def keyed_anew(folder: Path) -> None:
     """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
     not takes its place, and finds the bones as they were before the first.

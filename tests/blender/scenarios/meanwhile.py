@@ -42,7 +42,7 @@ def touched_meanwhile(folder: Path) -> None:
     refused(lambda: bake(filepath=str(folder / "gone.usdc")), "deleted or renamed")
 
 
-@patch("dcc_addon.operators.base.SLICE", 0.0)
+@patch("dcc_addon.operators.base.SAMPLED", 0.0)
 def disabled_meanwhile(folder: Path) -> None:
     """The add-on is disabled while a bake is at work: it ends, and enabled anew all works."""
     import dcc_addon
@@ -63,7 +63,7 @@ def disabled_meanwhile(folder: Path) -> None:
     assert apart(points_at(strands, 9), points_at(strands, 14)) > 1e-3 and not messages(), messages()
 
 
-@patch("dcc_addon.operators.base.SLICE", 0.0)
+@patch("dcc_addon.operators.base.SAMPLED", 0.0)
 def edited_meanwhile(folder: Path) -> None:
     """While a bake samples, the artist's frame is shown, a slider is followed at once, and a bone without keys that is turned
     stays so; the motion is out of date afterwards. Frames are those of the scene that it began in, whichever is shown by
