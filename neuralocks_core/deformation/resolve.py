@@ -66,6 +66,18 @@ class Resolver:
             return None
         return Collider(self.body.posed(self.character.skinning(joints), shape), self.body.triangles)
 
+    def rough_distance(self, points: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Signed distance (N,) [m] of points (N, 3) to the body in a pose, as hair is resolved by: within about a millimetre
+        near the skin, infinite where it is not near and deeper than a few centimetres in skin that moves.
+
+        Args:
+            points: canonical [m].
+            joints: world joint transforms (J, 4, 4).
+            shape: blend shape weights (B,).
+        """
+        points = np.asarray(points, np.float32)
+        return self._posed(joints, shape, points.min(axis=0), points.max(axis=0)).distance(points)[0]
+
     def prepare(self) -> None:
         """Make now, once for all frames, what the first one would have to wait for."""
         if self.body is not None:

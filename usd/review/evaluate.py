@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks evaluate`: the report card of a bake."""
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
@@ -29,10 +30,10 @@ from .baked import Baked, read_baked
 STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
 REFERENCE_STRANDS = 200
-COLLISION_FRAMES = 32
-"""Frames in which distances to the body are measured, evenly over the bake."""
-COLLISION_VERTICES = 200_000
-"""Most own vertices whose distances are measured, evenly along the strands."""
+COLLISION_FRAMES, DEEPEST_FRAMES = 32, 6
+"""Frames in which distances to the body are measured: so many evenly over the bake, and those in which hair seems deepest."""
+COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
+"""Most own vertices whose distances are measured, evenly along the strands, and most places of them in all frames."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
 
@@ -102,9 +103,8 @@ class _Subject:
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
         self.moved = np.zeros((total, count, K, 3), np.float32)
-        self.collision_frames = np.unique(np.linspace(0, total - 1, min(total, COLLISION_FRAMES)).round().astype(int))
         self.own_rest = rest[self._own]
-        self.own = np.zeros((len(self.collision_frames), len(self._own), 3), np.float32)
+        self.own = np.zeros((total, len(self._own), 3), np.float32)
         sums, taut = [], []
         edges_at_rest = self._edge_lengths(rest)
         for frame, code in enumerate(baked.codes):
@@ -113,9 +113,7 @@ class _Subject:
             taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
             self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
-            where = np.flatnonzero(self.collision_frames == frame)
-            if len(where):
-                self.own[where[0]] = points[self._own]
+            self.own[frame] = points[self._own]
             say(frame + 1, total, f"reading {item.path}")
         self.stretch = {
             key: float(max(s[key] for s in sums) if key.endswith("max") else np.mean([s[key] for s in sums]))
@@ -141,7 +139,8 @@ class _Subject:
             own.append(start + np.flatnonzero(free))
             edges.append(np.arange(start, start + count - 1))
         movable = np.concatenate(own) if own else np.zeros(0, int)
-        self._own = movable[np.linspace(0, len(movable) - 1, min(len(movable), COLLISION_VERTICES)).round().astype(int)]
+        most = min(len(movable), COLLISION_VERTICES, COLLISION_POINTS // max(len(self.baked.codes), 1))
+        self._own = movable[np.linspace(0, len(movable) - 1, most).round().astype(int)]
         self._edges = np.concatenate(edges) if edges else np.zeros(0, int)
 
     def _edge_lengths(self, points: np.ndarray) -> np.ndarray:
@@ -175,19 +174,31 @@ class _Subject:
         if resolver.at_rest is None or not len(self._own):
             return {}
         rig, baked = self.item.attachment.rig, self.baked
-        frames, distance = self.collision_frames, []
-        joints = [rig.joints_at(baked.codes[frame]) for frame in frames]
-        shapes = rig.clip.shape_at(baked.times[frames])
+        at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
+        every = np.arange(len(baked.codes))
+        joints, shapes = [rig.joints_at(code) for code in baked.codes], rig.clip.shape_at(baked.times)
 
-        def measured(points, joints, shape) -> np.ndarray:
-            return resolver.collider(joints, shape).distance(points, limit=0.005)[0]
+        def roughly(frame: int) -> float:
+            distance = resolver.rough_distance(self.own[frame], joints[frame], shapes[frame])
+            return float(np.min(distance - np.minimum(at_rest, 0)))
+
+        def measured(frame: int) -> np.ndarray:
+            return resolver.collider(joints[frame], shapes[frame]).distance(self.own[frame], limit=0.005)[0]
 
         with ThreadPoolExecutor(cores()) as pool:
-            for each in pool.map(measured, self.own, joints, shapes):
-                distance.append(each)
-                self.say(len(distance), len(frames), "measuring distances to the body")
-        at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
-        return metrics.penetration(np.stack(distance), at_rest)
+
+            def told(function, frames: np.ndarray) -> Iterator:
+                for number, each in enumerate(pool.map(function, frames)):
+                    self.say(number + 1, len(frames), "measuring distances to the body")
+                    yield each
+
+            even = every[np.linspace(0, len(every) - 1, min(len(every), COLLISION_FRAMES)).round().astype(int)]
+            deepest = np.argsort(list(told(roughly, every)), kind="stable")[:DEEPEST_FRAMES]
+            frames = np.concatenate([even, np.setdiff1d(deepest, even)])
+            distance = np.stack(list(told(measured, frames)))
+        worst = metrics.penetration(distance, at_rest)["penetration_worst_mm"]
+        shares = metrics.penetration(distance[: len(even)], at_rest)
+        return shares | {"penetration_worst_mm": worst, "penetration_frames": len(even)}
 
     def _stops(self, joints) -> dict:
         """Settling after the longest stop, and what still moves once it should be over."""
