@@ -10,6 +10,7 @@ strands lie from the bake's. The stage must be in metres, Y up, and the groom's 
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -47,17 +48,18 @@ class Runtime:
         """(T, n, 3, 3) world rotations of the joints named, since the bind pose."""
         return rotations @ np.swapaxes(self.fixed["bind"], -1, -2) @ self.fixed["facing"].T
 
-    def vector(self, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    def vector(self, places: np.ndarray, turns: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         """The boundary vector (F,) of the newest of some moments, each the model's dt before the one before it.
 
         Args:
             places: (steps + 2, 3) the head joint's, newest first [m].
             turns: (steps + 2, n, 3, 3) as `turns` gives them; head, upper chest, pose joints.
+            drawn: (n, 3, 3), the same of the pose that is drawn at the newest.
         """
         dt, bins = self.model["boundary"]["dt"], self.model["boundary"]["bins"]
         result = self.fixed["held"].copy()  # shape and material stay as they are
-        head = turns[0, 0]
-        pose = head.T @ turns[0, 2:] @ self.fixed["stance"]
+        head = drawn[0]
+        pose = head.T @ drawn[2:] @ self.fixed["stance"]
         result[slice(*self.parts["pose"])] = pose[:, :, :2].transpose(0, 2, 1).ravel()
         gravity = head.T @ GRAVITY / 9.81
         result[slice(*self.parts["gravity"])] = gravity
@@ -112,30 +114,39 @@ class Motion:
     """Joints' world transforms at any time, as a bake reads them from a stage; an engine has its own way."""
 
     def __init__(self, stage: Usd.Stage, joints: list[str]):
-        prim = next(p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton))
-        query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(prim))
-        codes = query.GetAnimQuery().GetJointTransformTimeSamples()
-        pick = [list(query.GetJointOrder()).index(joint) for joint in joints]
-        world = []
-        for code in codes:
-            place = UsdGeom.XformCache(code)
-            local = np.array(query.ComputeJointSkelTransforms(place.GetTime()))[pick]
-            world.append((local @ np.array(place.GetLocalToWorldTransform(prim))).transpose(0, 2, 1))
-        self.times, self.joints = np.array(codes) / stage.GetTimeCodesPerSecond(), np.array(world)
-        rotations = (
-            Rotation.from_matrix(self.joints[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
-        )
+        self._prim = next(p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton))
+        self._query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(self._prim))
+        self._pick = [list(self._query.GetJointOrder()).index(joint) for joint in joints]
+        codes = clip_codes(stage, self._query.GetAnimQuery().GetJointTransformTimeSamples())
+        self._times, world = np.array(codes) / stage.GetTimeCodesPerSecond(), np.stack([self.drawn(c) for c in codes])
+        rotations = Rotation.from_matrix(world[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
         for last, q in zip(rotations, rotations[1:]):
             q *= np.where((last * q).sum(-1, keepdims=True) < 0, -1, 1)
-        self._curve = CubicSpline(self.times, self.joints[:, 0, :3, 3], bc_type="natural")
-        self._turn = CubicSpline(self.times, rotations, bc_type="natural")
+        self._curve = CubicSpline(self._times, world[:, 0, :3, 3], bc_type="natural")
+        self._turn = CubicSpline(self._times, rotations, bc_type="natural")
+
+    def drawn(self, code: float) -> np.ndarray:
+        """World transforms (n, 4, 4) of the joints as USD shows them at a time code."""
+        place = UsdGeom.XformCache(code)
+        local = np.array(self._query.ComputeJointSkelTransforms(place.GetTime()))[self._pick]
+        return (local @ np.array(place.GetLocalToWorldTransform(self._prim))).transpose(0, 2, 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; before the clip straight on."""
-        inside = np.maximum(times, self.times[0])
-        places = self._curve(inside) + (times - inside)[:, None] * self._curve(self.times[0], 1)
+        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; outside of the clip straight on."""
+        inside = np.clip(times, *self._times[[0, -1]])
+        places = self._curve(inside) + (times - inside)[:, None] * self._curve(inside, 1)
         turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()
         return places, turns.reshape(len(times), -1, 3, 3)
+
+
+def clip_codes(stage: Usd.Stage, samples: list[float]) -> list[float]:
+    """Time codes at which a bake reads the motion; `clip` in the description says why. The shot is one of frames."""
+    second, start, end = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    before = [start] if samples[0] - start >= 0.1 * second - 1e-6 else []
+    after = [end] if end - samples[-1] >= 0.1 * second - 1e-6 else []
+    codes = [*before, *samples, *after]
+    gaps = [(a, b) for a, b in zip(codes, codes[1:]) if b - a > 0.0625 * second]
+    return sorted({*codes, *(float(code) for a, b in gaps for code in range(math.ceil(a), math.ceil(b)))})
 
 
 def check_even(stage: Usd.Stage, prim: str) -> None:
@@ -160,8 +171,8 @@ def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str
         for code in curves.GetPointsAttr().GetTimeSamples():
             now = code / stage.GetTimeCodesPerSecond()
             places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
-            head = motion.joints[np.abs(motion.times - now).argmin(), 0]
-            ours = runtime.strands(runtime.vector(places, runtime.turns(rotations)), head)
+            drawn = motion.drawn(code)
+            ours = runtime.strands(runtime.vector(places, *map(runtime.turns, (rotations, drawn[:, :3, :3]))), drawn[0])
             to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim()))
             theirs = np.array(curves.GetPointsAttr().Get(code)) @ to_world[:3, :3] + to_world[3, :3]
             worst = max(worst, float(np.linalg.norm(ours.reshape(-1, 3) - theirs, axis=1).max()))

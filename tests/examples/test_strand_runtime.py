@@ -41,6 +41,20 @@ def test_a_runtime_written_from_the_description_has_the_hair_of_the_bake(tmp_pat
             assert largest_difference(tmp_path / "onnx", shot, baked, {}) > 1e-4
 
 
+@pytest.mark.parametrize("wider", [2, 6])
+def test_it_has_it_too_where_the_shot_is_longer_than_its_animation_and_between_samples(tmp_path, shot, wider):
+    """Two frames beyond the samples are no stand, six are one."""
+    stage = Usd.Stage.Open(str(shot))
+    stage.SetStartTimeCode(1 - wider)
+    stage.SetEndTimeCode(40 + wider)
+    stage.Save()
+    model = model_file.shipped("strands")
+    export_model(model, tmp_path / "onnx", shot)
+    codes = [1 - wider, 1, 2.5, 5, 38.3, 40, 41, 40 + wider]
+    bake(shot, tmp_path / "hair.usdc", model, frames=codes, resolve=False)
+    assert largest_difference(tmp_path / "onnx", shot, tmp_path / "hair.usdc", {}) < 1e-5
+
+
 def test_every_array_of_a_groom_is_described(tmp_path, shot):
     export_model(model_file.shipped("strands"), tmp_path, shot)
     described = json.loads((tmp_path / "description.json").read_text())["grooms"]

@@ -9,6 +9,9 @@ from neuralocks_core.materials import Material
 from neuralocks_core.measures import MEASURES
 from neuralocks_core.runtime import graph_session
 
+from ..border.units import FASTEST, SLOWEST
+from ..skel.clip_codes import CLOSE, SAME, STAND
+
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
 GRAPHS = {
@@ -30,8 +33,18 @@ _HISTORY = (
     "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
     "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
     "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
-    "its `bin weights`. In a held pose all is 0. A bake reads poses between samples from a natural cubic spline of the place "
-    "and of the quaternion's components; before the first sample the head goes on in a straight line and does not turn"
+    "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
+    "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the pose that "
+    "is drawn. Before the first sample and after the last one the head goes on in a straight line, with its velocity there, and "
+    "does not turn"
+)
+_CLIP = (
+    "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
+    f"shot's range adds its start where that lies {STAND:g} s or more before the first of them, and its end where that lies so "
+    "long after the last: the character stands meanwhile. Where the range is less than that wider, it adds nothing. Between two "
+    f"samples farther apart than {CLOSE:g} s each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
+    f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second, a framesPerSecond-th of a second, counted "
+    f"from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts"
 )
 _SPACES = "(3, 3) without scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
 
@@ -42,6 +55,7 @@ STRAND_INPUT = {
     "shape": "ten lengths of the bind body [m], as in `held`",
     "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; 0, since clumping is no input",
     "history": _HISTORY,
+    "clip": _CLIP,
 }
 """How each part of the boundary vector is made, for a model whose `linear` is "gravity", as those shipped."""
 
@@ -53,6 +67,7 @@ RIG_INPUT = {
     "pose": "for neck and upper chest: column 0, then column 1, of T(R_head) R_j",
     "gravity": STRAND_INPUT["gravity"],
     "history": _HISTORY + ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained",
+    "clip": _CLIP,
     "turns": "in the axes that each joint has in the model's rig: B, its row of `chains.axes`, is its world rotation in the bind "
     "pose that faces +Z. With J your joint's own there, D = T(J) B, the turn (w, v) becomes (w, det(D) D v)",
 }

@@ -12,20 +12,15 @@ from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import LARGEST_CLIP, LOOP_GAP, Clip
+from neuralocks_core.motion import LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, transformed
 
 from ..border.units import Border
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
+from .clip_codes import clip_codes
 from .joints import JointSource
 from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
-
-CLOSE = 1.5 / 24
-"""Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
-SAME = 1e-4
-"""Samples nearer to each other, in frames, are one: layer offsets and other programs' clocks part what was keyed together,
-and over so little time a rounding error of a pose is a blow."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +152,7 @@ def read_rig(
     """
     source = JointSource(prim)
     notes = source.notes
-    time_codes = _time_codes(source, border)
+    time_codes = clip_codes(source, border)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
@@ -203,36 +198,6 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     """Skeleton prims in stage order."""
     every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
     return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
-
-
-def _time_codes(source: JointSource, border: Border) -> np.ndarray:
-    """Where the animation is read (T,): at its samples, and at every frame in gaps wider than CLOSE."""
-    frame = border.frame
-    samples = source.samples
-    if not samples:
-        return np.zeros(1)
-    first, last = samples[0], samples[-1]
-    stage = source.prim.GetStage()
-    if stage.HasAuthoredTimeCodeRange():
-        # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
-        start, end = min(stage.GetStartTimeCode(), first), max(stage.GetEndTimeCode(), last)
-        if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
-            samples = [start, *samples, end]
-            first, last = start, end
-    count = (last - first) / frame + len(samples)
-    if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
-        raise NeuralocksError(
-            f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
-            "remove stray keys, or samples and joints that the shot does not need"
-        )
-    begin = np.ceil(first) if frame == 1 else first
-    frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
-    samples = np.unique(samples)
-    # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
-    near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
-    wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
-    codes = np.unique(np.concatenate([frames[wide], samples]))
-    return codes[np.diff(codes, append=np.inf) > SAME * frame]  # of a step's two samples the one after it
 
 
 def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:

@@ -12,6 +12,7 @@ from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
 from usd.models.export import export_model
+from usd.skel.clip_codes import CLOSE, STAND
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,7 @@ def test_the_parts_of_the_input_are_those_of_the_graph(tmp_path, kind, graph, en
         described[entry]["length"],
     ]
     (shape,) = described["graphs"][graph]["inputs"].values()
+    assert all(word in described[entry]["how"]["clip"] for word in ("range", f"{STAND:g} s", f"{CLOSE:g} s"))
     assert shape[1] == described[entry]["length"] and parts.keys() <= described[entry]["how"].keys()
 
 

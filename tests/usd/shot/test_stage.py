@@ -113,18 +113,6 @@ def test_samples_a_rounding_error_apart_are_one(tmp_path, off):
     np.testing.assert_allclose(vectors[1], vectors[0], atol=0.02 * np.abs(vectors[0]).max())
 
 
-def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before_it(tmp_path):
-    """Animation with a run-up, whose exporter left out the samples after the character stopped."""
-    path = write_shot(tmp_path, Recipe(frames=9))
-    stage = Usd.Stage.Open(str(path))
-    stage.SetStartTimeCode(4)
-    stage.SetEndTimeCode(30)
-    stage.GetRootLayer().Save()
-    rig = read_shot(path).rigs[0]
-    assert (rig.time_codes[0], rig.time_codes[-1]) == (1, 30)
-    np.testing.assert_array_equal(rig.clip.joints[-1], rig.joints_at(9))
-
-
 def test_rigs_are_read_without_grooms_or_animation(tmp_path):
     path = write_shot(tmp_path, Recipe(frames=0))
     assert len(read_rigs(path)[0].clip.times) == 1
