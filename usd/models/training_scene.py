@@ -25,6 +25,7 @@ from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.lacking import nothing_found
 from ..shot.notes import first_of, unfound, unlikely_head
+from ..shot.rig_controls import is_closed
 from ..shot.stage import StageRig, read_rigs
 from ..shot.unnamed_head import read_each_rig
 from ..skel.source import find_skeletons
@@ -84,8 +85,9 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
+    prims = [prim for prim in prims if not is_closed(prim)] or prims
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
-    # Beside hair, the grass of a set is none.
+    # Beside hair, the grass of a set is none, as controls of the rig are none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
     found = [_strands(groom_between(prim, a.to_bind, notes, drawn=a.drawn)[0], a.character) for prim, a in near]
     if not any(strands.valid.any() for strands in found):

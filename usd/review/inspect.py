@@ -30,7 +30,6 @@ from ..shot.lacking import no_groom
 from ..shot.notes import (
     another_head,
     composition_notes,
-    few,
     groom_notes,
     layer_notes,
     left_out,
@@ -171,7 +170,7 @@ def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops
             grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))
-    (spoils if grooms else stops).extend(few(search.far))
+    (spoils if grooms else stops).extend(search.no_hair)
     return grooms
 
 

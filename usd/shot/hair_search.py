@@ -12,6 +12,7 @@ from .attach import Attachment, attach, of_another
 from .character_notes import untrained
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
+from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 
 
 class HairSearch:
@@ -25,8 +26,6 @@ class HairSearch:
         others: skeletons whose hair is not wanted.
 
     Attributes:
-        far: why curves were too far from every head to be hair, one line each. A note where other hair was found, the
-            error where none was.
         rigs: as given.
         carriers: skeletons that carry what was found.
     """
@@ -42,11 +41,20 @@ class HairSearch:
     ):
         self.rigs, self._head, self._notes = rigs, head, notes
         self._named, self._others = named, list(others)
-        self.far: list[str] = []
+        self._far: list[str] = []
+        self._controls: list[str] = []
         self.carriers: list[StageRig] = []
 
+    @property
+    def no_hair(self) -> list[str]:
+        """Why curves are not taken for hair: notes where other hair was found, the error where none was."""
+        return few(self._far) + controls_left_out(self._controls)
+
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
-        """The curves that have points, with a note on the others."""
+        """The curves that have points, with a note on the others, and are not closed."""
+        closed = [] if self._named else [prim for prim in curves if is_closed(prim)]
+        self._controls += [str(prim.GetPath()) for prim in closed]
+        curves = [prim for prim in curves if prim not in closed]
         empty = [] if self._named else without_points(curves)
         self._notes += few([no_points(str(prim.GetPath())) for prim in empty])
         return [prim for prim in curves if prim not in empty]
@@ -61,12 +69,17 @@ class HairSearch:
         if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
             self._notes.append(another_carries(path, other))
             return None
+        if not self._named and is_lone_guide(prim, self.rigs, placement):
+            self._controls.append(path)
+            return None
         found = attach(prim, self.rigs, placement, self._head, self._notes)
         if found.far and not self._named:
-            self.far.append(too_far(prim, found))
+            self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
-        self._notes += left_as_they_are(prim) + untrained(replace(found.rig, character=found.character))
+        self._notes += (
+            moved_as_open(prim) + left_as_they_are(prim) + untrained(replace(found.rig, character=found.character))
+        )
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

@@ -25,7 +25,6 @@ from .hair_search import HairSearch
 from .lacking import no_groom, nothing_found
 from .notes import (
     composition_notes,
-    few,
     groom_notes,
     layer_notes,
     left_out,
@@ -127,9 +126,9 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     found = _grooms(search, curves, notes)
     if not found:
         raise NeuralocksError(
-            search.far[0] if search.far else f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
+            (*search.no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
         )
-    notes += few(search.far)
+    notes += search.no_hair
     if not grooms:
         found = _moving(found, notes)
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Curves that are drawn for animators to pull at, as rigs are exported with, and no hair."""
+
+from collections.abc import Sequence
+
+from pxr import Usd, UsdGeom
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from ..skel.surface import bound_skeleton
+from .curves import rest_counts
+from .seat import NEAR, find_seat
+
+
+def is_closed(prim: Usd.Prim) -> bool:
+    """Whether curves go round, as no hair does."""
+    return UsdGeom.BasisCurves(prim).GetWrapAttr().Get() == UsdGeom.Tokens.periodic
+
+
+def is_lone_guide(prim: Usd.Prim, rigs: Sequence[StageRig], placement: Placement) -> bool:
+    """Whether a prim is one curve of purpose guide that nothing binds and that begins on no skin. What begins on skin may be
+    one of a groom's guides, of which some tools make a prim each.
+    """
+    if UsdGeom.Imageable(prim).ComputePurpose() != UsdGeom.Tokens.guide or len(rest_counts(prim)) != 1:
+        return False
+    bound = bound_skeleton(prim)
+    return all(rig.path != bound and find_seat(prim, rig, placement, NEAR) is None for rig in rigs)
+
+
+def controls_left_out(paths: list[str]) -> list[str]:
+    """The line on curves that are taken for controls."""
+    if not paths:
+        return []
+    others = f" and {len(paths) - 1} more prims" if paths[1:] else ""
+    return [
+        f"{paths[0]}{others}: closed curves, and a single one of purpose guide on no skin, are taken for a rig's controls, not "
+        "for hair; if it is hair, name it with --groom"
+    ]
+
+
+def moved_as_open(prim: Usd.Prim) -> list[str]:
+    """The note on closed curves that the user named."""
+    if not is_closed(prim):
+        return []
+    return [
+        f"{prim.GetPath()}: its curves are closed (wrap periodic) and are moved as hair that begins at the first point of each; "
+        "set the wrap to pinned if they are hair"
+    ]
