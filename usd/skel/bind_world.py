@@ -12,6 +12,9 @@ from neuralocks_core.rotation import sizes
 from ..border.units import Border
 from .joints import JointSource
 
+LEAST = 1e-6
+"""Less than this times its size in the bind pose is no size."""
+
 
 def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humanoid: Humanoid) -> np.ndarray:
     """Authored bind space to bind world [m], (4, 4).
@@ -28,7 +31,7 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
         humanoid: which of them is the head.
 
     Raises:
-        NeuralocksError: the character is mirrored.
+        NeuralocksError: the character is mirrored, or its head has no size.
     """
     placed = source.placement.reference[:3, :3]
     if np.linalg.det(placed) < 0:
@@ -42,6 +45,8 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
             f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
             "apply or remove the negative scale"
         )
+    if np.median(shown) < LEAST:
+        raise NeuralocksError(_flat(source, posed[np.abs(sizes(posed[:, head])).argmin()], head))
     ratio = np.median(shown) / sizes(placed)
     if abs(ratio - 1) < 1e-4:
         ratio = 1.0
@@ -49,3 +54,16 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
     result = np.eye(4)
     result[:3, :3] = standing(placed, source.bind[:, :3, 3], humanoid, up) * ratio
     return border.to_core @ result
+
+
+def _flat(source: JointSource, posed: np.ndarray, head: int) -> str:
+    """What gives the head no size in a pose (J, 4, 4): the uppermost joint that has none, and its scale."""
+    size, joint = sizes(posed @ np.linalg.inv(source.bind)), head
+    while (above := source.parents[joint]) >= 0 and size[above] < LEAST:
+        joint = above
+    parent = posed[above] if above >= 0 else np.eye(4)
+    scale = np.linalg.norm(np.linalg.solve(parent, posed[joint])[:3, :3], axis=0)
+    return (
+        f"{source.path}: joint '{source.names[joint]}' is scaled to {' x '.join(f'{each:.2g}' for each in scale)} in most of its "
+        "animation, so that nothing is left of its head; leave it at 1, and hide meshes instead"
+    )

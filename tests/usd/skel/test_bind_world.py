@@ -5,13 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pxr import Gf, Usd, UsdSkel
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.anatomy.humanoid import Humanoid
+from neuralocks_core.errors import NeuralocksError
 from usd.shot.stage import read_shot
 from usd.skel.bind_world import to_bind_world
 
-from ..shots import POSITIONS, Recipe, write_shot
+from ..shots import JOINTS, POSITIONS, Recipe, write_shot
 
 STANDING = {"hips": (0, 1, 0), "head": (0, 1.7, 0.05), "left_foot": (0.1, 0.1, 0), "right_foot": (-0.1, 0.1, 0)}
 GRAZING = {"hips": (0, 1.2, -1), "head": (0, 1.0, 1)}
@@ -84,3 +86,14 @@ def test_a_shot_on_a_slope(tmp_path, recipe):
     slope = read_shot(write_shot(tmp_path, Recipe(unit=recipe.unit, up=recipe.up, place=place), "slope")).rigs[0]
     assert np.abs(slope.character.skeleton.bind[:, :3, 3] - POSITIONS).max() < 1e-6
     assert np.abs(slope.clip.joints - place @ level.clip.joints).max() < 1e-5
+
+
+@pytest.mark.parametrize("joint", ["hips/spine/neck", "hips/spine/neck/head"])
+def test_a_head_that_a_scale_of_zero_hides_all_the_while_is_told_with_the_joint(tmp_path, joint):
+    path = write_shot(tmp_path, Recipe())
+    stage = Usd.Stage.Open(str(path))
+    scales = [Gf.Vec3h(0, 0, 1) if name == joint else Gf.Vec3h(1) for name in JOINTS]
+    UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetScalesAttr().Set(scales)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match=f"^/Hero/Rig: joint '{joint}' is scaled to 0 x 0 x 1 .*leave it at 1"):
+        read_shot(path)
