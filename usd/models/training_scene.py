@@ -24,7 +24,7 @@ from ..shot.attach import attach
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.lacking import nothing_found
-from ..shot.notes import first_of, unfound, unlikely_head
+from ..shot.notes import first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
 from ..shot.stage import StageRig, read_rigs
 from ..shot.unnamed_head import read_each_rig
@@ -129,7 +129,9 @@ def read_clip(path: str, character: Character) -> Clip:
     rigs, errors = read_each_rig(stage, alike, Border.of(stage), names[character.head], all_shapes=True)
     if not rigs:
         raise errors[0]
-    moving = [rig.clip for rig in rigs if len(rig.clip.times) > 1]
+    moving = [rig for rig in rigs if len(rig.clip.times) > 1]
     if not moving:
         raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
-    return moving[0]
+    if stops := without_turn(moving[0]):
+        raise NeuralocksError(stops[0])
+    return moving[0].clip

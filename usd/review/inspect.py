@@ -97,7 +97,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
-        stops += without_turn(rig)
+        stops += without_turn(rig, read)
         spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig) + partial_body(rig, rigs)
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]

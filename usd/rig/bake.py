@@ -21,7 +21,7 @@ from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_input
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import written_notes
+from ..shot.notes import without_turn, written_notes
 from ..shot.stage import check_cuts, frame_range
 from .layer import write_rig_layer
 from .stage import RiggedHair, mirrored_notes, read_rigged_hair, rigged_notes
@@ -97,6 +97,8 @@ def bake_rig(
     hair, model, moved, size = _read(shot, skeleton, head, model, cuts, joints)
     source = hair.source.source
     check_not_input(out, hair.stage)
+    if stops := without_turn(hair.source, model.spec.pose_joints):
+        raise NeuralocksError(stops[0])
     wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
     codes = _with_samples(hair, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip

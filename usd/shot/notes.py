@@ -187,14 +187,12 @@ def another_head(rig: StageRig) -> list[str]:
     return []
 
 
-def without_turn(rig: StageRig) -> list[str]:
-    """What stops a bake of strands: joints that the network reads and that have no rotation, hidden by a scale of zero or
-    mirrored.
-    """
+def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
+    """What stops a bake: joints that the network reads and that have no rotation, hidden by a scale of zero or mirrored."""
     found: list[str] = []
     if "head" not in rig.character.humanoid:
         return found
-    for joint in dict.fromkeys(joints_read(rig.character)):
+    for joint in dict.fromkeys(joints_read(rig.character, pose_joints)):
         linear = rig.clip.joints[:, joint, :3, :3]
         flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
         for fact, bad, remedy in (

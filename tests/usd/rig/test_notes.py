@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What commands for mesh hair tell of rigs that would be baked otherwise than somebody expects."""
 
+import re
+
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdSkel, Vt
@@ -156,3 +158,24 @@ def test_hair_that_the_animation_mirrors_is_told(edited, tmp_path):
     said = "hair joint 'hair_1' is mirrored by its animation"
     assert any(said in note for note in bake_rig(shot, tmp_path / "out.usda", model).notes)
     assert any(said in note for note in inspect(shot)["spoils"])
+
+
+@pytest.mark.parametrize("dynamic", [True, False])
+def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp_path, dynamic):
+    """By a bake, and by `inspect`, which is asked before; of joints that are not read nothing is said."""
+
+    def hide(stage, joint):
+        motion = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion"))
+        names = list(motion.GetJointsAttr().Get())
+        for code in (3, 4, 5):
+            scales = [Gf.Vec3h(0 if name == names[joint] and code == 4 else 1) for name in names]
+            motion.GetScalesAttr().Set(scales, code)
+
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "whole.usda")), dynamic=dynamic)
+    path = edited(lambda stage: hide(stage, 1))
+    said = "/Who/Rig: joint 'hips/head' has zero scale at time code 4; .* 0.0001 hides"
+    with pytest.raises(NeuralocksError, match=said):
+        bake_rig(path, tmp_path / "out.usda", model)
+    assert re.search(said, "\n".join(inspect(path)["stops"]))
+    path = edited(lambda stage: hide(stage, 4))
+    assert bake_rig(path, tmp_path / "out.usda", model).samples and not inspect(path)["stops"]
