@@ -84,7 +84,7 @@ class Runtime:
         return self.tail.run([output], same | frame)[0]
 
     def strands(self, vector: np.ndarray, head: np.ndarray) -> np.ndarray:
-        """World points (S, 24, 3) [m] for a boundary vector and the head joint's world transform (4, 4)."""
+        """World points (S, 24, 3) [m] for a boundary vector and the head joint's world transform (4, 4) in the stage."""
         frame = self.made(vector)
         moved = self.answer("displacement", frame).reshape(-1, 24, 3)
         if (self.stray != 1).any():
@@ -94,6 +94,8 @@ class Runtime:
             longer = np.linalg.norm(wanted, axis=2) / np.linalg.norm(edges, axis=2).clip(1e-12)
             moved[:, 2:] = np.cumsum((wanted / longer[..., None].clip(1e-12) - edges)[:, 1:], axis=1)
         moved *= self.fixed["valid"][:, None, None]
+        head = head.copy()
+        head[:3, :3] /= self.fixed["size"]
         to_world = head @ self.fixed["canonical_to_head"]
         return (self.fixed["rest"] + moved) @ to_world[:3, :3].T + to_world[:3, 3]
 
@@ -102,6 +104,12 @@ def limited(vectors: np.ndarray, longest: float) -> np.ndarray:
     """Vectors (n, 3), those beyond a length cut to it."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors * np.minimum(1, longest / np.maximum(length, 1e-9))
+
+
+def turned(transforms: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) of transforms (..., 4, 4) that scale alike in all directions."""
+    linear = transforms[..., :3, :3]
+    return linear / np.cbrt(np.linalg.det(linear))[..., None, None]
 
 
 def joints_of(facts: dict) -> list[str]:
@@ -119,7 +127,7 @@ class Motion:
         self._pick = [list(self._query.GetJointOrder()).index(joint) for joint in joints]
         codes = clip_codes(stage, self._query.GetAnimQuery().GetJointTransformTimeSamples())
         self._times, world = np.array(codes) / stage.GetTimeCodesPerSecond(), np.stack([self.drawn(c) for c in codes])
-        rotations = Rotation.from_matrix(world[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
+        rotations = Rotation.from_matrix(turned(world).reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
         for last, q in zip(rotations, rotations[1:]):
             q *= np.where((last * q).sum(-1, keepdims=True) < 0, -1, 1)
         self._curve = CubicSpline(self._times, world[:, 0, :3, 3], bc_type="natural")
@@ -172,7 +180,7 @@ def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str
             now = code / stage.GetTimeCodesPerSecond()
             places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
             drawn = motion.drawn(code)
-            ours = runtime.strands(runtime.vector(places, *map(runtime.turns, (rotations, drawn[:, :3, :3]))), drawn[0])
+            ours = runtime.strands(runtime.vector(places, *map(runtime.turns, (rotations, turned(drawn)))), drawn[0])
             to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim()))
             theirs = np.array(curves.GetPointsAttr().Get(code)) @ to_world[:3, :3] + to_world[3, :3]
             worst = max(worst, float(np.linalg.norm(ours.reshape(-1, 3) - theirs, axis=1).max()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a clip holds of its joints as a C2 spline through its samples, and how the character goes on outside of them."""
+"""What a clip holds of its joints as a C2 spline through its samples, and what it does outside of them."""
 
 from collections.abc import Callable
 
@@ -12,8 +12,9 @@ class ClipSpline:
     """Numbers made of a clip's poses, at any time.
 
     Motion between samples has the accelerations of the motion and not those of its polyline, as a 24 fps shot needs it.
-    Outside of the clip the pose is held while the character goes on, as the head does: with its first or last velocity;
-    a loop is continued on both sides, and a character that walks in it gets ahead.
+    Before the clip the pose is held while the character comes on, as the head does, with its first velocity: hair must not
+    begin with a blow. After it all stand still, as a stage shows it. A loop is continued on both sides, and a character that
+    walks in it gets ahead.
 
     Args:
         clip: without cuts.
@@ -32,19 +33,19 @@ class ClipSpline:
         self._drift = last - first
         if len(times) == 1:
             self._spline = lambda t: numbers.repeat(len(t), axis=0)
-            self._speeds = np.zeros((2, 3))
+            self._speed = np.zeros(3)
         else:
             self._spline = CubicSpline(times, numbers, bc_type="natural")
-            self._speeds = CubicSpline(times, place(poses), bc_type="natural")(times[[0, -1]], 1)
+            self._speed = CubicSpline(times, place(poses), bc_type="natural")(times[0], 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers (n, ...) at times (n,) [s], and by how much all joints have then gone on (n, 3) [m]."""
+        """The numbers (n, ...) at times (n,) [s], and how far all joints are then from where they are in them (n, 3) [m]."""
         clip, base = self._clip, self._clip.wrapped(times)
         beyond = (times - base)[:, None]
         if clip.loop:
             moved = np.round(beyond / max(clip.end - clip.start, 1e-9)) * self._drift
         else:
-            moved = beyond * np.where(beyond < 0, *self._speeds)
+            moved = np.minimum(beyond, 0) * self._speed
         return self._spline(base), moved
 
 

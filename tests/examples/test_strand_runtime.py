@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, Vt
+from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from examples.strand_runtime import largest_difference
 from neuralocks_core import model as model_file
-from tests.usd.shots import Recipe, strand_points, write_shot
+from tests.usd.shots import HEAD, JOINTS, Recipe, strand_points, write_shot
 from usd.baking.bake import bake
 from usd.models.export import export_model
 
@@ -52,6 +52,19 @@ def test_it_has_it_too_where_the_shot_is_longer_than_its_animation_and_between_s
     export_model(model, tmp_path / "onnx", shot)
     codes = [1 - wider, 1, 2.5, 5, 38.3, 40, 41, 40 + wider]
     bake(shot, tmp_path / "hair.usdc", model, frames=codes, resolve=False)
+    assert largest_difference(tmp_path / "onnx", shot, tmp_path / "hair.usdc", {}) < 1e-5
+
+
+def test_it_has_it_too_on_a_character_that_is_shown_larger_and_whose_head_grows(tmp_path, shot):
+    stage = Usd.Stage.Open(str(shot))
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddScaleOp().Set(Gf.Vec3f(1.2))
+    scales = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetScalesAttr()
+    for code, size in ((1, 1), (20, 1.25), (40, 1.5)):
+        scales.Set([Gf.Vec3h(size if joint == HEAD else 1) for joint in range(len(JOINTS))], code)
+    stage.Save()
+    model = model_file.shipped("strands")
+    export_model(model, tmp_path / "onnx", shot)
+    bake(shot, tmp_path / "hair.usdc", model, frames="1:40:13", resolve=False)
     assert largest_difference(tmp_path / "onnx", shot, tmp_path / "hair.usdc", {}) < 1e-5
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
-from neuralocks_core.rotation import rotation_part
+from neuralocks_core.rotation import rotation_part, sizes
 from neuralocks_core.runtime import StrandModel
 
 from ..baking.placing import GroomPlacer
@@ -29,9 +29,10 @@ ARRAYS = {
     "edges": "(S, 72) float32, input of tail.onnx",
     "held": "(F,) float32, boundary vector of the bind pose, held",
     "facing": "(3, 3) float64, rotation from bind-world to canonical axes",
-    "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint: its world transform times this "
-    "takes strands to the world, metres and Y up. Of that transform the linear part is the joint's rotation times its size "
-    "since the bind pose, 1 where it has not grown, whatever the unit of the stage",
+    "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint. The joint's world transform times this "
+    "takes strands to the world: its linear part as the stage has it divided by `size`, its place in metres, both turned to Y up",
+    "size": "() float64, size (cube root of the determinant) of that linear part at which hair is as long as in `rest`: that of "
+    "the joint's bind transform, times the median over the shot of how much larger it shows the head. Hair grows as its joint does",
     "bind": "(n, 3, 3) float64, world rotations in the bind pose of the joints that `joints` names: head, upper chest, then the "
     "pose joints",
     "stance": "(p, 3, 3) float64, of the pose joints in their order",
@@ -85,14 +86,14 @@ def file_names(paths: list[str]) -> list[str]:
 
 def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], dict]:
     """ARRAYS of one groom, and the joints whose motion its boundary vector is made of."""
-    character = item.attachment.character
-    sampler = model.sampler(character, item.attachment.rig.clip)
+    character, rig = item.attachment.character, item.attachment.rig
+    sampler = model.sampler(character, rig.clip)
     strands, held = GroomPlacer(item).strands, sampler.held_bind()
     locks = Locks.of(strands)
     session, led = StrandSession(model, strands), StrandSession(model, locks.strands)
     session.anchor(held)
     led.anchor(held)
-    skeleton = character.skeleton
+    skeleton, joint = character.skeleton, character.carrying_joint
     arrays = {
         "rest": strands.rest,
         "valid": strands.valid,
@@ -101,7 +102,8 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
         "edges": rest_edges(strands.rest),
         "held": held,
         "facing": character.facing,
-        "canonical_to_head": character.inverse_bind[character.carrying_joint] @ character.canonical_to_bind,
+        "canonical_to_head": character.inverse_bind[joint] @ character.canonical_to_bind,
+        "size": np.abs(sizes(rig.to_bind @ rig.source.bind[joint])) / rig.border.metres_per_unit,
         "bind": rotation_part(skeleton.bind[sampler.joints], "bind pose"),
         "stance": sampler.stance,
         "length": strands.length.astype(np.float32),
