@@ -17,7 +17,7 @@ from neuralocks_core.progress import Progress, silent
 from ..border.damage import first_line, named
 from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
 from ..border.units import Border
-from ..shot.notes import composition_notes, out_of_place
+from ..shot.notes import FEW, composition_notes, out_of_place
 from ..shot.recorded import KEY
 from .header import relative, repeat_metadata
 from .override import deliver
@@ -43,19 +43,20 @@ class JoinResult:
 
 
 def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
-    """Write one bake out of several of the same shot, byte for byte what a bake of all their frames is.
+    """Write one bake out of several of the same shot, byte for byte what a bake of all their frames and grooms is.
 
-    Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
+    Parts may be of other frames, of other grooms, or both; those of one head that are not baked together come out the same
+    but for rounding. Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
 
     Args:
-        parts: files that `bake` or `simulate` wrote, in any order, or a lone one. Of frames that several have the first
-            file's count.
+        parts: files that `bake` or `simulate` wrote, in any order, or a lone one. Of a groom's frames that several have the
+            first file's count.
         out: `.usdc`, `.usd` or `.usda` to write.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: a part is no bake, or of another shot or with other options than the first. Nothing is left
-            under the output's name.
+        NeuralocksError: a part is no bake, or of another shot than the first, or has a groom with other options than
+            another part. Nothing is left under the output's name.
     """
     out = as_path(out, "out")
     check_layer_name(out)
@@ -65,21 +66,21 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         raise NeuralocksError("no parts: name the files that neuralocks bake wrote")
     first, say = every[0], progress or silent
     stage = open_stage(first.path)
-    for part in every:
-        part.check_alike(first)
+    for number, part in enumerate(every):
+        part.check_alike(every[:number])
         if one_file(out, part.path):
             raise NeuralocksError(f"{out}: is one of the parts; choose another name")
     check_not_input(out, stage)
     frame = Border.of(stage).frame
-    plan = {groom: _sources(groom, every) for groom in first.grooms}
+    prims = _prims(every, stage)
+    plan = {prim.path: _sources(prim.path, every) for prim in prims if any(prim.path in part.grooms for part in every)}
     total, done = sum(map(len, plan.values())), 0
     spool = Spool(out, fingerprint([part.path for part in every], {}))
     try:
         file = SampleLayer(spool.layer_path, out)
         with named(out):
             _copy_header(first.layer, file.layer, out, every)
-        # In the order in which a bake writes.
-        for prim in _below(first.layer.pseudoRoot):
+        for prim in prims:
             with named(out):
                 _copy_prim(prim, file.layer)
             if prim.path in plan:
@@ -92,7 +93,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         spool.discard()
         raise
     codes = sorted({code for sources in plan.values() for code in sources})
-    notes = composition_notes(stage, first.path) + _gaps(codes, frame, stage) + out_of_place(stage, out)
+    notes = composition_notes(stage, first.path) + _all_gaps(plan, frame, stage) + out_of_place(stage, out)
     return JoinResult(out, [str(groom) for groom in plan], codes, notes)
 
 
@@ -148,20 +149,14 @@ class _Part:
         options = {"velocities": self.samples_of(groom, "velocities"), "number of points": count}
         return self.layer.GetPrimAtPath(groom).customData[KEY] | options
 
-    def check_alike(self, other: "_Part") -> None:
-        """Refuse what is not of the same shot, grooms and options as another part."""
-        shots = [
-            [os.path.realpath(part.layer.ComputeAbsolutePath(shot)) for shot in part.layer.subLayerPaths]
-            for part in (self, other)
-        ]
-        if shots[0] != shots[1]:
-            raise NeuralocksError(f"{self.path}: is a bake of another shot than {other.path} is; join the parts of one")
-        if self.grooms != other.grooms:
+    def check_alike(self, others: list["_Part"]) -> None:
+        """Refuse what is of another shot than other parts, or has a groom of theirs with other options."""
+        if others and self._shots() != others[0]._shots():
             raise NeuralocksError(
-                f"{self.path}: its grooms are {', '.join(map(str, self.grooms))}, those of {other.path} "
-                f"{', '.join(map(str, other.grooms))}; bake the same ones"
+                f"{self.path}: is a bake of another shot than {others[0].path} is; join the parts of one"
             )
         for groom in self.grooms:
+            other = next((part for part in others if groom in part.grooms), self)
             mine, theirs = self.made(groom), other.made(groom)
             unlike = sorted(name for name in {*mine, *theirs} if mine.get(name) != theirs.get(name))
             if unlike:
@@ -169,6 +164,9 @@ class _Part:
                     f"{self.path}: {groom} was baked with other {', '.join(unlike)} than in {other.path}; "
                     "bake both with the same options"
                 )
+
+    def _shots(self) -> list[str]:
+        return [os.path.realpath(self.layer.ComputeAbsolutePath(shot)) for shot in self.layer.subLayerPaths]
 
 
 def _sources(groom: Sdf.Path, parts: list[_Part]) -> dict[float, _Part]:
@@ -226,6 +224,26 @@ def _below(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
     for child in prim.nameChildren:
         yield child
         yield from _below(child)
+
+
+def _prims(parts: list[_Part], stage: Usd.Stage) -> list[Sdf.PrimSpec]:
+    """All prims of parts in the order in which a bake writes them, that of the stage; each from the first part that has it."""
+    found: dict[Sdf.Path, Sdf.PrimSpec] = {}
+    for part in parts:
+        for prim in _below(part.layer.pseudoRoot):
+            found.setdefault(prim.path, prim)
+    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate))
+    place = {path: number for number, path in enumerate(prim.GetPath() for prim in every)}
+    return sorted(found.values(), key=lambda prim: place.get(prim.path, len(place)))
+
+
+def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd.Stage) -> list[str]:
+    """The notes on frames of the shot that no part has; of each groom where they are not the same."""
+    found = {groom: _gaps(list(sources), frame, stage) for groom, sources in plan.items()}
+    if len({tuple(sources) for sources in plan.values()}) == 1:
+        return next(iter(found.values()))
+    lines = [f"{groom}: {note}" for groom, notes in found.items() for note in notes]
+    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more grooms have such gaps"]
 
 
 def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:

@@ -67,13 +67,15 @@ def bake_command(
 
 
 def join_command(
-    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of a shot's range, in any order.")],
+    parts: Annotated[
+        list[Path], typer.Argument(help="Bakes of parts of a shot, of its frames or its grooms, in any order.")
+    ],
     out: Out,
     as_json: AsJson = False,
 ) -> None:
-    """Join the bakes of parts of a shot's range, as the machines of a farm write them, into one.
+    """Join the bakes of parts of a shot, as the machines of a farm write them, into one.
 
-    The file is the same, byte for byte, as if all frames had been baked at once.
+    The file is the same, byte for byte, as if all frames and characters had been baked at once.
     """
     from ..baking.join import join
     from .progress import progress_bar
