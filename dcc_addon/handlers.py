@@ -13,6 +13,7 @@ from .models import SETTING
 from .scene import blur
 from .scene.appended import remake
 from .scene.carried import bodies_of
+from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
 from .scene.save_as import Remade
 from .scene.together import drawn_with
@@ -21,9 +22,19 @@ from .session import session
 
 
 @persistent
+def before_frame(*_):
+    """A new frame is about to be evaluated."""
+    go_last(on_frame)
+
+
+@persistent
 def on_frame(scene, graph=None):
     """A new frame is evaluated, in the viewport or for a render."""
-    live.update(scene, graph or bpy.context.evaluated_depsgraph_get(), moved=True)
+    graph = graph or bpy.context.evaluated_depsgraph_get()
+    # What others have posed since is evaluated first. Not for a render: its engine would not be told what has changed.
+    if others_called() and graph.mode == "VIEWPORT" and not session.paused and live.carriers(scene):
+        _unseen(graph.update)
+    live.update(scene, graph, moved=True)
     _catch_up()
 
 
@@ -172,6 +183,7 @@ def _edited(thing) -> bool:
 
 
 HANDLERS = {
+    "frame_change_pre": before_frame,
     "frame_change_post": on_frame,
     "depsgraph_update_post": on_update,
     "load_post": on_load,

@@ -7,6 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .scene import rotations
 from .scene.binding import hidden
+from .scene.last_called import others_called
 from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
 from .services.motion import TOLERANCE, as_carried
@@ -35,13 +36,28 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
             same |= _live(armature, sampled)
         if same[sampled.moving(body)].all():
             return sampled.clip.joints[row]
-        if moved:
+        if moved and graph.mode == "RENDER" and others_called():
+            _tell_late(armature.name_full)
+        elif moved:
             sampled.stale = session.wanting = True
     drawn, head = to_core(sampled.motion.metres_per_unit) @ world, sampled.character.head
     drawn[head] = as_carried(drawn[head], armature.name_full)
     if row is not None:
         drawn[same] = sampled.clip.joints[row, same]
     return drawn
+
+
+def _tell_late(name: str) -> None:
+    """Say, also on the console, that the render's pose is not the sampled one: what is posed after a frame change Blender
+    evaluates over the keys of the frame in view, too late for the hair.
+    """
+    message = (
+        f"{name}: the render poses it otherwise than the view, and hair may be off; if a script poses it after each frame "
+        "change (frame_change_post), let it do so before (frame_change_pre)"
+    )
+    if session.messages.get(name) != message:
+        session.messages[name] = message
+        print(f"Neuralocks: {message}")
 
 
 def _live(armature, sampled) -> np.ndarray:

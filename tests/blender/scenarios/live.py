@@ -229,19 +229,23 @@ def rendering(folder: Path) -> None:
     scene.camera = camera
     scene.frame_start, scene.frame_end = 3, 5
     scene.render.filepath = str(folder / "r_")
-    rendered = {}
+    places, rendered = {}, {}
 
-    def look(current, graph):
+    def place(current, graph):
         if graph.mode == "RENDER":
-            values = np.empty((len(strands.data.points), 3), np.float32)
-            strands.data.attributes["position"].data.foreach_get("vector", values.ravel())
-            matrix = np.array(strands.evaluated_get(graph).matrix_world)
-            rendered[current.frame_current] = values @ matrix[:3, :3].T + matrix[:3, 3]
+            places[current.frame_current] = np.array(strands.evaluated_get(graph).matrix_world)
 
-    bpy.app.handlers.frame_change_post.append(look)  # called after the add-on's own
+    def look(current, *_):
+        values, matrix = np.empty((len(strands.data.points), 3), np.float32), places[current.frame_current]
+        strands.data.attributes["position"].data.foreach_get("vector", values.ravel())
+        rendered[current.frame_current] = values @ matrix[:3, :3].T + matrix[:3, 3]
+
+    bpy.app.handlers.frame_change_post.append(place)
+    bpy.app.handlers.render_write.append(look)  # called after all of a frame's other ones
     scene.frame_set(20)
     bpy.ops.render.render(animation=True)
-    bpy.app.handlers.frame_change_post.remove(look)
+    bpy.app.handlers.frame_change_post.remove(place)
+    bpy.app.handlers.render_write.remove(look)
     assert sorted(rendered) == [3, 4, 5]
     for f, points in rendered.items():
         assert apart(points_at(strands, f), points) < SAME

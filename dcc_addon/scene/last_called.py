@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whom Blender calls after it has evaluated a frame. Others may pose a rig then: Blender evaluates that once more, and
+calls nobody any more.
+"""
+
+import bpy
+
+
+def go_last(handler) -> None:
+    """Let this one of those that are called after a frame change be the last; not while they are being called, or one of
+    them goes without.
+    """
+    calls = bpy.app.handlers.frame_change_post
+    if handler in calls and calls[-1] != handler:
+        calls.remove(handler)
+        calls.append(handler)
+
+
+def others_called() -> bool:
+    """Whether anybody else is called after a frame change."""
+    return len(bpy.app.handlers.frame_change_post) > 1
