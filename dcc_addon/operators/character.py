@@ -9,6 +9,7 @@ from ..live import refresh
 from ..scene import armature as armature_reader
 from ..scene.attach import check_own
 from ..scene.binding import carrier
+from ..scene.body import find
 from ..scene.instances import check_real
 from ..services import rig as rig_service
 from .base import Hardened, Stepwise, sampling, shown_armature
@@ -30,25 +31,40 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
             check_real(selected if armatures else [*selected, *local])
         if not armatures:
             raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
-        armature = armatures[0]
-        if hairs and hairs[0] in selected:
-            hair = hairs[0]
-            if armature not in selected and _carrier(hair) in armatures:
-                armature = _carrier(hair)
-        else:
-            hair = next((o for o in hairs if _carrier(o) == armature), hairs[0] if hairs else None)
+        armature = _character(armatures, hairs, selected, local)
+        hair = hairs[0] if hairs and hairs[0] in selected else _hair(hairs, armature, armatures)
         settings.armature, settings.hair = armature, hair
         if hair is not None and hair.neuralocks_hair.armature is None:
             check_own(hair)
-            hair.neuralocks_hair.armature = _carrier(hair) or armature
-        return f"Character {armature.name_full}" + (
-            f", hair {hair.name_full}" if hair else ", no hair Curves in this scene"
-        )
+            hair.neuralocks_hair.armature = _carrier(hair, armature)
+        none = "no hair of its own" if hairs else "no hair Curves in this scene"
+        return f"Character {armature.name_full}, {f'hair {hair.name_full}' if hair else none}"
 
 
-def _carrier(hair):
-    """The armature that a hair object belongs to, or hangs on; None where there is none."""
-    return hair.neuralocks_hair.armature or carrier(hair, None)
+def _character(armatures, hairs, selected, things):
+    """The armature that is selected, or carries selected hair, or a mesh; else the first of the scene that carries hair,
+    that deforms a mesh, or that there is: a rig's template may lie beside it.
+    """
+    if armatures[0] in selected:
+        return armatures[0]
+    carried = [_carrier(thing) for kind in ("CURVES", "MESH") for thing in selected if thing.type == kind]
+    with_hair = [_carrier(hair) for hair in hairs]
+    found = [a for a in armatures if a in with_hair] or [a for a in armatures if find(a, things)] or armatures
+    return next(a for a in [*carried, *found] if a in armatures)
+
+
+def _hair(hairs, armature, armatures):
+    """The first hair of an armature, else that of none of them; None where all of it is that of others."""
+    others = {other for other in armatures if other != armature}
+    free = [hair for hair in hairs if _carrier(hair, armature) not in others]
+    return next(iter(sorted(free, key=lambda hair: _carrier(hair) != armature)), None)
+
+
+def _carrier(thing, shown=None):
+    """The armature that a hair object belongs to, or that moves it or a mesh; the one that is `shown` where that does, or
+    none does.
+    """
+    return thing.neuralocks_hair.armature or carrier(thing, shown)
 
 
 class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
