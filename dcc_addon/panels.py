@@ -212,8 +212,11 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
 
 
 def findings(armature) -> tuple[list[str], str]:
-    """What is found of the rig, and what is wrong with it; looked at again only when bones or choices change."""
+    """What is found of the rig, and what is wrong with it or with the body chosen; the rig is looked at again only when
+    bones or choices change.
+    """
     from .scene import armature as armature_reader
+    from .scene.body import left_behind
     from .services import rig as rig_service
 
     chosen = armature.neuralocks_character.head_bone
@@ -229,7 +232,8 @@ def findings(armature) -> tuple[list[str], str]:
             _findings[key] = [f"Head: {rig.bones[head]}{why}", *rig_service.advice(rig)], ""
         except NeuralocksError as error:
             _findings[key] = [], str(error)
-    return _findings[key]
+    (lines, problem), body = _findings[key], armature.neuralocks_character.body
+    return lines, problem or (left_behind(body, armature) if body is not None else "")
 
 
 def message(layout, name: str) -> None:

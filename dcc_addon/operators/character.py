@@ -9,7 +9,8 @@ from ..live import refresh
 from ..scene import armature as armature_reader
 from ..scene.attach import check_own
 from ..scene.binding import carrier
-from ..scene.body import find
+from ..scene.body import find, left_behind
+from ..scene.carried import bodies_of
 from ..scene.instances import check_real
 from ..services import rig as rig_service
 from .base import Hardened, Stepwise, sampling, shown_armature
@@ -77,7 +78,8 @@ class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
     def work(self, context):
         armature = shown_armature(context)
         rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
-        lines = rig_service.advice(rig)
+        behind = (left_behind(body, armature) for body in bodies_of(armature, context.scene))
+        lines = [*rig_service.advice(rig), *filter(None, behind)]
         for line in lines:
             self.report({"WARNING"}, line)
         return None if lines else f"{armature.name_full}: the rig is fine"

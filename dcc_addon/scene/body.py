@@ -12,7 +12,7 @@ from ..services.mirror import mirrored
 from ..services.rig import BodyArrays
 from ..session import session
 from .armature import matrix
-from .binding import carrying_bone
+from .binding import carrier, carrying_bone
 
 PROBES = 500
 """Vertices whose weights are compared with what is known."""
@@ -54,13 +54,33 @@ def read(mesh_object, armature) -> BodyArrays:
         if modifier.type == "MIRROR" and modifier.show_render:
             body = _mirrored(body, mesh_object, modifier)
     if _deformed(mesh_object, armature):
-        bones = armature.data.bones  # a group may have the name of a bone that deforms nothing
-        moving = [name if name in bones and bones[name].use_deform else "" for name in groups]
-        return replace(body, groups=tuple(moving))
+        return replace(body, groups=_moving(mesh_object, armature))
     if (bone := carrying_bone(mesh_object, armature)) is not None:
         rigid = np.array([[i, 0, 1] for i in range(len(body.points))], float)
         return replace(body, groups=(bone,), weights=rigid)
     return body
+
+
+def left_behind(mesh_object, armature) -> str:
+    """What to say of a body that no bone of this armature moves, for it stays with the first one; empty where one does."""
+    if any(_moving(mesh_object, armature)) or carrying_bone(mesh_object, armature) is not None:
+        return ""
+    moving = carrier(mesh_object, None)
+    remedy = f"choose {moving.name_full} as the character" if moving not in (None, armature) else "choose another body"
+    return (
+        f"{mesh_object.name_full}: none of its vertex groups is a deforming bone of {armature.name_full}, so hair is not kept "
+        f"out of it where it moves; {remedy}"
+    )
+
+
+def _moving(mesh_object, armature) -> tuple[str, ...]:
+    """Names of the vertex groups, empty for those that no bone moves."""
+    bones, deformed = armature.data.bones, _deformed(mesh_object, armature)
+
+    def moves(name: str) -> bool:  # a group may have the name of a bone that deforms nothing
+        return name in bones and (bones[name].use_deform or not deformed)
+
+    return tuple(group.name if moves(group.name) else "" for group in mesh_object.vertex_groups)
 
 
 def _deformed(mesh_object, armature) -> bool:

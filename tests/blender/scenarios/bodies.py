@@ -2,6 +2,7 @@
 """Body meshes as artists build them."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bmesh
 import bpy
@@ -92,6 +93,38 @@ def rigid_bodies(_folder: Path) -> None:
     assert binding.carrying_bone(skull, rig) is None
     rides(("head", 1.0))
     assert binding.carrying_bone(skull, rig) == "head"
+
+
+def weighted_elsewhere(_folder: Path) -> None:
+    """A chosen body that no bone of the character moves is told, with the rig that moves it; one that goes with bones of
+    the same names, or rides on one, is not.
+    """
+    from dcc_addon.operators.character import NEURALOCKS_OT_check
+    from dcc_addon.panels import findings
+
+    control = scenes.armature("Control", [(f"c_{n}", p and f"c_{p}", *ends) for n, p, *ends in scenes.BONES])
+    game, twin, said = scenes.armature("Game"), scenes.armature("Twin"), []
+    skin = scenes.body(game)
+    operator = SimpleNamespace(report=lambda kind, text: said.append(text))
+
+    def told(armature, body) -> str:
+        bpy.context.scene.neuralocks.armature, armature.neuralocks_character.body = armature, body
+        said.clear()
+        NEURALOCKS_OT_check.work(operator, bpy.context)
+        lines, problem = findings(armature)
+        assert lines and said == ([problem] if problem else []), (said, problem)
+        return problem
+
+    assert not any(told(*pair) for pair in ((game, skin), (twin, skin), (control, None)))
+    assert "Body" in told(control, skin) and "choose Game as the character" in told(control, skin)
+    bpy.ops.mesh.primitive_cube_add(size=0.2)
+    stone = bpy.context.object
+    assert "choose another body" in told(game, stone)
+    stone.parent, stone.parent_type, stone.parent_bone = game, "BONE", "head"
+    assert not told(game, stone)
+    for bone in game.data.bones:
+        bone.use_deform = False
+    assert "deforming bone" in told(game, skin) and not told(twin, skin)
 
 
 def no_faces(folder: Path) -> None:
