@@ -140,9 +140,9 @@ class Motion:
         return (local @ np.array(place.GetLocalToWorldTransform(self._prim))).transpose(0, 2, 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; outside of the clip straight on."""
+        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; straight on before the clip, still after it."""
         inside = np.clip(times, *self._times[[0, -1]])
-        places = self._curve(inside) + (times - inside)[:, None] * self._curve(inside, 1)
+        places = self._curve(inside) + np.minimum(times - inside, 0)[:, None] * self._curve(inside, 1)
         turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()
         return places, turns.reshape(len(times), -1, 3, 3)
 

@@ -13,11 +13,10 @@ class SmoothMotion:
     """A clip whose motion between its samples, and outside of them, is that of `ClipSpline`, as `Track` has it of a few
     joints.
 
-    `Clip.at` goes along straight lines and stops where the samples end: what is simulated on it feels a blow at every
-    sample, and a stop that the shot does not have.
+    `Clip.at` goes along straight lines: what is simulated on it feels a blow at every sample.
 
     Args:
-        character: whose motion it is; all joints go on with its head outside of the clip.
+        character: whose motion it is; all joints come on with its head before the clip.
         clip: without cuts.
     """
 

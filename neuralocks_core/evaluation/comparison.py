@@ -102,7 +102,7 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
 
     # One step more than the last time needs: how hair goes on there is known, whichever times are wanted.
     clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
-    joints, shapes = _unscaled(character, SmoothMotion(character, clip).at(clock)), clip.shape_at(clock)
+    joints, shapes = _unscaled(character, _without_stop(character, clip, clock, times[-1])), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
@@ -120,6 +120,18 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
         **options,
     )
     return _between(clock, rollout.points, times) - strands.rest
+
+
+def _without_stop(character: Character, clip: Clip, clock: np.ndarray, last: float) -> np.ndarray:
+    """World joint transforms (C, J, 4, 4) at times `clock` (C,) [s]. Steps that go past the clip, where none but times in it
+    are wanted, go on with its last velocity: the hair is not to feel a stop there that it is not asked for.
+    """
+    motion = SmoothMotion(character, clip)
+    joints = motion.at(clock)
+    if not clip.loop and last <= clip.end + 1e-9:
+        before, end = character.head_place(motion.at(clip.end - np.array([STEP, 0.0])))
+        joints[..., :3, 3] += (np.maximum(clock - clip.end, 0)[:, None] * (end - before) / STEP)[:, None]
+    return joints
 
 
 class _PosedBody(Sequence):

@@ -33,14 +33,15 @@ def test_the_head_goes_as_the_network_reads_it(loop):
     np.testing.assert_allclose(found[:, :3, :3], 1.5 * turn[:, 0], atol=1e-9)
 
 
-def test_samples_come_back_and_outside_of_them_all_goes_on_without_turning():
+def test_samples_come_back_before_them_all_comes_on_without_turning_and_after_them_it_stands():
     motion = clip()
     smooth = SmoothMotion(rigs.person(), motion)
     np.testing.assert_allclose(smooth.at(TIMES), motion.joints, atol=1e-12)
-    outside, step = smooth.at(np.array([-1.0, -0.5, 1.5, 2.0])), smooth.at(np.array([0.0, 1e-6, 1 - 1e-6, 1.0]))
+    outside, step = smooth.at(np.array([-1.0, -0.5, 1.5, 2.0])), smooth.at(np.array([0.0, 1e-6]))
     np.testing.assert_allclose(outside[..., :3, :3], motion.joints[[0, 0, -1, -1], :, :3, :3], atol=1e-12)
-    gone, speed = (np.diff(joints[..., :3, 3], axis=0)[::2] for joints in (outside, step))
+    gone, speed = (np.diff(joints[:2, ..., :3, 3], axis=0) for joints in (outside, step))
     np.testing.assert_allclose(gone / 0.5, speed / 1e-6, atol=1e-5)
+    np.testing.assert_allclose(outside[2:], motion.joints[[-1, -1]], atol=1e-12)
     alone = Clip(TIMES[:1], motion.joints[:1])
     np.testing.assert_allclose(
         SmoothMotion(rigs.person(), alone).at(TIMES), motion.joints[:1].repeat(25, axis=0), atol=1e-12

@@ -29,14 +29,14 @@ GRAPHS = {
 }
 
 _HISTORY = (
-    "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the head joint's place and t_k = t - k dt: "
+    "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the place of the head joint (on hair that a joint below it carries: of `canonical_to_head`'s origin) and t_k = t - k dt: "
     "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
     "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
     "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
     "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
     "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the pose that "
-    "is drawn. Before the first sample and after the last one the head goes on in a straight line, with its velocity there, and "
-    "does not turn"
+    "is drawn. Before the first sample the head comes in a straight line, with its velocity there, and does not turn; after the last "
+    "one it stands still"
 )
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "

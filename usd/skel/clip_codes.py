@@ -16,7 +16,7 @@ SAME = 1e-4
 and over so little time a rounding error of a pose is a blow."""
 STAND = 0.1
 """A shot that begins or ends at least so long [s] before or after its samples shows a character that stands meanwhile. An
-exporter's range is often a frame or two wider than its samples: standing for that time, it would start with a blow."""
+exporter's range is often a frame or two wider than its samples: standing before them, it would start with a blow."""
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:

@@ -100,3 +100,5 @@ def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
     joints[:, :, 0, 3] += times[:, None]
     found = simulated(character, lying_strands(character), Clip(times, joints, cuts=times[[12]]), times)
     np.testing.assert_allclose(found, found[:1].repeat(24, axis=0), atol=1e-5)
+    handles = simulated(character, lying_strands(character), Clip(times, joints), np.arange(36) / 24)
+    assert np.abs(handles[24:] - handles[23]).max() > 1e-3, "and afterwards it stands"
