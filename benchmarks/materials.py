@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether the material sliders act: each constant's effect in a model beside its effect in the reference solver.
 
-    python benchmarks/materials.py [MODEL] --character examples/shot/shot.usda [--groom FILE]... [--constant NAME]...
+    python benchmarks/materials.py [MODEL] [--character SHOT] [--groom FILE]... [--constant NAME]...
 
 Each constant is set to the low end, the default and the high end of its range, the others staying at their default,
 in motion that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -38,6 +39,7 @@ SHOWS = {
 }
 """Constant -> the motions that show it, and the number that it changes."""
 SECONDS = 3.0
+SHOT = Path(__file__).parents[1] / "examples" / "shot" / "shot.usda"
 
 
 def main() -> None:
@@ -46,7 +48,7 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?", default=None)
-    parser.add_argument("--character", required=True)
+    parser.add_argument("--character", default=SHOT, help="USD stage; examples/shot/shot.usda if left out")
     parser.add_argument("--groom", action="append", default=[])
     parser.add_argument("--constant", action="append", choices=SHOWS, help="only this one; repeat for more")
     parser.add_argument("--strands", type=int, default=160)

@@ -20,7 +20,7 @@ LABELS = {
     "stretch_cm": ("stretch violation", "cm", "mean over strands"),
     "penetration_percent": ("vertices in the body", "%", "deeper than at rest"),
     "penetration_3mm_percent": ("deeper than 3 mm", "%", ""),
-    "penetration_frames": ("frames of which these are", "", "evenly over the bake"),
+    "penetration_frames": ("these are of", "frames", "evenly over the bake"),
     "penetration_worst_mm": ("worst depth", "mm", "of all frames"),
     "inside_at_rest_percent": ("inside already at rest", "%", "as the groom was made"),
     "droop_cm": ("droop", "cm", "tips below the rigid groom's, mean"),
