@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.body.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import inverse, rotation_part, sizes
+from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
@@ -217,7 +217,7 @@ class Character:
 
     def canonical(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) of the bind pose [m], world, in canonical space."""
-        return points @ self.bind_to_canonical[:3, :3].T + self.bind_to_canonical[:3, 3]
+        return transformed(points, self.bind_to_canonical)
 
     def carrying(self, joints: np.ndarray) -> np.ndarray:
         """Rigid transforms (..., 4, 4), bind world to posed world, with which its joint carries the groom.

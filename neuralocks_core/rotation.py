@@ -65,6 +65,11 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any
     normal.
     """
+    return from_quaternion(quaternion_between(a, b))
+
+
+def quaternion_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation `between` two directions as quaternions (..., 4) wxyz, not of unit length."""
     a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
     b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
     a, b = np.broadcast_arrays(a, b)
@@ -74,7 +79,7 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     fallback = np.cross(a, np.where(np.abs(a[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     quaternion = np.concatenate([1 + cosine, axis], axis=-1)
     opposite = cosine < -1 + 1e-12
-    return from_quaternion(np.where(opposite, np.concatenate([0 * cosine, fallback], axis=-1), quaternion))
+    return np.where(opposite, np.concatenate([0 * cosine, fallback], axis=-1), quaternion)
 
 
 def sizes(transforms: np.ndarray) -> np.ndarray:

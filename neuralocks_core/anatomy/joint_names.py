@@ -58,6 +58,16 @@ def leaf(path: str) -> str:
     return path.rsplit("/", 1)[-1]
 
 
+def without_namespace(name: str) -> str:
+    """A joint's own name without what stands before a colon."""
+    return name.rsplit(":", 1)[-1]
+
+
+def words(name: str) -> list[str]:
+    """Words of a name in lower case, without numbers."""
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+
+
 def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
     """('left' | 'right' | '', words in one, in lower case, without numbers, sides and prefixes) of each joint.
 
@@ -65,17 +75,16 @@ def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
         names: the joints' own names, without their parents'.
         parts: words that mean a part of the body.
     """
-    return [_side_and_key(words) for words in _without_namespace([_words(name) for name in names], parts)]
+    return [_side_and_key(words) for words in _without_namespace([_own_words(name) for name in names], parts)]
 
 
-def _words(name: str) -> list[str]:
-    """Words of a joint's own name in lower case, without numbers."""
-    name = name.rsplit(":", 1)[-1]
+def _own_words(name: str) -> list[str]:
+    """Words of a joint's own name, those of MikuMikuDance as their English ones."""
+    name = without_namespace(name)
     if not name.isascii():
         for word, part in _JAPANESE.items():
             name = name.replace(word, part)
-    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", name)
-    return [word.lower() for word in words if not word.isdigit()]
+    return words(name)
 
 
 def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str]]:

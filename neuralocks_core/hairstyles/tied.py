@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import DOWN, Site, evenly, smooth, unit
+from neuralocks_core.hairstyles.growth import DOWN, Site, at_vertices, evenly, smooth, unit
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
@@ -115,13 +115,10 @@ def _ponytail(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.nd
     spine, left, up = _spine(knot, scalp, obstacle, knot.out + [0, 0.35, 0], 0.36, 20.0, 0.025)
     # Strands end at different places: the tail tapers.
     share = np.linspace(0.0, 1.0, _TAIL) * (1 - 0.40 * site.own[:, 1:2] ** 1.5 - 0.10 * site.of_clump[:, 3:])
-    at = share * (_TAIL - 1)
-    low = np.minimum(at.astype(int), _TAIL - 2)
-    part = (at - low)[..., None]
-    take = lambda line: line[low] * (1 - part) + line[low + 1] * part  # noqa: E731
+    spine, left, up = (at_vertices(line[None], share * (_TAIL - 1)) for line in (spine, left, up))
     spread = radius * (0.11 + 0.20 * smooth(share / 0.25) - 0.13 * smooth((share - 0.4) / 0.6))
     disc = knot.disc + 0.25 * (site.of_clump[:, :2] - 0.5)
-    return take(spine) + spread[..., None] * (disc[:, None, :1] * take(left) + disc[:, None, 1:] * take(up))
+    return spine + spread[..., None] * (disc[:, None, :1] * left + disc[:, None, 1:] * up)
 
 
 def _braid(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
@@ -136,7 +133,7 @@ def _braid(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.ndarr
     aside = girth * plait * np.sin(angle)
     lift = 0.55 * girth * plait * np.sin(2 * angle)
     thick = girth * (0.62 - 0.40 * smooth((share - 0.82) / 0.05) * (1 - smooth((share - 0.88) / 0.12)))
-    disc = np.sqrt(site.own[:, 2:3]) * unit_disc(site.own[:, 1])
+    disc = np.sqrt(site.own[:, 2:3]) * _circle(site.own[:, 1])
     aside = aside + thick * disc[:, :1]
     lift = lift + thick * disc[:, 1:]
     return spine + aside[..., None] * left + lift[..., None] * up
@@ -158,7 +155,7 @@ def _bun(site: Site, knot: Knot, scalp: Scalp, obstacle: Obstacle) -> np.ndarray
     return knot.place + flat + high[..., None] * knot.out
 
 
-def unit_disc(turns: np.ndarray) -> np.ndarray:
+def _circle(turns: np.ndarray) -> np.ndarray:
     """(S, 2) points on the unit circle at turns (S,)."""
     return np.stack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)], axis=1)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rotation import from_quaternion
+from neuralocks_core.rotation import from_quaternion, quaternion_between
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def spring_bones(
             new = _at_length(place[:, j], new, lengths[j])
             previous[:, j], tail[:, j] = tail[:, j], new
             local = np.einsum("cji,cj->ci", carrier, new - place[:, j]) / lengths[j]
-            turn = _from_to(bones[j] / lengths[j], local)
-            result[:, frame, j] = turn
+            turn = quaternion_between(bones[j], local)
+            result[:, frame, j] = turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
             world[:, j] = carrier @ from_quaternion(turn)
     return result
 
@@ -73,13 +73,3 @@ def spring_bones(
 def _at_length(origin, point, length):
     way = point - origin
     return origin + way * (length / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9))
-
-
-def _from_to(a, b):
-    """Smallest turns (C, 4) wxyz from direction a (3,) to directions b (C, 3)."""
-    cross = np.cross(np.broadcast_to(a, b.shape), b)
-    half = np.concatenate([1 + (b @ a)[:, None], cross], axis=-1)
-    opposite = half[:, 0] < 1e-6
-    side = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
-    half[opposite] = np.concatenate([[0.0], side])
-    return half / np.linalg.norm(half, axis=-1, keepdims=True)

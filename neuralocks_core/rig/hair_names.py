@@ -3,7 +3,7 @@
 
 import re
 
-from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.anatomy.joint_names import leaf, without_namespace, words
 
 _HAIR = (
     "hair|pony|braid|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|pigtail|twintail|ahoge|kami|mane|plait|dread"
@@ -53,9 +53,8 @@ def says_face(name: str) -> bool:
     return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _WORN_IN_HAIR.search(whole))
 
 
-def _begins(name: str, words: str) -> bool:
-    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", _own(name))
-    return any(re.match(f"(?:{words})", part.lower()) for part in parts)
+def _begins(name: str, beginnings: str) -> bool:
+    return any(re.match(f"(?:{beginnings})", word) for word in words(_own(name)))
 
 
 def _whole(name: str) -> str:
@@ -63,4 +62,4 @@ def _whole(name: str) -> str:
 
 
 def _own(name: str) -> str:
-    return leaf(name).rsplit(":", 1)[-1]
+    return without_namespace(leaf(name))

@@ -83,7 +83,7 @@ def train_dynamic(
     held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
-    net = TinyNet(features.shape[-1], hidden, len(rig.chains), held.pool, spec)
+    net = TinyNet(hidden, held.pool, spec)
     net.normalise(features.reshape(-1, features.shape[-1]))
 
     def losses(done: float) -> dict[str, torch.Tensor]:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tiny network of a rig while it is trained."""
 
+from itertools import pairwise
+
 import numpy as np
 import torch
 
-from neuralocks_core.rig.network import MAX_ANGLE, POSE, RigModel, input_limits
+from neuralocks_core.rig.network import MAX_ANGLE, POSE, RigModel, held_features, input_limits
 from neuralocks_core.training.rig.energy import bounded_turns
 from neuralocks_core.training.rig.poses import PosePool
 
@@ -13,25 +15,22 @@ class TinyNet(torch.nn.Module):
     """Two hidden layers; gives turns (B, N, 4) wxyz in canonical axes, none for the held bind pose.
 
     Args:
-        inputs: F, how many features it reads.
         hidden: width of both layers.
-        joints: N.
-        pool: poses whose features scale the inputs.
-        spec: which features these are.
+        pool: poses of the rig, with N hair joints, whose features scale the inputs.
+        spec: which features these are, F of them.
     """
 
-    def __init__(self, inputs: int, hidden: int, joints: int, pool: PosePool, spec):
+    def __init__(self, hidden: int, pool: PosePool, spec):
         super().__init__()
-        self.joints, self.spec = joints, spec
+        self.joints, self.spec = len(pool.rig.chains), spec
         sample = np.arange(min(pool.count, 512))
         features = pool.features(spec, sample, pool.gravity(sample))
         self.register_buffer("mean", torch.as_tensor(features.mean(0)))
         self.register_buffer("scale", torch.as_tensor(1 / np.maximum(features.std(0), 0.05)))
-        still = np.zeros(inputs, np.float32)
-        still[[0, 4, 6, 10, 13]] = 1, 1, 1, 1, -1
-        self.register_buffer("bind", torch.as_tensor(still)[None])
+        still = held_features(spec, np.tile(np.eye(3), (1, 2, 1, 1)), np.array([[0.0, -1.0, 0.0]]))
+        self.register_buffer("bind", torch.as_tensor(still))
         self.layers = torch.nn.ModuleList(
-            [torch.nn.Linear(inputs, hidden), torch.nn.Linear(hidden, hidden), torch.nn.Linear(hidden, 3 * joints)]
+            [torch.nn.Linear(a, b) for a, b in pairwise((still.shape[1], hidden, hidden, 3 * self.joints))]
         )
         torch.nn.init.normal_(self.layers[2].weight, std=0.02)
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.progress import Progress, silent, within
-from neuralocks_core.rig.network import POSE, RigModel, rig_spec
+from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend, muon
@@ -61,7 +61,7 @@ def train_static(
     say(0, 1, "posing bodies")
     roomy = replace(material, margin=material.margin + _ROOM)
     held = HairOnBodies(rig, roomy, _POOL, rng, spec)
-    net = TinyNet(POSE, hidden, len(rig.chains), held.pool, spec)
+    net = TinyNet(hidden, held.pool, spec)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
