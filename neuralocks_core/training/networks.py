@@ -132,19 +132,6 @@ class StrandNet(nn.Module):
         second = torch.relu(self.middle(first) + self.middle_change(first, middle)) * two
         return self.out(second) + self.out_change(second, out)
 
-    def forward(self, strands: Tensor, frames: Tensor) -> Tensor:
-        """Offsets for every frame and strand.
-
-        Args:
-            strands: (S, strand_size), the same strands in all frames, or (B, S, strand_size), own ones in each.
-            frames: (B, frame_size) boundary vectors.
-
-        Returns:
-            (B, S, 24, 3) offsets; see `deform` for what they mean.
-        """
-        out = self.tail(self.strand_part(strands), self.frame_part(frames)[:, None, :])
-        return out.reshape(*out.shape[:-1], -1, 3)
-
 
 class LowRank(nn.Module):
     """A matrix (outputs, inputs) of low rank whose terms a frame weighs: x -> back(weights * to(x))."""
