@@ -6,6 +6,8 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 
 OPSET = 17
+IR_VERSION = 8
+"""Of the file: the oldest that goes with OPSET, for the oldest onnxruntime that a user may have."""
 
 
 class OnnxGraph:
@@ -13,13 +15,12 @@ class OnnxGraph:
 
     Args:
         name: of the graph.
-        ir_version: of the file; 8 is the oldest that goes with OPSET, for the oldest onnxruntime that a user may have.
 
     Raises:
         NeuralocksError: onnx is not installed.
     """
 
-    def __init__(self, name: str, ir_version: int = 8):
+    def __init__(self, name: str):
         try:
             from onnx import helper, numpy_helper
         except ImportError:
@@ -27,7 +28,7 @@ class OnnxGraph:
                 "onnx: not installed, it writes the model's graph; pip install 'neuralocks[train]'"
             ) from None
         self.helper, self.numpy_helper = helper, numpy_helper
-        self.name, self.ir_version, self.nodes, self.constants = name, ir_version, [], []
+        self.name, self.nodes, self.constants = name, [], []
 
     def constant(self, name: str, array: np.ndarray) -> str:
         """An array under this name, which is returned."""
@@ -50,7 +51,7 @@ class OnnxGraph:
         model = self.helper.make_model(
             graph,
             opset_imports=[self.helper.make_opsetid("", OPSET)],
-            ir_version=self.ir_version,
+            ir_version=IR_VERSION,
             producer_name="neuralocks",
         )
         onnx.checker.check_model(model)

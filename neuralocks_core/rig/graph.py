@@ -15,7 +15,7 @@ def rig_graph(model) -> bytes:
     Raises:
         NeuralocksError: onnx is not installed.
     """
-    graph = OnnxGraph("rig", ir_version=9)
+    graph = OnnxGraph("rig")
     limits = np.asarray(model.limits, np.float32)
     value = graph.node("Min", ["features", graph.constant("most", limits)], "capped")
     value = graph.node("Max", [value, graph.constant("least", -limits)], "clipped")
