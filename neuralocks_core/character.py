@@ -14,6 +14,8 @@ from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
+LEAST_SKIN = 20
+"""Fewer vertices than these are no head that could be measured."""
 MOVED = 0.001
 """Skin that a blend shape moves by less [m] is not moved by it; files round the offsets of all their points."""
 
@@ -271,9 +273,13 @@ class Character:
             return None
         return own_skin(self.body.points, self.body.triangles, self.on_head, HEAD_WIDTHS[0])
 
-    def head_mask(self) -> np.ndarray | None:
-        """Which body vertices (V,) are the head's skin: the head is measured on them."""
-        return None if self.body is None else self.on_head & self.skin
+    @cached_property
+    def head_skin(self) -> np.ndarray | None:
+        """Which body vertices (V,) are the head's skin, on which it is measured; None where they are too few."""
+        if self.body is None:
+            return None
+        mask = self.on_head & self.skin
+        return mask if mask.sum() >= LEAST_SKIN else None
 
     @cached_property
     def body_shapes(self) -> np.ndarray:
@@ -282,24 +288,23 @@ class Character:
         """
         if self.body is None or not self.body.shapes:
             return np.zeros(0, bool)
-        head, rest = self.head_mask(), ~self.on_head
+        head, rest = self.on_head & self.skin, ~self.on_head
         moved = [np.linalg.norm(offsets, axis=1) > MOVED for offsets in self.body.shapes.values()]
         return np.array([m[head].sum() > 0.8 * head.sum() or m[rest].sum() > 0.1 * rest.sum() for m in moved])
 
     @cached_property
     def head_width(self) -> float | None:
         """Width of the head's skin in bind pose [m], if there are a head and skin on it."""
-        if "head" not in self.humanoid or (mask := self.head_mask()) is None or mask.sum() < 20:
+        if "head" not in self.humanoid or self.head_skin is None:
             return None
-        return float(np.ptp((self.body.points[mask] @ self.facing.T)[:, 0]))
+        return float(np.ptp((self.body.points[self.head_skin] @ self.facing.T)[:, 0]))
 
     @cached_property
     def head_centre(self) -> np.ndarray:
         """Centre of the head in canonical space (3,) [m]: middle of its surface, or an average adult's."""
-        mask = self.head_mask()
-        if mask is None or mask.sum() < 20:
+        if self.head_skin is None:
             return np.array([0.0, 0.08, 0.02])
-        points = (self.body.points[mask] - self.canonical_to_bind[:3, 3]) @ self.facing.T
+        points = (self.body.points[self.head_skin] - self.canonical_to_bind[:3, 3]) @ self.facing.T
         low, high = points.min(axis=0), points.max(axis=0)
         # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured over the ears.
         skull = points[points[:, 1] > high[1] / 2]

@@ -44,13 +44,12 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
     if "left_upper_arm" in humanoid and "right_upper_arm" in humanoid:
         left, right = joints[humanoid["left_upper_arm"]], joints[humanoid["right_upper_arm"]]
         result[6:9] = (left[0] - right[0]) / 2, -(left[1] + right[1]) / 2, -(left[2] + right[2]) / 2
-    mask = character.head_mask()
-    if mask is not None and mask.sum() >= 20:
+    if character.head_skin is not None:
         if shape is not None and np.any(shape):
             # A tongue put out makes no head deeper.
             shape = np.where(character.body_shapes, shape, 0)
         points = character.canonical(character.body.shaped(shape if np.any(shape) else None))
-        head = points[mask]
+        head = points[character.head_skin]
         result[:4] = np.abs(head[:, 0]).max(), head[:, 1].max(), head[:, 2].max(), -head[:, 2].min()
         # The back at shoulder height, where long hair lies.
         level = (np.abs(points[:, 1] + result[7]) < 0.05) & (np.abs(points[:, 0]) < 0.5 * result[6])

@@ -45,7 +45,7 @@ def test_the_shipped_body_is_a_person():
     leaves = [name.rsplit("/", 1)[-1] for name in character.skeleton.names]
     assert len(set(leaves)) == len(leaves) and all(leaf.replace("_", "").isalnum() for leaf in leaves)
     # Blend shapes leave the head on its joint: no vertex of it goes farther than heads differ in size.
-    head = character.head_mask()
+    head = character.head_skin
     assert all(np.abs(offsets[head]).max() < 0.04 for offsets in body.shapes.values())
 
 

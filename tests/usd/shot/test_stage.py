@@ -45,7 +45,7 @@ def test_bind_pose_comes_in_metres_y_up_whatever_the_stage(tmp_path):
         assert np.abs(rig.character.skeleton.bind[:, :3, 3] - POSITIONS).max() < 1e-6
         assert rig.character.head == HEAD
         assert np.allclose(rig.character.facing, np.eye(3))
-        width = np.ptp(rig.character.body.points[rig.character.head_mask()][:, 0])
+        width = np.ptp(rig.character.body.points[rig.character.head_skin][:, 0])
         assert abs(width - 0.2) < 1e-3
         inward = np.cross(
             *np.diff(rig.character.body.points[rig.character.body.triangles[:150]], axis=1).swapaxes(0, 1)
