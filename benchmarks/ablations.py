@@ -80,7 +80,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
         inputs = map(torch.from_numpy, samples(banks["rollouts"]))
         net.set_normalisation(*inputs, spec.slices["history"], static=options.static)
         *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
-        card = measure(net, banks["held_out"], options.output, spec.slices["history"]).to_json()
+        card = measure(net, banks["held_out"], options.output, spec.slices["history"], options.anchored).to_json()
         print(
             f"| {row} | {state.step} | {time.process_time() - began:.0f} | "
             + " | ".join(f"{card[name]:.3g}" for name in names)

@@ -103,7 +103,6 @@ def solved(scene: TrainingScene, drawn: np.ndarray, kind: str, material: Materia
         None if body is None else body.triangles,
         material,
         dt=scene.spec.dt,
-        rest_support=scene.rest_support,
         neighbours=mates,
     )
     return rollout.points - rest

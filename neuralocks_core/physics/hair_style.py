@@ -13,9 +13,7 @@ REACH = 0.03
 """s_max [m]."""
 
 
-def hair_style(
-    x: Tensor, rods: Rods, distance: Tensor, stiffness: float | Tensor = STIFFNESS, reach: float = REACH
-) -> Tensor:
+def hair_style(x: Tensor, rods: Rods, distance: Tensor, stiffness: float | Tensor = STIFFNESS) -> Tensor:
     """Energy `k sum m (1 - min(1, s / s_max)) |x - x_posed|^2`.
 
     Weighted by vertex mass, which the paper's sum is not, so that it does not depend on the number of vertices.
@@ -26,10 +24,9 @@ def hair_style(
         distance: (..., S, K) s, distance of each vertex to the body [m]; no gradient goes through it, or hair
             would flee from the body to be free of its style.
         stiffness: [1/s^2], a number or (..., S, 1).
-        reach: s_max [m].
 
     Returns:
         (..., S) energy per unit line density [m^3/s^2].
     """
-    hold = 1.0 - (distance.detach().clamp_min(0.0) / reach).clamp_max(1.0)
+    hold = 1.0 - (distance.detach().clamp_min(0.0) / REACH).clamp_max(1.0)
     return (stiffness * rods.mass * hold * (x - rods.rest).square().sum(-1)).sum(-1)

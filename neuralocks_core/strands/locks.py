@@ -15,6 +15,9 @@ so that a groom of 120,000 strands has the same locks as the 3,000 of it that th
 COARSER = 2**0.25
 """Locks are farther apart by so much, and again, until they hold strands enough."""
 
+NEAREST, NEAR_RADIUS = 5, 0.01
+"""So many vertices at most adhere to each, within so many metres."""
+
 MATES, MATE_RADIUS = 5, 0.02
 """So many strands at most are tied to each, within so many metres."""
 
@@ -79,38 +82,36 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
     return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)
 
 
-def neighbours(rest: np.ndarray, radius: float = 0.01, count: int = 5) -> np.ndarray:
+def neighbours(rest: np.ndarray) -> np.ndarray:
     """The nearest vertices of other strands at rest, which adhesion keeps near.
 
     Args:
         rest: (S, K, 3) [m].
-        radius: largest distance [m].
-        count: at most this many.
 
     Returns:
-        (S, K, count) int32, index into the S K vertices, nearest first; -1 where there are fewer.
+        (S, K, NEAREST) int32, index into the S K vertices, nearest first; -1 where there are fewer within NEAR_RADIUS.
     """
     strands, vertices = rest.shape[:2]
     points = np.asarray(rest, np.float64).reshape(-1, 3)
     tree = _tree(points)
-    found = np.full((len(points), count), -1, np.int32)
-    todo, asked = np.arange(len(points)), 2 * count + 4
+    found = np.full((len(points), NEAREST), -1, np.int32)
+    todo, asked = np.arange(len(points)), 2 * NEAREST + 4
     while len(todo):
         asked = min(asked, len(points))
-        distance, index = tree.query(points[todo], np.arange(1, asked + 1), distance_upper_bound=radius)
+        distance, index = tree.query(points[todo], np.arange(1, asked + 1), distance_upper_bound=NEAR_RADIUS)
         present = index < len(points)
         other = np.where(present, index, 0) // vertices
         own = todo[:, None] // vertices
         good = present & (other != own)
-        first = np.argsort(~good, axis=1, kind="stable")[:, :count]
+        first = np.argsort(~good, axis=1, kind="stable")[:, :NEAREST]
         pick = np.where(np.take_along_axis(good, first, 1), np.take_along_axis(index, first, 1), -1)
         found[todo, : pick.shape[1]] = pick
         # Again, with more candidates, for those whose list ended before the radius did.
-        short = (good.sum(axis=1) < count) & np.isfinite(distance[:, -1])
+        short = (good.sum(axis=1) < NEAREST) & np.isfinite(distance[:, -1])
         if asked == len(points):
             break
         todo, asked = todo[short], 4 * asked
-    return found.reshape(strands, vertices, count)
+    return found.reshape(strands, vertices, NEAREST)
 
 
 def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:

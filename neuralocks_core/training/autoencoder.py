@@ -30,7 +30,6 @@ def train_autoencoder(
     rate: float = 3e-4,
     seed: int = 0,
     principal: bool = True,
-    device: str = "cpu",
     progress: Progress | None = None,
 ) -> StrandAutoencoder:
     """Trains on all strands of all grooms and returns the autoencoder with frozen weights.
@@ -45,7 +44,6 @@ def train_autoencoder(
         rate: Adam's first step size; it falls to 1 % along a cosine.
         seed: of the weights and the batches.
         principal: start from principal components; else the paper's MLPs alone.
-        device: torch device.
         progress: called with done, total, message.
 
     Raises:
@@ -57,10 +55,10 @@ def train_autoencoder(
     if not np.isfinite(shapes).all():
         raise NeuralocksError("strand shapes: some vertices are not finite; clean the groom first")
     generator = torch.Generator().manual_seed(seed)
-    data = torch.from_numpy(shapes.reshape(len(shapes), 3 * K)).to(device)
+    data = torch.from_numpy(shapes.reshape(len(shapes), 3 * K))
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        model = StrandAutoencoder(principal=principal).to(device)
+        model = StrandAutoencoder(principal=principal)
     model.set_normalisation(data)
     optimiser = torch.optim.Adam(model.parameters(), lr=rate)
     # A millimetre on short hair is a larger part of its shape than on long hair.
@@ -68,7 +66,7 @@ def train_autoencoder(
     weight = weight / weight.mean()
     start, step, done = time.monotonic(), 0, 0.0
     while done < 1.0:
-        pick = torch.randint(len(data), (min(batch, len(data)),), generator=generator).to(device)
+        pick = torch.randint(len(data), (min(batch, len(data)),), generator=generator)
         target = data[pick]
         loss = ((model(target) - target).square().mean(1) * weight[pick]).mean()
         optimiser.zero_grad(set_to_none=True)

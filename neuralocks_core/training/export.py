@@ -13,7 +13,7 @@ from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
 
 
-def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str = "direction") -> dict[str, bytes]:
+def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
     Normalisation is folded into the weights, so all inputs are SI. Where the frame has a deep map, all that is computed

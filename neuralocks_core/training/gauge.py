@@ -59,9 +59,9 @@ class Gauge:
 def measure(
     net: StrandNet,
     bank: RolloutBank,
-    output: str = "direction",
-    history: slice | None = None,
-    anchored: bool = True,
+    output: str,
+    history: slice,
+    anchored: bool,
 ) -> Gauge:
     """Compare the network with all rollouts of a held-out bank.
 
@@ -79,8 +79,7 @@ def measure(
         length = bank.lengths[rollout.groom][rollout.strands][:, None]
         answer = predicted(net, bank, rollout, output, anchored)[rollout.first :]
         held = rollout.vectors.copy()
-        if history is not None:
-            held[:, history] = 0
+        held[:, history] = 0
         still = predicted(net, bank, replace(rollout, vectors=held), output, anchored)[rollout.first :]
         for name, error in (("position", answer - target), ("rigid", target), ("static", still - target)):
             sums[name].append(100 * (np.linalg.norm(error, axis=-1) / length).mean())

@@ -88,10 +88,9 @@ class MomentPool:
         self.moments: list[Moment] = []
         self._maker = RolloutMaker(scene)
 
-    def grow(self, clips: int = 1) -> None:
-        """Add the moments of further random clips."""
-        for _ in range(clips):
-            self._add(len(self.hair))
+    def grow(self) -> None:
+        """Add the moments of another random clip."""
+        self._add(len(self.hair))
 
     def batch(self, rng: np.random.Generator, count: int) -> tuple[list[Moment], list[Hair]]:
         """Random moments and the hair of each."""

@@ -229,9 +229,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
 
 
 @torch.no_grad()
-def predicted(
-    net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str = "direction", anchored: bool = True
-) -> np.ndarray:
+def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str, anchored: bool) -> np.ndarray:
     """The network's displacement (T, n, 24, 3) float32 [m] over a whole rollout.
 
     Args:

@@ -42,8 +42,6 @@ class TrainingScene:
         seed: of everything random.
         frames: length of a rollout, in steps of `spec.dt`.
         strands: strands of a rollout, in whole locks.
-        rest_support: whether the bind pose is an equilibrium.
-        substeps: of the solver in a step.
         held_out: draw from the locks and the random numbers that training never sees.
     """
 
@@ -54,8 +52,6 @@ class TrainingScene:
     seed: int = 0
     frames: int = 110
     strands: int = 64
-    rest_support: bool = True
-    substeps: int = 1
     held_out: bool = False
 
 
@@ -141,8 +137,6 @@ class RolloutMaker:
             None if self.body is None else self.body.triangles,
             {name: np.array([getattr(m, name) for m in draw.materials]) for name in RANGES},
             dt=scene.spec.dt,
-            substeps=scene.substeps,
-            rest_support=scene.rest_support,
             neighbours=lock_mates(rest, groom.lock[draw.strands]),
             bind_body=None if self.body is None else scene.character.canonical(self.body.shaped(shape)),
             planes=True,

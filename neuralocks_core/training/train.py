@@ -275,7 +275,7 @@ def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
     budget = {"steps": min(1000, options.steps)} if options.steps else {"seconds": min(35.0, 4.0 * options.minutes)}
     coder = train_autoencoder(
         shapes, **budget, seed=scene.seed, progress=lambda done, total, message: report(0.0, message)
-    ).cpu()
+    )
     checkpoint.save(saved, {}, {"coder": coder})
     return coder
 

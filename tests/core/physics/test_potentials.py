@@ -167,7 +167,7 @@ def test_the_style_fades_with_the_distance_to_the_body():
     far = torch.linspace(0, 0.06, 24, dtype=torch.float64)[None]
     r = rods(rest)
     expected = (r.mass[0] * (1 - (far[0] / 0.03).clamp_max(1)) * 7.0 * 3e-4).sum()
-    assert hair_style(x, r, far, 7.0, 0.03).item() == pytest.approx(expected.item())
+    assert hair_style(x, r, far, 7.0).item() == pytest.approx(expected.item())
 
 
 def test_each_frame_of_a_batch_may_have_neighbours_of_its_own(curls):

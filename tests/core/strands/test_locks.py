@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from neuralocks_core.strands.locks import lock_codes, lock_of_roots, neighbours
+from neuralocks_core.strands.locks import NEAR_RADIUS, NEAREST, lock_codes, lock_of_roots, neighbours
 
 
 def scalp(strands, seed=0):
@@ -64,13 +64,13 @@ def test_lock_codes_are_means_of_the_valid():
 
 def test_neighbours_against_brute_force():
     random = np.random.default_rng(0)
-    rest = scalp(60)[:, None] * np.linspace(1.0, 1.3, 24)[:, None] + random.normal(size=(60, 24, 3)) * 1e-3
-    radius, count = 0.02, 4
-    found = neighbours(rest, radius=radius, count=count)
+    rest = 0.5 * scalp(60)[:, None] * np.linspace(1.0, 1.3, 24)[:, None] + random.normal(size=(60, 24, 3)) * 1e-3
+    found = neighbours(rest)
     points = rest.reshape(-1, 3)
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     strand = np.arange(len(points)) // 24
     distance[strand[:, None] == strand[None]] = np.inf
-    expected = np.argsort(distance, axis=1)[:, :count]
-    expected = np.where(np.take_along_axis(distance, expected, 1) <= radius, expected, -1)
-    np.testing.assert_array_equal(found.reshape(-1, count), expected)
+    expected = np.argsort(distance, axis=1)[:, :NEAREST]
+    expected = np.where(np.take_along_axis(distance, expected, 1) <= NEAR_RADIUS, expected, -1)
+    assert (expected < 0).any() and (expected >= 0).any(axis=0).all()
+    np.testing.assert_array_equal(found.reshape(-1, NEAREST), expected)

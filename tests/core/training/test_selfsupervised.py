@@ -46,7 +46,8 @@ def _headed():
 @pytest.fixture(scope="module")
 def pool():
     pool = MomentPool(TrainingScene(_headed(), (straight_hair(),), spec=SPEC, frames=40, strands=16))
-    pool.grow(4)
+    for _ in range(4):
+        pool.grow()
     return pool
 
 
@@ -76,7 +77,8 @@ def _values(losses):
 
 def test_the_pool_is_the_same_for_the_same_scene(pool):
     again = MomentPool(pool.scene)
-    again.grow(4)
+    for _ in range(4):
+        again.grow()
     assert len(again.moments) == len(pool.moments) > 8
     for one, two in zip(pool.moments, again.moments):
         np.testing.assert_array_equal(one.vectors, two.vectors)
