@@ -27,3 +27,8 @@ def write_random_model(path: Path, gain: float) -> Path:
         net.out.bias.mul_(gain)
     meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": True, "output": "direction"}
     return model.write(path, meta, strand_graphs(encoder, net, "direction"))
+
+
+def offsets_of(net, strands, frames):
+    """What a network answers, (B, S, 24, 3), to strands (S, 70) or (B, S, 70) in frames (B, F)."""
+    return net.tail(net.strand_part(strands), net.frame_part(frames)[:, None]).unflatten(-1, (24, 3))

@@ -8,6 +8,7 @@ import torch
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.networks import RANKS, StrandNet, deform
+from tests.strand_models import offsets_of
 
 HISTORY = slice(40, 100)
 
@@ -26,11 +27,6 @@ def _net(motion="linear", static=False):
     frames[:, 7] = 0.3
     net.set_normalisation(torch.randn(50, 70) * 3 + 1, frames, HISTORY, static=static)
     return net
-
-
-def _answer(net, strands, frames):
-    """(B, S, 24, 3) offsets of (S, 70) or (B, S, 70) strands in (B, 100) frames."""
-    return net.tail(net.strand_part(strands), net.frame_part(frames)[:, None]).unflatten(-1, (24, 3))
 
 
 def _run(graph, output=None, **inputs):
@@ -132,21 +128,21 @@ def test_a_static_network_does_not_read_the_history():
     net = _net(static=True)
     frames = torch.randn(1, 100).repeat(2, 1)
     frames[1, HISTORY] += 100.0
-    still, moving = _answer(net, torch.randn(4, 70), frames)
+    still, moving = offsets_of(net, torch.randn(4, 70), frames)
     assert torch.equal(still, moving)
-    assert not torch.equal(*_answer(_net(), torch.randn(4, 70), frames))
+    assert not torch.equal(*offsets_of(_net(), torch.randn(4, 70), frames))
 
 
 def test_an_input_that_never_varied_is_not_read():
     net = _net()
     frames = torch.zeros(2, 100)
     frames[1, 7] = 50.0
-    assert torch.equal(*_answer(net, torch.randn(4, 70), frames))
+    assert torch.equal(*offsets_of(net, torch.randn(4, 70), frames))
 
 
 def test_own_strands_in_each_frame_equal_the_same_strands_for_all():
     net, strands, frames = _net(), torch.randn(4, 70), torch.randn(3, 100)
-    torch.testing.assert_close(_answer(net, strands, frames), _answer(net, strands.expand(3, 4, 70), frames))
+    torch.testing.assert_close(offsets_of(net, strands, frames), offsets_of(net, strands.expand(3, 4, 70), frames))
 
 
 def test_zero_offsets_are_exactly_the_groom(rest):
