@@ -9,21 +9,19 @@ from scipy.spatial import cKDTree
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import loose, tied
-from neuralocks_core.hairstyles.growth import Site, evenly, march
+from neuralocks_core.hairstyles.growth import STEPS, Site, evenly
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp, from_head
 from neuralocks_core.hairstyles.shaping import shaped
+from neuralocks_core.hairstyles.style import Style
 from neuralocks_core.strands.strand_set import root_uv
 
-STYLES = (*loose.STYLES, *tied.STYLES)
-"""Names of the styles that `grow` knows."""
+STYLES = {**loose.STYLES, **tied.STYLES}
+"""The styles that `grow` knows, by name."""
 
 MOST_STRANDS = 150_000
 
 __all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "from_head", "grow"]
-
-_STEPS = 24
-"""Vertices of a strand before it is waved or curled."""
 
 _ROOT_WIDTH, _TIP_WIDTH = 9e-5, 5e-5  # [m], real hair
 
@@ -55,15 +53,12 @@ def grow(
     random = np.random.default_rng(seed)
     obstacle = body if isinstance(body, Obstacle) else Obstacle(scalp, body)
     size = scalp.radius / 0.1
-    chosen = loose.STYLES.get(style) or tied.STYLES[style]
+    chosen = STYLES[style]
     site = _site(chosen, scalp, count, random, size)
-    if style in loose.STYLES:
-        axis = march(site, chosen.plan(site), scalp, obstacle, _STEPS)
-    else:
-        axis = tied.gathered(site, chosen, scalp, obstacle, chosen.shape.vertices)
+    axis = chosen.axis(site, scalp, obstacle)
     points = shaped(axis, site, chosen.shape, obstacle, size)
-    if chosen.shape.vertices == _STEPS:
-        points = evenly(points, _STEPS).astype(np.float32)
+    if chosen.shape.vertices == STEPS:
+        points = evenly(points, STEPS).astype(np.float32)
         points[:, 0] = axis[:, 0]
     vertices = points.shape[1]
     width = np.linspace(_ROOT_WIDTH, _TIP_WIDTH, vertices, dtype=np.float32)
@@ -79,20 +74,18 @@ def grow(
     )
 
 
-def _site(style: loose.Loose | tied.Tied, scalp: Scalp, count: int, random: np.random.Generator, size: float) -> Site:
+def _site(style: Style, scalp: Scalp, count: int, random: np.random.Generator, size: float) -> Site:
     roots = scalp.roots(count, random)
-    density = getattr(style, "density", None)
-    if density is not None:
+    if style.density is not None:
         many = scalp.roots(4 * count, random)
-        chance = density((many.place - scalp.head_centre) / scalp.radius)
+        chance = style.density((many.place - scalp.head_centre) / scalp.radius)
         kept = np.argsort(random.random(4 * count) / np.maximum(chance, 1e-6), kind="stable")[:count]
-        roots = type(roots)(many.place[kept], many.normal[kept], many.border[kept])
+        roots = many.rows(kept)
     clumps = int(np.clip(scalp.area / (style.shape.clump_spacing * size) ** 2, 1, count))
     guides = np.arange(clumps)  # roots come in random order: the first ones are as good as any
     ragged = 0.15 * style.shape.clump_spacing * size * random.normal(size=(count, 3))
     seen = (roots.place - scalp.head_centre) / scalp.radius
-    zone = getattr(style, "zone", None)
-    apart = np.zeros(count) if zone is None else 10.0 * zone(seen)  # metres no search will cross
+    apart = np.zeros(count) if style.zone is None else 10.0 * style.zone(seen)  # metres no search will cross
     tree = cKDTree(np.column_stack([roots.place[guides], apart[guides]]))
     nearest = tree.query(np.column_stack([roots.place + ragged, apart]))[1]
     nearest[guides] = guides

@@ -30,9 +30,8 @@ class Site:
 
     def rows(self, part: slice) -> Site:
         """Some of the strands; `guide` still counts all of them."""
-        roots = Roots(self.roots.place[part], self.roots.normal[part], self.roots.border[part])
         rest = (getattr(self, field)[part] for field in ("seen", "guide", "of_clump", "own"))
-        return Site(roots, *rest)
+        return Site(self.roots.rows(part), *rest)
 
     def along_scalp(self, direction: np.ndarray) -> np.ndarray:
         """(S, 3) unit: a direction (S, 3) or (3,) laid flat on the scalp."""
@@ -70,6 +69,8 @@ class Plan:
         return Plan(**{field: value[part] for field, value in vars(self).items()})
 
 
+STEPS = 24
+"""Vertices of a strand before it is waved or curled."""
 CHUNK = 4096
 """Strands worked on at a time: their arrays stay in the processor's cache."""
 

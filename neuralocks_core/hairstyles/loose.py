@@ -8,20 +8,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import DOWN, Plan, Site, smooth, unit
+from neuralocks_core.hairstyles.growth import DOWN, STEPS, Plan, Site, march, smooth, unit
+from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
+from neuralocks_core.hairstyles.style import Style
 
 
 @dataclass(frozen=True)
-class Loose:
-    """A style: what it does at each root, and to all strands."""
+class Loose(Style):
+    """A style that says how strands grow step by step from each root."""
 
     plan: Callable[[Site], Plan]
-    shape: Shape
-    density: Callable[[np.ndarray], np.ndarray] | None = None
-    """(S, 3) `Site.seen` to chances (S,) 0..1 that hair grows there; None everywhere."""
-    zone: Callable[[np.ndarray], np.ndarray] | None = None
-    """(S, 3) `Site.seen` to numbers (S,): no clump reaches from one zone into another."""
+
+    def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
+        return march(site, self.plan(site), scalp, obstacle, STEPS)
 
 
 def _falling(
@@ -203,35 +204,35 @@ def _mohawk_density(seen: np.ndarray) -> np.ndarray:
 
 
 STYLES = {
-    "long_straight": Loose(_long_straight, Shape(clumping=0.55, frizz=0.0007), zone=_sides(0.0)),
+    "long_straight": Loose(Shape(clumping=0.55, frizz=0.0007), _long_straight, zone=_sides(0.0)),
     "wavy": Loose(
-        _wavy,
         Shape(32, clump_spacing=0.014, clumping=0.8, wave=0.008, pitch=0.085, curl_from=0.12, unison=0.7),
+        _wavy,
         zone=_sides(0.28),
     ),
-    "bob": Loose(_bob, Shape(clump_spacing=0.008, clumping=0.45, frizz=0.0006), zone=_sides(0.25)),
+    "bob": Loose(Shape(clump_spacing=0.008, clumping=0.45, frizz=0.0006), _bob, zone=_sides(0.25)),
     "fringe": Loose(
-        _fringe,
         Shape(clump_spacing=0.008, clumping=0.5, frizz=0.0006),
+        _fringe,
         zone=lambda seen: np.where(_bangs(seen), 2.0, _sides(0.0)(seen)),
     ),
-    "pixie": Loose(_pixie, Shape(clump_spacing=0.011, clumping=0.85, frizz=0.0008)),
+    "pixie": Loose(Shape(clump_spacing=0.011, clumping=0.85, frizz=0.0008), _pixie),
     "tight_curls": Loose(
-        _tight_curls,
         Shape(64, clump_spacing=0.012, clumping=0.85, curl=0.0065, pitch=0.026, curl_from=0.05, frizz=0.0008),
+        _tight_curls,
     ),
     "coils": Loose(
-        _coils,
         Shape(96, clump_spacing=0.009, clumping=0.9, curl=0.0035, pitch=0.0095, curl_from=0.015, frizz=0.0007),
+        _coils,
         zone=_sides(0.0),
     ),
     "afro": Loose(
-        _afro,
         Shape(72, clump_spacing=0.006, clumping=0.5, curl=0.0024, pitch=0.007, curl_from=0.01, scatter=1.0),
+        _afro,
     ),
     "mohawk": Loose(
-        _mohawk,
         Shape(clump_spacing=0.011, clumping=0.85, frizz=0.0006),
+        _mohawk,
         density=_mohawk_density,
         zone=lambda seen: np.where(np.abs(seen[:, 0]) < 0.27, 1.0, 0.0),
     ),

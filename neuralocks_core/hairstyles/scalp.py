@@ -130,6 +130,10 @@ class Roots:
     border: np.ndarray
     """(S,) distance to the hairline [m]."""
 
+    def rows(self, index: slice | np.ndarray) -> Roots:
+        """Some of them."""
+        return Roots(self.place[index], self.normal[index], self.border[index])
+
 
 def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray) -> Scalp:
     """Mark a plausible scalp on a head: above the hairline, the crown and the back down to the nape.

@@ -12,19 +12,29 @@ from neuralocks_core.hairstyles.growth import DOWN, Site, at_vertices, evenly, s
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
+from neuralocks_core.hairstyles.style import Style
 
 _ON_HEAD, _TAIL = 18, 60
 
 
 @dataclass(frozen=True)
-class Tied:
-    """A style: where it is tied, and what becomes of the hair behind the tie."""
+class Tied(Style):
+    """A style that gathers hair in one place: where it is tied, and what becomes of the hair behind the tie."""
 
     tie: tuple[float, float, float]
     """Direction of the tie from the head's centre."""
     tail: Callable[[Site, Knot, Scalp, Obstacle], np.ndarray]
     """Points (S, M, 3) [m] behind the tie; all are called alike, and a bun keeps clear of nothing."""
-    shape: Shape
+
+    def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
+        """From the roots over the head, through the tie and on."""
+        knot = _knot(site, self.tie, scalp, obstacle)
+        ring = knot.place + 0.11 * scalp.radius * (knot.disc @ np.stack(_across(knot.out)))
+        head = _over_head(site, ring, scalp, obstacle)
+        points = np.concatenate([head[:, :-1], self.tail(site, knot, scalp, obstacle)], axis=1)
+        for _ in range(4):  # round the corner at the tie
+            points[:, 1:-1] = (points[:, :-2] + 2 * points[:, 1:-1] + points[:, 2:]) / 4
+        return evenly(points.astype(np.float32), self.shape.vertices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +49,8 @@ class Knot:
     """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie together."""
 
 
-def gathered(site: Site, style: Tied, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
-    """(S, steps, 3) [m] strands from their roots over the head, through the tie and on."""
-    knot = _knot(site, style, scalp, obstacle)
-    ring = knot.place + 0.11 * scalp.radius * (knot.disc @ np.stack(_across(knot.out)))
-    head = _over_head(site, ring, scalp, obstacle)
-    points = np.concatenate([head[:, :-1], style.tail(site, knot, scalp, obstacle)], axis=1)
-    for _ in range(4):  # round the corner at the tie
-        points[:, 1:-1] = (points[:, :-2] + 2 * points[:, 1:-1] + points[:, 2:]) / 4
-    return evenly(points.astype(np.float32), steps)
-
-
-def _knot(site: Site, style: Tied, scalp: Scalp, obstacle: Obstacle) -> Knot:
-    out = unit(np.array(style.tie))
+def _knot(site: Site, tie: tuple[float, float, float], scalp: Scalp, obstacle: Obstacle) -> Knot:
+    out = unit(np.array(tie))
     # From far outside back to the skin, then out by the bundle's own thickness.
     place = scalp.head_centre + 1.6 * scalp.radius * out
     for _ in range(12):
@@ -161,7 +160,7 @@ def _circle(turns: np.ndarray) -> np.ndarray:
 
 
 STYLES = {
-    "ponytail": Tied((0.0, 0.50, -1.0), _ponytail, Shape(clumping=0.35, frizz=0.0007)),
-    "braid": Tied((0.0, -0.55, -1.0), _braid, Shape(vertices=48, clumping=0.0, frizz=0.0004)),
-    "bun": Tied((0.0, 0.55, -1.0), _bun, Shape(vertices=40, clumping=0.0, frizz=0.0010)),
+    "ponytail": Tied(Shape(clumping=0.35, frizz=0.0007), (0.0, 0.50, -1.0), _ponytail),
+    "braid": Tied(Shape(vertices=48, clumping=0.0, frizz=0.0004), (0.0, -0.55, -1.0), _braid),
+    "bun": Tied(Shape(vertices=40, clumping=0.0, frizz=0.0010), (0.0, 0.55, -1.0), _bun),
 }
