@@ -7,8 +7,6 @@ keep a strand within a millimetre, which the MLPs alone do not reach in minutes.
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -16,6 +14,7 @@ from torch import Tensor, nn
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 from neuralocks_core.strands.strand_set import K
+from neuralocks_core.training.descent import Schedule, descend
 
 LATENT, HIDDEN = 32, 256
 """Length of a code, and width of the hidden layers."""
@@ -64,20 +63,17 @@ def train_autoencoder(
     # A millimetre on short hair is a larger part of its shape than on long hair.
     weight = 1.0 / (data[:, -3:].square().sum(1) + 0.05**2)
     weight = weight / weight.mean()
-    start, step, done = time.monotonic(), 0, 0.0
-    while done < 1.0:
+
+    def losses(_: float) -> dict[str, Tensor]:
         pick = torch.randint(len(data), (min(batch, len(data)),), generator=generator)
         target = data[pick]
-        loss = ((model(target) - target).square().mean(1) * weight[pick]).mean()
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        for group in optimiser.param_groups:
-            group["lr"] = rate * (0.01 + 0.99 * 0.5 * (1.0 + np.cos(np.pi * done)))
-        optimiser.step()
-        step += 1
-        done = step / steps if steps else (time.monotonic() - start) / seconds
-        if progress and step % 200 == 0:
-            progress(int(1000 * min(done, 1.0)), 1000, f"strand codes: error {1e3 * loss.item() ** 0.5:.1f} mm")
+        return {"shape": ((model(target) - target).square().mean(1) * weight[pick]).mean()}
+
+    schedule = Schedule(seconds / 60, steps, rate, floor=0.01, warm_up=1, clip=float("inf"))
+    for state in descend([optimiser], losses, schedule):
+        if progress:
+            error = 1e3 * state.losses["shape"] ** 0.5
+            progress(int(1000 * state.done), 1000, f"strand codes: error {error:.1f} mm")
     return model.eval().requires_grad_(False)
 
 
