@@ -177,20 +177,6 @@ def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
     return (rigid @ np.linalg.inv(head))[:, None] @ joints
 
 
-def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
-    """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
-    the same each time. With one seed, those of a smaller count are among those of a larger one.
-    """
-    usable = np.flatnonzero(strands.valid)
-    if len(usable) <= count:
-        return usable
-    order = np.random.default_rng(seed).permutation(int(strands.lock.max()) + 1)
-    rank = np.empty(len(order), int)
-    rank[order] = np.arange(len(order))
-    by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]
-    return np.sort(by_lock[:count])
-
-
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     """Correlation of two curves (T, 3) about their means."""
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)

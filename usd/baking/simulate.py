@@ -10,10 +10,11 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.comparison import RUN_IN, simulated, whole_locks
+from neuralocks_core.evaluation.comparison import RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
+from neuralocks_core.strands.locks import whole_locks
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name

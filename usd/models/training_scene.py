@@ -8,10 +8,10 @@ from pxr import UsdSkel
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.comparison import whole_locks
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
+from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 from neuralocks_core.training.rollouts import TrainingScene
 

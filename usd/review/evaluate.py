@@ -20,6 +20,7 @@ from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
+from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import K, StrandSet, strands_on
 
 from ..border.damage import names_damage
@@ -95,7 +96,7 @@ class _Subject:
         self.character, groom = item.attachment.character, item.groom
         every = strands_on(self.character, groom)
         # The strands that a solver moved are the first choice of seed 0: those that follow them must be met, too.
-        self.chosen = comparison.whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
+        self.chosen = whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self.valid = int(every.valid.sum())
         self._within(groom)
@@ -221,7 +222,7 @@ class _Subject:
     def compared(self, material: Material, model) -> tuple[dict, dict]:
         """Rows and tip curves beside the reference."""
         strands, times = self.strands, self.baked.times
-        few = comparison.whole_locks(strands, REFERENCE_STRANDS)
+        few = whole_locks(strands, REFERENCE_STRANDS)
         some = strands.subset(few)
         clip = self._clip
         # The network knows what came before the first frame baked, so the reference must, too.

@@ -6,7 +6,7 @@ import pytest
 
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.comparison import whole_locks
+from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import strands_on
 from usd.baking.simulate import simulate
 from usd.review.baked import read_baked
