@@ -20,7 +20,7 @@ MOVED = 0.001
 """Skin that a blend shape moves by less [m] is not moved by it; files round the offsets of all their points."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """Joints in bind pose, parents before children.
 
@@ -78,7 +78,7 @@ def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
     return sizes(posed[few] @ np.linalg.inv(bind))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """Skinned triangle mesh in bind pose.
 
@@ -140,7 +140,7 @@ class Body:
         return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Character:
     """A skeleton with its body and the meaning of its joints.
 

@@ -20,7 +20,7 @@ LOOP_GAP = 2.0
 """Turn of a joint from the last sample of a loop to its first [degrees] that a user should know of."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Clip:
     """World transforms of every joint over time.
 

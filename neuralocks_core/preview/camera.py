@@ -9,7 +9,7 @@ ANGLE = 24.0
 """Of a picture's height, as its camera sees it [degrees]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """A pinhole camera of a view ANGLE.
 

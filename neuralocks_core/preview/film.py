@@ -31,7 +31,7 @@ class Detail:
     width: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """What is to be seen, from arrays.
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 from neuralocks_core.errors import NeuralocksError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeadMotion:
     """Poses at all substeps, T frames with n substeps: N = (T - 1) n + 1."""
 

@@ -10,7 +10,7 @@ from neuralocks_core.strands.bends import bends
 from neuralocks_core.strands.rest_support import rest_force
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RestRods:
     """Constants of every strand; all per unit line density, canonical axes."""
 

@@ -19,7 +19,7 @@ SIZES = (0.7, 1.4)
 fast gravity swings hair does, by its square root."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HairChains:
     """Moving hair joints in bind pose, parents before children.
 

@@ -15,7 +15,7 @@ ROOM = 0.2
 """So far beyond where hair rests [m] it could come to touch a body: the neck bends."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HairRig:
     """What training, report and pictures need of a rig.
 

@@ -9,7 +9,7 @@ LEAST_WEIGHT = 1e-3
 """Skin weight below which a joint does not drive a vertex."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SkinnedMesh:
     """One skinned mesh of a rig.
 

@@ -55,7 +55,7 @@ class TrainingScene:
     held_out: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rollout:
     """One simulated clip.
 
@@ -85,7 +85,7 @@ class Rollout:
     materials: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Draw:
     """The random choices of a rollout.
 
