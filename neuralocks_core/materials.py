@@ -27,6 +27,8 @@ COLLISION = 1e6
 """Stiffness of the body [1/(m s^2)]."""
 MARGIN = 0.004
 """Distance that hair keeps from the body [m], where it does not rest nearer."""
+NO_PLANE = (0.0, 0.0, 0.0, -1e3)
+"""Stands for the body plane n, d of a vertex that no body is near: all that is on earth is outside of it."""
 LINEAR = 0.02
 """Depth in the body [m] from which the force stops growing."""
 SMOOTHING = 0.015

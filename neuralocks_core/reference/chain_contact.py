@@ -72,7 +72,7 @@ class Contacts:
         return cls(np.array(joints), np.array(chosen), np.full(len(joints), radius))
 
 
-class NearBody:
+class NearestVertices:
     """The bodies of one step, points and normals (C, P, 3), to be asked for what is near."""
 
     def __init__(self, points, normals):

@@ -12,7 +12,7 @@ points of the hair's mesh, each fixed to one joint, against the plane of the nea
 import numpy as np
 
 from neuralocks_core.motion import GRAVITY
-from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearBody
+from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearestVertices
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.rods import RodTree
@@ -93,7 +93,7 @@ class ChainSolver:
                 flight = np.einsum("cji,cmj->cmi", rotation, 2 * last - before - origin[:, None])
                 gravity = np.einsum("cji,j->ci", rotation, GRAVITY * self.weight)
                 if part == 0 and body is not None:
-                    near = NearBody(body.points[:, sample], body.normals[:, sample])
+                    near = NearestVertices(body.points[:, sample], body.normals[:, sample])
                 turns, ends = self._step(turns, ends, flight, gravity, h, near, limit)
                 before, last = last, np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
             previous = heads[:, sample]
@@ -155,7 +155,9 @@ class ChainSolver:
         """Distance that each contact keeps: its radius, or its distance at rest if that is less."""
         if body is None:
             return None
-        normals, offsets = NearBody(body.rest_points[None], body.rest_normals[None]).planes(self.contacts.points[None])
+        normals, offsets = NearestVertices(body.rest_points[None], body.rest_normals[None]).planes(
+            self.contacts.points[None]
+        )
         return np.minimum(self.contacts.radius, np.einsum("qi,qi->q", normals[0], self.contacts.points) - offsets[0])
 
     def _touching(self, rotations, positions):

@@ -19,14 +19,14 @@ SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
 
 
-@dataclass(frozen=True)
-class Rollout:
+@dataclass(frozen=True, eq=False)
+class SimulatedHair:
     """T frames of S simulated strands, in canonical space, which leaves out the head's own motion."""
 
     points: np.ndarray
     """(T, S, K, 3) float32 [m]."""
     planes: np.ndarray | None
-    """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; (0, 0, 0, -1e3) if
+    """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; NO_PLANE if
     it is farther than 2 cm. None where they are not asked for."""
     residual: np.ndarray
     """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity; neighbours
@@ -57,7 +57,7 @@ def simulate(
     planes: bool = False,
     device: str = "cpu",
     progress: Progress | None = None,
-) -> Rollout:
+) -> SimulatedHair:
     """Simulate strands on a moving head and body by implicit Euler (docs/architecture.md, Physics).
 
     Before the first frame the head moves at constant velocity without rotating and the hair is at rest in it. Any
@@ -140,11 +140,11 @@ def simulate(
     return result
 
 
-def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> Rollout:
+def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> SimulatedHair:
     """Arrays to be filled in."""
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     near = np.zeros((*points.shape[:3], 4), np.float32) if planes else None
-    return Rollout(points, near, np.zeros(frames), np.zeros(frames))
+    return SimulatedHair(points, near, np.zeros(frames), np.zeros(frames))
 
 
 def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.reference.rest import RestRods
 from neuralocks_core.warp_device import start_warp
@@ -96,7 +97,7 @@ class Stepper:
         self.tension = self._empty(wp.float64, shape)
         self.load = energy_kernels.Load()
         self.load.target, self.load.pull = self._empty(wp.vec3d, shape), self._empty(wp.float64, shape)
-        self.load.plane = wp.array(np.full((*shape, 4), [0, 0, 0, -1e3]), dtype=wp.vec4d, device=self.device)
+        self.load.plane = wp.array(np.full((*shape, 4), NO_PLANE), dtype=wp.vec4d, device=self.device)
         self.load.margin = wp.array(np.full(shape, margin), dtype=wp.float64, device=self.device)
         self.load.collision = collision
         self.seen, self.corner = self._empty(wp.vec3d, shape), self._empty(wp.vec2, shape)
@@ -178,7 +179,7 @@ class Stepper:
         self._solve(dt, iterations, settling=0)
 
     def read(self, points: np.ndarray, planes: np.ndarray | None) -> tuple[float, float]:
-        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `rods.Rollout` has them."""
+        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `rods.SimulatedHair` has them."""
         args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.materials import MARGIN
+from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
-from neuralocks_core.reference.rods import Rollout
+from neuralocks_core.reference.rods import SimulatedHair
 from neuralocks_core.reference.stepper import REACH
 from neuralocks_core.warp_device import start_warp
 
@@ -34,7 +34,7 @@ def simulate_xpbd(
     gravity: float = G,
     device: str = "cpu",
     progress: Progress | None = None,
-) -> Rollout:
+) -> SimulatedHair:
     """Simulate strands by XPBD on the energies of `rods.simulate`, with one iteration in each of many substeps.
 
     It starts from the rest shape (there is no equilibrium solve) and has no ties between neighbours. Edges stretch by
@@ -74,7 +74,7 @@ def simulate_xpbd(
         hair.read(head[t], b, points[t])
         if progress:
             progress(t + 1, frames, "simulating")
-    return Rollout(points, None, np.full(frames, np.nan), np.full(frames, float(substeps)))
+    return SimulatedHair(points, None, np.full(frames, np.nan), np.full(frames, float(substeps)))
 
 
 class _Hair:
@@ -96,7 +96,7 @@ class _Hair:
         self.gravity = wp.vec3(0.0, -gravity, 0.0)
         self.old, self.twist = (wp.zeros(self.shape, dtype=wp.vec3, device=device) for _ in range(2))
         self.waiting = wp.zeros(self.shape, dtype=wp.float32, device=device)
-        far = np.full((*self.shape, 4), [0, 0, 0, -1e3], np.float32)
+        far = np.full((*self.shape, 4), NO_PLANE, np.float32)
         self.plane = wp.array(far, dtype=wp.vec4, device=device)
         self.limit = self._reals(np.full((self.strands, vertices), margin))
         self.mesh = None

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from neuralocks_core.body.mesh import vertex_normals
-from neuralocks_core.materials import MARGIN
+from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density
@@ -29,7 +29,7 @@ DEEPEST = 0.04
 """[m] A nearest surface farther than this is no contact: the plane through it means nothing there."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Moment:
     """One frame to be penalised and the two before it.
 
@@ -50,7 +50,7 @@ class Moment:
     normals: np.ndarray | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hair:
     """Strands of whole locks on a body of some shape.
 
@@ -157,7 +157,7 @@ def nearest_planes(surface: cKDTree, normals: np.ndarray, points: np.ndarray) ->
         points: (..., 3) in the same space.
 
     Returns:
-        planes (..., 4) float32, normal and offset; an offset of -1000 where there is no contact to be had;
+        planes (..., 4) float32, normal and offset; NO_PLANE where there is no contact to be had;
         distance (...) float32 to the nearest vertex [m].
     """
     distance, index = surface.query(points)
@@ -168,5 +168,5 @@ def nearest_planes(surface: cKDTree, normals: np.ndarray, points: np.ndarray) ->
     # behind a far point, as the shoulder's does under the chin, is none.
     contact = (distance < DEEPEST) & ((height > 0) | (-height > 0.5 * distance) | (distance < 0.015))
     planes = np.concatenate([normal, offset[..., None]], axis=-1)
-    planes[~contact] = (0.0, 0.0, 0.0, -1000.0)
+    planes[~contact] = NO_PLANE
     return planes.astype(np.float32), distance.astype(np.float32)

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.deformation.strand_session import strand_inputs
-from neuralocks_core.materials import MARGIN
+from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training.descent import Descended, Schedule, descend, muon
 from neuralocks_core.training.farm import load
@@ -217,7 +217,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
     target = (normals * batch["moved"]).sum(-1) - offset
     depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
-    depth = torch.where(offset > -100, depth, torch.zeros_like(depth))
+    depth = torch.where(offset > NO_PLANE[3] / 10, depth, torch.zeros_like(depth))
     return {
         "position": options.position * position.mean(),
         "velocity": options.velocity * velocity.mean(),

@@ -3,10 +3,11 @@
 
 import warp as wp
 
+from neuralocks_core import materials
 from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
-NO_PLANE = wp.constant(wp.vec4d(0.0, 0.0, 0.0, -1.0e3))
-"""n.x - d of this is 1 km wherever x is: no body near."""
+NO_PLANE = wp.constant(wp.vec4d(*materials.NO_PLANE))
+NO_PLANE_SINGLE = wp.constant(wp.vec4(*materials.NO_PLANE))
 STILL = wp.constant(wp.float64(5e-4))
 FAR = wp.constant(wp.float64(0.02))
 FAR_AHEAD = wp.constant(wp.float64(0.05))
@@ -195,7 +196,7 @@ def to_canonical(
     wall = plane[k, s]
     n = wp.vec3d(wall[0], wall[1], wall[2])
     if wp.dot(n, p) - wall[3] > near:
-        planes[s, k] = wp.vec4(0.0, 0.0, 0.0, -1.0e3)
+        planes[s, k] = NO_PLANE_SINGLE
     else:
         m = wp.quat_rotate_inv(turn, n)
         d = wall[3] - wp.dot(n, origin)

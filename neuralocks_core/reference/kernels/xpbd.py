@@ -7,9 +7,12 @@ root to tip over distances (rigid), bends (compliance 1 / stiffness) and body pl
 
 import warp as wp
 
+from neuralocks_core import materials
+
 array_vec = wp.array2d(dtype=wp.vec3)
 array_real = wp.array2d(dtype=wp.float32)
 
+NO_PLANE = wp.constant(wp.vec4(*materials.NO_PLANE))
 CAUTION = wp.constant(1.5)
 """How much of a bend's correction is held back, as a factor on its vertices' inverse mass: with 1, a single pass whose
 corrections reach back to the root shakes short stiff curls at rest. It is lost in the compliance as substeps get short."""
@@ -205,7 +208,7 @@ def look(
     k, s = wp.tid()
     q = wp.quat_rotate(carry, x[k, s]) + carry_origin
     hit = wp.mesh_query_point_sign_normal(mesh, q, reach, 1.0e-3)
-    found = wp.vec4(0.0, 0.0, 0.0, -1.0e3)
+    found = NO_PLANE
     if hit.result:
         near = wp.mesh_eval_position(mesh, hit.face, hit.u, hit.v)
         away = (q - near) * hit.sign

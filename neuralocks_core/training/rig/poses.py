@@ -8,6 +8,7 @@ import numpy as np
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.deformation.scratch import Scratch
+from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
@@ -124,7 +125,7 @@ class PosePool:
             normals[row] = self._normals[pose, nearest]
             offsets[row] = np.einsum("vi,iv->v", normals[row], self._points[pose, :3][:, nearest])
             # Where the rest of the body was cut off, a plane says nothing about inside and outside.
-            offsets[row][self._patch.rim[nearest]] = -1e3
+            offsets[row][self._patch.rim[nearest]] = NO_PLANE[3]
         return normals, offsets
 
     def distances(self, poses: np.ndarray, points: np.ndarray, progress: Progress = silent) -> np.ndarray:
