@@ -21,7 +21,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.animation.puppet import Puppet
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.motion import Clip
 from usd.assets.animation import write_animation
 from usd.assets.prims import author_influences, bind_to

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
-from neuralocks_core.body.own_skin import own_skin
+from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
 

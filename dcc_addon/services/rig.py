@@ -9,10 +9,10 @@ import numpy as np
 
 from neuralocks_core.anatomy.humanoid import find_humanoid
 from neuralocks_core.anatomy.standing import standing
-from neuralocks_core.body.mesh import inside_out
 from neuralocks_core.character import Body, Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.mesh import inside_out
 from neuralocks_core.rotation import transformed
 
 from . import names

@@ -7,9 +7,9 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles.scalp import Scalp
+from neuralocks_core.mesh import vertex_normals
 
 _CELL = 0.08
 """Grid spacing in head radii (7 mm on an adult)."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.mesh import vertex_normals
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
 # forehead, up is in skull heights from the head's centre. From the nape behind and over the ear, the

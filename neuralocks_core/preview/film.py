@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.preview import shading
 from neuralocks_core.preview.camera import ANGLE, Camera
 from neuralocks_core.preview.canvas import open_canvas

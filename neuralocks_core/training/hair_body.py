@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.character import Body, Character
+from neuralocks_core.mesh import vertex_normals
 
 CELL = 0.012
 """[m] Vertices within one such cell become one; on a head's curvature that moves the surface by 0.2 mm."""

@@ -14,8 +14,8 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.materials import MARGIN, NO_PLANE
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density

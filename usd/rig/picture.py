@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from neuralocks_core.body.mesh import connected_pieces
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.mesh import connected_pieces
 from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.body.mesh import vertex_normals
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
 
 AROUND = 1000

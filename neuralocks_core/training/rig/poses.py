@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.deformation.scratch import Scratch
 from neuralocks_core.materials import NO_PLANE
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig

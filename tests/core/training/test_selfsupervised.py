@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from neuralocks_core.body.mesh import vertex_normals
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.character import Body, Character
 from neuralocks_core.deformation.strand_session import strand_inputs
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moment_options import SelfSupervisedOptions

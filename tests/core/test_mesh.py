@@ -4,7 +4,7 @@
 import numpy as np
 import trimesh
 
-from neuralocks_core.body.mesh import connected_pieces, inside_out, vertex_normals
+from neuralocks_core.mesh import connected_pieces, inside_out, vertex_normals
 
 
 def test_normals_of_a_sphere_are_its_directions():

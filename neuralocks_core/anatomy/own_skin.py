@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.body.mesh import connected_pieces
+from neuralocks_core.mesh import connected_pieces
 
 WELDED = 1e-4
 """Points this near [m] are one: files part a skin along the seams of its texture and between its meshes."""
