@@ -16,30 +16,28 @@ def adhesion(
     neighbours: Tensor,
     stiffness: float | Tensor = Material.clumping,
     *,
-    rest_distance: bool = True,
-    lagged: bool = False,
+    paper: bool = False,
 ) -> Tensor:
     """Energy `k sum m mean_n |(x - x_n) - (x0 - x0_n)|^2` over the neighbours at rest.
 
-    The paper's `|x - x_n|^2` pulls neighbours into one point; it is taken with `rest_distance=False`. Both are
-    means over the neighbours that there are, weighted by vertex mass.
+    The paper's `|x - x_n|^2` pulls neighbours into one point. Both are means over the neighbours that there are,
+    weighted by vertex mass. No gradient goes into the neighbours: each pair counts in both its vertices, so the force is
+    the reference solver's and not twice as much; in the paper's form it is the energy's own.
 
     Args:
         x: (..., S, K, 3) points in canonical space [m].
         rods: the strands at rest.
         neighbours: (..., S, K, N) indices into the S K vertices, -1 for none (`locks.neighbours`).
         stiffness: [1/s^2], a number or (..., S, 1).
-        rest_distance: measure from the offset at rest.
-        lagged: no gradient into the neighbours. Each pair counts in both its vertices, so with it the force is
-            the reference solver's; without it, twice as much.
+        paper: measure from nothing, not from the offset at rest, with the whole gradient.
 
     Returns:
         (..., S) energy per unit line density [m^3/s^2].
     """
     present = neighbours >= 0
     index = neighbours.clamp_min(0).long().flatten(-3)
-    from_rest = x - rods.rest if rest_distance else x
-    flat = (from_rest.detach() if lagged else from_rest).flatten(-3, -2)
+    from_rest = x if paper else x - rods.rest
+    flat = (from_rest if paper else from_rest.detach()).flatten(-3, -2)
     index = index.reshape(*(1,) * (flat.ndim - 1 - index.ndim), *index.shape, 1)
     others = torch.take_along_dim(flat, index, -2).reshape(*x.shape[:-1], neighbours.shape[-1], 3)
     gap = (from_rest[..., None, :] - others).square().sum(-1) * present

@@ -97,7 +97,5 @@ def energies(
     if around.distance is not None:
         terms["hair_style"] = hair_style(x, rods, around.distance, stiffness.style)
     if around.neighbours is not None:
-        terms["adhesion"] = adhesion(
-            x, rods, around.neighbours, stiffness.clumping, rest_distance=not paper_adhesion, lagged=not paper_adhesion
-        )
+        terms["adhesion"] = adhesion(x, rods, around.neighbours, stiffness.clumping, paper=paper_adhesion)
     return terms
