@@ -2,7 +2,6 @@
 """Extended position based dynamics: the simulator that games use, as the baseline of speed and accuracy."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,31 +53,28 @@ def simulate_xpbd(
     if not (np.isfinite(dt) and dt > 0) or substeps < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}: must be positive")
     rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
-    # about the head's first place, as in `rods.simulate`
-    away = way.origin[0]
-    way = replace(way, origin=way.origin - away)
     strands, vertices = rods.mass.shape
     hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)
     step, first = dt / substeps, head[0, :3, :3].astype(float)
     hair.begin(first, (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3))
     if body is not None:
         start, faces = check_body(body, triangles, frames)
-        hair.attach_body((start - away) @ first if bind_body is None else np.asarray(bind_body), faces)
+        hair.attach_body((start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
         if body is not None:
-            hair.look(np.asarray(body[t]) - away, a, b)
+            hair.look(np.asarray(body[t]) - way.origin[b], a, b)
         if t:
             hair.go(a, b, step)
-        hair.read(head[t], b, points[t])
+        hair.read(head[t], points[t])
         if progress:
             progress(t + 1, frames, "simulating")
     return SimulatedHair(points, None, np.full(frames, np.nan), np.full(frames, float(substeps)))
 
 
 class _Hair:
-    """Strands in world space on a device, and the body around them. Arrays there are (K, S)."""
+    """Strands on a device, and the body around them. Arrays there are (K, S), points from the head's place along world axes."""
 
     def __init__(self, rods: RestRods, way: HeadMotion, material: dict, margin: float, gravity: float, device: str):
         self.wp = wp = start_warp(device)
@@ -103,7 +99,7 @@ class _Hair:
 
     def begin(self, first: np.ndarray, drift: np.ndarray) -> None:
         """At rest in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
-        self.x = self._vectors(self.rods.points @ first.T + self.way.origin[0])
+        self.x = self._vectors(self.rods.points @ first.T)
         self.velocity = self._vectors(np.broadcast_to(drift, self.rods.points.shape))
 
     def attach_body(self, bind: np.ndarray, faces: np.ndarray) -> None:
@@ -112,39 +108,34 @@ class _Hair:
         self.surface = wp.array(bind.astype(np.float32), dtype=wp.vec3, device=self.device)
         indices = wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device=self.device)
         self.mesh = wp.Mesh(points=self.surface, indices=indices)
-        still = (wp.quat_identity(), wp.vec3(), wp.quat_identity(), wp.vec3())
+        still = wp.quat_identity(), wp.quat_identity()
         self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *still, self.home, self.plane)
         near = np.swapaxes(self.plane.numpy(), 0, 1)
         self.limit = self._reals(np.minimum(self.margin, (near[..., :3] * self.rods.points).sum(-1) - near[..., 3]))
 
     def look(self, body: np.ndarray, a: int, b: int) -> None:
-        """Move the body to points (V, 3), and find what is near when the head has gone from substep a to b."""
+        """Move the body to points (V, 3) from the head's place, and find what is near when the head has gone from substep a to b."""
         self.surface.assign(np.asarray(body, np.float32))
         self.mesh.refit()
-        pose = self.wp.quat(*self.way.turn[b]), self.wp.vec3(*self.way.origin[b])
-        self._run(self.kernels.look, self.shape, self.mesh.id, REACH, *pose, *self._carry(a, b), self.x, self.plane)
+        before, turn = (self.wp.quat(*self.way.turn[i]) for i in (a, b))
+        carry = turn * self.wp.quat_inverse(before)
+        self._run(self.kernels.look, self.shape, self.mesh.id, REACH, turn, carry, self.x, self.plane)
 
     def go(self, a: int, b: int, step: float) -> None:
         """Advance from substep a to b, each of `step` [s]."""
         wp = self.wp
         turns = wp.array(self.way.turn[a : b + 1].astype(np.float32), dtype=wp.quat, device=self.device)
-        origins = wp.array(self.way.origin[a : b + 1].astype(np.float32), dtype=wp.vec3, device=self.device)
+        way = self.way.origin[a : b + 1]
+        moves = wp.array(np.diff(way, axis=0, prepend=way[:1]).astype(np.float32), dtype=wp.vec3, device=self.device)
         self._run(
             self.kernels.frame, self.strands, self.length, self.inverse_mass, self.stiffness, self.curl, self.home,
-            self.push, self.weight, self.damping, turns, origins, self.gravity, step, self.plane, self.limit, self.x,
+            self.push, self.weight, self.damping, turns, moves, self.gravity, step, self.plane, self.limit, self.x,
             self.old, self.velocity, self.twist, self.waiting,
         )  # fmt: skip
 
-    def read(self, head: np.ndarray, b: int, points: np.ndarray) -> None:
-        """Write (S, K, 3) canonical, for the head (4, 4) of substep b."""
-        posed = np.swapaxes(self.x.numpy(), 0, 1) - self.way.origin[b]
-        points[:] = posed @ np.asarray(head, float)[:3, :3]
-
-    def _carry(self, a: int, b: int):
-        """The head's motion from substep a to substep b."""
-        wp, way = self.wp, self.way
-        turn = wp.quat(*way.turn[b]) * wp.quat_inverse(wp.quat(*way.turn[a]))
-        return turn, wp.vec3(*way.origin[b]) - wp.quat_rotate(turn, wp.vec3(*way.origin[a]))
+    def read(self, head: np.ndarray, points: np.ndarray) -> None:
+        """Write (S, K, 3) canonical, for the head (4, 4) of this moment."""
+        points[:] = np.swapaxes(self.x.numpy(), 0, 1) @ np.asarray(head, float)[:3, :3]
 
     def _run(self, kernel: object, dim: int | tuple, *inputs) -> None:
         if self.strands:

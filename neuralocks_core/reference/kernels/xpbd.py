@@ -129,7 +129,7 @@ def frame(
     weight: wp.array(dtype=wp.float32),
     damping: wp.array(dtype=wp.float32),
     turns: wp.array(dtype=wp.quat),
-    origins: wp.array(dtype=wp.vec3),
+    moves: wp.array(dtype=wp.vec3),
     gravity: wp.vec3,
     h: float,
     plane: wp.array2d(dtype=wp.vec4),
@@ -140,28 +140,29 @@ def frame(
     twist: array_vec,
     waiting: array_real,
 ):
-    """All substeps of a frame. turns, origins: the head at each substep, the frame's start first.
+    """All substeps of a frame. turns: the head's at each substep, the frame's start first.
 
-    plane: in the head's frame. push: rest support per mass, head axes. stiffness: 4 B / l per interior vertex.
-    twist, waiting: scratch of `carry_frame` and `hold_bend`.
+    x: from the head's place at that moment, along the world's axes, since float32 is too coarse far from the origin.
+    moves: how far that place went in each substep; the first is not read. plane: in the head's frame. push: rest support
+    per mass, head axes. stiffness: 4 B / l per interior vertex. twist, waiting: scratch of `carry_frame` and `hold_bend`.
     """
     s = wp.tid()
     vertices = x.shape[0]
     for step in range(1, turns.shape[0]):
         turn = turns[step]
-        origin = origins[step]
+        move = moves[step]
         carry = turn * wp.quat_inverse(turns[step - 1])
         keep = wp.exp(-damping[s] * h)
         for k in range(vertices):
             p = x[k, s]
-            old[k, s] = p
+            old[k, s] = p - move
             if k < 2:
-                x[k, s] = origin + wp.quat_rotate(turn, rest[k, s])
+                x[k, s] = wp.quat_rotate(turn, rest[k, s])
             else:
-                along = (wp.quat_rotate(carry, p - origins[step - 1]) + origin - p) / h
+                along = (wp.quat_rotate(carry, p) - p + move) / h
                 v = along + keep * (velocity[k, s] - along)
                 v = v + h * weight[s] * (gravity + wp.quat_rotate(turn, push[k, s]))
-                x[k, s] = p + h * v
+                x[k, s] = old[k, s] + h * v
         q = turn
         edge = wp.normalize(x[1, s] - x[0, s])
         spin = float(0.0)  # noqa: UP018 -- warp takes a plain literal for a constant
@@ -186,7 +187,7 @@ def frame(
             x[k, s] = x[k, s] + sum * inverse_mass[k, s] * twist[k, s]
             wall = plane[k, s]
             n = wp.vec3(wall[0], wall[1], wall[2])
-            p = wp.quat_rotate_inv(turn, x[k, s] - origin)
+            p = wp.quat_rotate_inv(turn, x[k, s])
             depth = margin[k, s] - (wp.dot(n, p) - wall[3])
             if depth > 0.0:
                 x[k, s] = x[k, s] + depth * wp.quat_rotate(turn, n)
@@ -198,15 +199,16 @@ def look(
     mesh: wp.uint64,
     reach: float,
     turn: wp.quat,
-    origin: wp.vec3,
     carry: wp.quat,
-    carry_origin: wp.vec3,
     x: array_vec,
     plane: wp.array2d(dtype=wp.vec4),
 ):
-    """Nearest body element of each vertex, taken along into the frame's end; a plane in the head's frame."""
+    """Nearest body element of each vertex, taken along by a turn of the head; a plane in the head's frame.
+
+    Mesh and x: from the head's place.
+    """
     k, s = wp.tid()
-    q = wp.quat_rotate(carry, x[k, s]) + carry_origin
+    q = wp.quat_rotate(carry, x[k, s])
     hit = wp.mesh_query_point_sign_normal(mesh, q, reach, 1.0e-3)
     found = NO_PLANE
     if hit.result:
@@ -217,5 +219,5 @@ def look(
         if gap > 1.0e-4:
             n = away / gap
         m = wp.quat_rotate_inv(turn, n)
-        found = wp.vec4(m[0], m[1], m[2], wp.dot(n, near - origin))
+        found = wp.vec4(m[0], m[1], m[2], wp.dot(n, near))
     plane[k, s] = found

@@ -75,6 +75,21 @@ def test_bind_pose_and_constant_speed():
     assert np.abs(result.points - rest).max() < 1e-3
 
 
+@pytest.mark.parametrize("substeps", [20, 100])
+def test_far_from_where_it_began(substeps):
+    """A head that turns in a fast vehicle: a constant speed changes nothing, however far it has come."""
+    rest, head = groom(8), shaken(60)
+    head[:, :3, 3] = 0
+    points, faces = sphere(0.1005)
+    fast = head.copy()
+    fast[:, 0, 3] = 150 * np.arange(60) / 30
+    here, there = (
+        simulate_xpbd(rest, way, carried(way, points), faces, bind_body=points, substeps=substeps).points
+        for way in (head, fast)
+    )
+    assert np.linalg.norm(there - here, axis=-1).max() < 5e-4
+
+
 def test_stretch_shrinks_with_substeps_and_nothing_breaks():
     rest, head = groom(8, curl=0.8), shaken(20, 1.5)
     stretch = []
