@@ -66,7 +66,7 @@ def load(
             prefix = f"module/{name}/"
             values = {k.removeprefix(prefix): torch.from_numpy(v) for k, v in arrays.items() if k.startswith(prefix)}
             module.load_state_dict(values)
-    except (OSError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
         fact = "damaged" if "allow_pickle" in str(error) else str(error).splitlines()[0]
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -107,17 +108,26 @@ def save(path: Path, rollout: Rollout) -> None:
 
 
 def load(path: Path) -> Rollout:
-    """Read what `save` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        values = {name: arrays[name] for name in arrays.files}
-    return Rollout(
-        **{
-            **values,
-            "groom": int(values["groom"]),
-            "first": int(values["first"]),
-            "residual": float(values["residual"]),
-        }
-    )
+    """Read what `save` wrote.
+
+    Raises:
+        NeuralocksError: it is damaged, as after a full disk or a power cut.
+    """
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
+            values = {name: arrays[name] for name in arrays.files}
+        return Rollout(
+            **{
+                **values,
+                "groom": int(values["groom"]),
+                "first": int(values["first"]),
+                "residual": float(values["residual"]),
+            }
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile):
+        raise NeuralocksError(
+            f"{path}: this simulation cannot be read; delete it, and go on with --resume: it is made again"
+        ) from None
 
 
 def _path(folder: Path, index: int) -> Path:

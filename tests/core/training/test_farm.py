@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
-from neuralocks_core.training import farm, methods
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.training import checkpoint, farm, methods
 
 ASK = [sys.executable, "-c", "import signal; print(signal.getsignal(signal.SIGINT) == signal.SIG_IGN)"]
 
@@ -74,3 +76,17 @@ class _Farm:
 
 def test_the_last_rollout_is_waited_for_though_its_process_has_ended():
     methods.wait(_Farm(), 1, lambda text: None)
+
+
+@pytest.mark.parametrize("kept", [0, 10, 1000])
+def test_a_damaged_file_says_what_to_do(tmp_path, kept):
+    """A full disk or a power cut cuts files short; a training that is resumed reads them again."""
+    path = tmp_path / "000000.npz"
+    np.savez(path, vectors=np.zeros((100, 8)))
+    with pytest.raises(NeuralocksError, match="000000.npz: .* delete it"):
+        farm.load(path)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(NeuralocksError, match="000000.npz: .* delete it, and go on with --resume"):
+        farm.load(path)
+    with pytest.raises(NeuralocksError, match="000000.npz: .* train without --resume"):
+        checkpoint.load(path, {})
