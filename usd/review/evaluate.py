@@ -24,7 +24,7 @@ from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import K, StrandSet, strands_on
 
 from ..border.damage import names_damage
-from ..shot.recorded import recorded, recorded_material
+from ..shot.recorded import recorded, recorded_material, recorded_volume
 from ..shot.stage import StageGroom
 from .baked import Baked, read_baked
 
@@ -230,7 +230,8 @@ class _Subject:
         if not clip.loop:
             begun = max(min(times[0], clip.start), begun)
         known = np.concatenate([[begun], times])
-        true = comparison.simulated(self.character, some, clip, known, material, progress=self.say)[1:]
+        volume = recorded_volume(self.item.prim)
+        true = comparison.simulated(self.character, some, clip, known, material, volume=volume, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a bake records on each groom: the material and the options that it was made with."""
 
+import math
+
 from pxr import Sdf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
@@ -41,6 +43,12 @@ def recorded_joint(prim: Usd.Prim) -> str | None:
     """Path of the joint that carried a groom in its bake, None where it is not recorded."""
     told = recorded(prim).get("joint")
     return told if isinstance(told, str) else None
+
+
+def recorded_volume(prim: Usd.Prim) -> float:
+    """The stiffness against strands crowding that a simulation was made with; 0 where none is recorded."""
+    told = recorded(prim).get("volume")
+    return told if isinstance(told, float) and 0 <= told < math.inf else 0.0
 
 
 def recorded_material(prim: Usd.Prim) -> Material | None:

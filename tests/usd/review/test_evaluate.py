@@ -11,6 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from usd.baking.bake import bake
+from usd.baking.simulate import simulate
 from usd.cli.app import main
 from usd.review.baked import read_baked
 from usd.review.demo import demo, shipped_shot
@@ -85,6 +86,16 @@ def test_a_loop_is_compared_with_a_loop(tmp_path, model):
         tips = evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"]
         off[loop] = np.linalg.norm(tips[0] - tips[-1])
     assert off[True] < 5e-4 < 5e-3 < off[False]
+
+
+def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path):
+    """Which keeps strands apart where the bake tells so."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    shot = write_shot(tmp_path, Recipe(frames=24, vertices=24))
+    for volume in (0.0, 3.0):
+        simulate(shot, tmp_path / "hair.usdc", volume=volume)
+        rows = evaluate(tmp_path / "hair.usdc", reference=True).compared["/Hero/Hair"]
+        assert rows["bake"]["position_percent"] < 0.05, volume
 
 
 def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
