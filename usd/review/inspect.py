@@ -170,7 +170,7 @@ def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops
             grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))
-    (spoils if grooms else stops).extend(search.no_hair)
+    (spoils if grooms else stops).extend(search.no_hair() if curves else [])
     return grooms
 
 

@@ -12,6 +12,7 @@ from .attach import Attachment, attach, of_another
 from .character_notes import untrained
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
+from .other_curves import other_hair
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 
 
@@ -45,10 +46,10 @@ class HairSearch:
         self._controls: list[str] = []
         self.carriers: list[StageRig] = []
 
-    @property
     def no_hair(self) -> list[str]:
-        """Why curves are not taken for hair: notes where other hair was found, the error where none was."""
-        return few(self._far) + controls_left_out(self._controls)
+        """Why curves are not taken for hair: notes where other hair was found, the first of them the error where none was."""
+        others = [] if self._named else other_hair(self.rigs)
+        return few(others) + few(self._far) + controls_left_out(self._controls)
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others, and are not closed."""

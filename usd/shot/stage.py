@@ -124,11 +124,12 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     others = [rig for rig in every if skeleton and rig.path != skeleton]
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
     found = _grooms(search, curves, notes)
+    no_hair = search.no_hair()
     if not found:
         raise NeuralocksError(
-            (*search.no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
+            (*no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
         )
-    notes += search.no_hair
+    notes += no_hair
     if not grooms:
         found = _moving(found, notes)
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair as NURBS or Hermite curves beside BasisCurves, which a bake leaves out."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
+
+from ..shots import CENTRE, Recipe, strand_points, write_shot
+
+
+@pytest.fixture
+def shot(tmp_path):
+    return Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+
+
+def curves(stage, kind, path, strands):
+    made = kind.Define(stage, path)
+    made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.concatenate(strands).astype(np.float32)))
+    made.CreateCurveVertexCountsAttr([len(strand) for strand in strands])
+    stage.Save()
+
+
+def told(stage, name):
+    path = stage.GetRootLayer().realPath
+    shot, facts = read_shot(path), inspect(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] and not facts["stops"]
+    notes, spoils = ([line for line in lines if name in line] for lines in (shot.notes, facts["spoils"]))
+    assert notes == spoils
+    return notes
+
+
+@pytest.mark.parametrize("kind", [UsdGeom.NurbsCurves, UsdGeom.HermiteCurves])
+def test_hair_of_other_kinds_is_told(shot, kind):
+    """On the skin, each guide a prim of its own, and some way off it."""
+    strands = strand_points(40, 12)
+    curves(shot, kind, "/Hero/Locks", strands)
+    (line,) = told(shot, "/Hero/Locks")
+    assert "convert them to BasisCurves" in line and kind.__name__ in line
+    assert not [note for note in read_shot(shot.GetRootLayer().realPath, ["/Hero/Hair"]).notes if "Locks" in note]
+    curves(shot, kind, "/Hero/Guide", strands[:1])
+    curves(shot, kind, "/Hero/Aura", strands + [0, 0.3, 0])
+    assert len(told(shot, "/Hero/Guide")) == len(told(shot, "/Hero/Aura")) == 1
+
+
+def test_what_is_no_hair_is_not(shot):
+    """Cables of a set, a ring to pull at, and a line from the head to what it looks at."""
+    cables = np.random.default_rng(0).uniform(4, 9, (9, 5, 3))
+    turn = np.linspace(0, 2 * np.pi, 11)
+    ring = CENTRE + 0.11 * np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
+    ring[8:] = ring[:3]
+    curves(shot, UsdGeom.NurbsCurves, "/Set/Cables", cables)
+    curves(shot, UsdGeom.NurbsCurves, "/Hero/Ring", [ring])
+    curves(shot, UsdGeom.NurbsCurves, "/Hero/Aim", [CENTRE + [[0, 0, 0.2], [0, 0, 0.5]]])
+    assert not told(shot, "/Set/Cables") + told(shot, "/Hero/Ring") + told(shot, "/Hero/Aim")
+
+
+def test_it_is_the_error_where_the_basis_curves_are_no_hair(shot):
+    curves(shot, UsdGeom.NurbsCurves, "/Hero/Locks", strand_points(40, 12))
+    shot.RemovePrim("/Hero/Hair")
+    curves(shot, UsdGeom.BasisCurves, "/Set/Grass", strand_points(9, 4) + [6, 0, 0])
+    with pytest.raises(NeuralocksError, match="/Hero/Locks.*convert"):
+        read_shot(shot.GetRootLayer().realPath)

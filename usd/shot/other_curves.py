@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair that nobody would find in a bake: curves of other kinds than BasisCurves, beside some of these."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.rotation import transformed
+
+from ..border.placement import Placement
+from ..skel.source import StageRig
+from ..skel.surface import rest_value
+from .attach import REACH
+from .seat import NEAR, ways
+
+MOST = 200
+"""Prims that are looked at: a rig may have thousands of such curves, to pull at."""
+SOME_ROOTS = 50
+"""How many of a prim's curves are looked at, about."""
+
+
+def other_hair(rigs: Sequence[StageRig]) -> list[str]:
+    """A line for each prim of NURBS or Hermite curves that looks like hair: on a skin, or several curves near a head."""
+    if not rigs:
+        return []
+    every = Usd.PrimRange(rigs[0].source.prim.GetStage().GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    others = [p for p in every if p.IsA(UsdGeom.NurbsCurves) or p.IsA(UsdGeom.HermiteCurves)]
+    return [
+        f"{prim.GetPath()}: its {prim.GetTypeName()} are left out; if they are hair, convert them to BasisCurves"
+        for prim in others[:MOST]
+        if _looks_like_hair(prim, rigs)
+    ]
+
+
+def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
+    roots = _roots(prim)
+    if not len(roots):
+        return False
+    placement = Placement(prim)
+    for rig in rigs:
+        for mesh, tree in zip(rig.meshes, rig.skins, strict=True):
+            for way in ways(rig, mesh, placement):
+                if np.median(tree.query(transformed(roots, way), distance_upper_bound=2 * NEAR)[0]) <= NEAR:
+                    return True
+        if len(roots) > 1 and "head" in rig.character.humanoid:
+            head = rig.character.canonical_to_bind[:3, 3]
+            away = [
+                np.median(np.linalg.norm(transformed(roots, way) - head, axis=1)) for way in ways(rig, None, placement)
+            ]
+            if min(away) <= REACH:
+                return True
+    return False
+
+
+def _roots(prim: Usd.Prim) -> np.ndarray:
+    """First points (n, 3) of some curves, without those that come back to it, as a rig's controls do; none where points are odd."""
+    curves = UsdGeom.Curves(prim)
+    points = np.asarray(rest_value(curves.GetPointsAttr()) or np.zeros((0, 3)), float)
+    counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
+    if counts.sum() != len(points) or counts.min(initial=1) < 1 or not np.isfinite(points).all():
+        return np.zeros((0, 3))
+    some = slice(None, None, max(1, len(counts) // SOME_ROOTS))
+    first, counts = (np.cumsum(counts) - counts)[some], counts[some]
+    back = [(points[low + 1 : low + count] == points[low]).all(axis=1).any() for low, count in zip(first, counts)]
+    return points[first[~np.array(back, bool)]]
