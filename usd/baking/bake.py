@@ -111,8 +111,8 @@ def bake(
     )
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
-    if cuts is None and strand_model.spec.bins:
-        notes += [text for rig in shot.rigs for text in rig.cut_notes()]
+    if (loop or cuts is None) and strand_model.spec.bins:
+        notes += [text for rig in shot.rigs for text in rig.cut_notes(loop)]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

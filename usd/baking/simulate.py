@@ -82,7 +82,7 @@ def simulate(
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
     notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
-    notes += [text for rig in shot.rigs if cuts is None for text in rig.cut_notes()]
+    notes += [text for rig in shot.rigs if loop or cuts is None for text in rig.cut_notes(loop)]
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 

@@ -114,8 +114,8 @@ def bake_rig(
     ]
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
     notes += hair.source.loop_notes(wanted, moved) if loop else []
-    if cuts is None and model.dynamic:
-        notes += hair.source.cut_notes()
+    if (loop or cuts is None) and model.dynamic:
+        notes += hair.source.cut_notes(loop)
     notes += written_notes(hair.stage, [hair.source], out, wanted)
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 

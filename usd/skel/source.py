@@ -84,13 +84,21 @@ class StageRig:
             )
         return notes
 
-    def cut_notes(self) -> list[str]:
-        """Where the hair starts anew, if it does anywhere."""
-        if self.clip.loop or not len(self.clip.cuts):
+    def cut_notes(self, loop: bool = False) -> list[str]:
+        """Where the hair starts anew, if it does anywhere; of a loop, in which it never does, where it ought to."""
+        cuts = self.clip.cuts
+        if loop and "head" in self.character.humanoid:  # it was read as if it had none
+            cuts = find_cuts(self.clip, self.character.head)
+        if not len(cuts):
             return []
-        codes = self.time_codes[np.searchsorted(self.clip.times, self.clip.cuts - 1e-9)]
+        codes = self.time_codes[np.searchsorted(self.clip.times, cuts - 1e-9)]
         named = ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
-        return [f"{self.path}: its head is put elsewhere at {named}; the hair starts anew there (--cuts says where)"]
+        what = (
+            "a loop has no cuts, so the hair is flung there; leave out --loop, or repair the animation"
+            if loop
+            else "the hair starts anew there (--cuts says where)"
+        )
+        return [f"{self.path}: its head is put elsewhere at {named}; {what}"]
 
     @cached_property
     def skins(self) -> list[cKDTree]:

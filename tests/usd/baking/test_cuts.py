@@ -14,7 +14,7 @@ from usd.review.baked import read_baked
 from usd.review.inspect import inspect
 from usd.shot.recorded import recorded
 
-from ..shots import Recipe, samples, write_shot
+from ..shots import Recipe, samples, write_loop, write_shot
 
 CUT, LAST = 13, 24
 
@@ -92,9 +92,13 @@ def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
 
 
 def test_a_loop_has_no_cuts(shots, tmp_path, model):
-    loops = [
-        bake(shots[0], tmp_path / f"{i}.usdc", model, loop=True, cuts=cuts).path for i, cuts in enumerate((None, []))
-    ]
+    made = [bake(shots[0], tmp_path / f"{i}.usdc", model, loop=True, cuts=cuts) for i, cuts in enumerate((None, []))]
+    for bakes in made:
+        (note,) = [note for note in bakes.notes if "elsewhere" in note]
+        assert note.startswith("/Hero/Rig: its head is put elsewhere at 13; a loop has no cuts")
+    whole = write_loop(tmp_path)
+    assert not any("elsewhere" in note for note in bake(whole, tmp_path / "whole.usdc", model, loop=True).notes)
+    loops = [each.path for each in made]
     for name in ("points", "velocities"):
         assert (samples(loops[0], name, at=CUT) == samples(loops[1], name, at=CUT)).all()
     assert not len(read_baked(loops[0]).shot.rigs[0].clip.cuts)
