@@ -5,7 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene import rotations
+from .scene.actions import as_before
 from .scene.binding import hidden
 from .scene.last_called import others_called
 from .scene.sampling import shown_frame, timing_of
@@ -33,7 +33,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
     if row is not None:
         same = np.abs(world - sampled.drawn[row]).max(axis=(1, 2)) < TOLERANCE
         if body:
-            same |= _live(armature, sampled)
+            same |= _hair(armature, sampled)
         if same[sampled.moving(body)].all():
             return sampled.clip.joints[row]
         if moved and graph.mode == "RENDER" and others_called():
@@ -60,9 +60,9 @@ def _tell_late(name: str) -> None:
         print(f"Neuralocks: {message}")
 
 
-def _live(armature, sampled) -> np.ndarray:
-    """Which joints (J,) are hair bones that are live themselves, or hang from such."""
-    turned = rotations.named(armature.neuralocks_character.rig_kept)
+def _hair(armature, sampled) -> np.ndarray:
+    """Which joints (J,) are hair bones that are live or baked themselves, or hang from such."""
+    turned = as_before(armature)
     found = np.array([bone in turned for bone in sampled.rig.bones])
     for joint, parent in enumerate(sampled.rig.parents) if turned else ():  # parents come first
         found[joint] |= parent >= 0 and found[parent]

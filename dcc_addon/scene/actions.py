@@ -14,6 +14,8 @@ from .lookup import identified, identity
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
+HAIR = TRACK, BEFORE
+"""Both."""
 KEPT = "neuralocks_rotations"
 """Property of the action with how the hair bones were turned before."""
 STILL = 1e-6
@@ -69,7 +71,7 @@ def check_heard(armature) -> None:
             f"{name}: its NLA is switched off, and with it baked keys; switch it on in the NLA editor"
         )
     for track in data.nla_tracks:
-        if track.is_solo and track.name not in (TRACK, BEFORE):
+        if track.is_solo and track.name not in HAIR:
             raise NeuralocksError(
                 f"{name}: NLA track '{track.name}' is solo, so that no other one plays; take its star off"
             )
@@ -81,7 +83,7 @@ def check_mode_left(armature, bones) -> None:
     Raises:
         NeuralocksError: one has keys in every rotation mode, or of the mode itself.
     """
-    written = animated(armature.animation_data, without=(TRACK, BEFORE))
+    written = animated(armature.animation_data, without=HAIR)
     for bone in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
         if all(start + rotations.CHANNELS[mode] in written for mode in rotations.KEYED):
@@ -99,6 +101,19 @@ def check_mode_left(armature, bones) -> None:
 def has_keys(armature) -> bool:
     """Whether its hair bones are baked."""
     return bool(_tracks(armature))
+
+
+def beside_others(armature) -> bool:
+    """Whether its hair bones are baked and play beside all else: with the star of a track of theirs nothing else does."""
+    return has_keys(armature) and not any(track.is_solo for track in _tracks(armature))
+
+
+def as_before(armature) -> dict[str, dict[str, list]]:
+    """Channels of the hair bones that are live or baked, by bone and name, as they are without the hair's motion."""
+    kept = rotations.named(armature.neuralocks_character.rig_kept)
+    for action in _actions(armature):  # Live over baked keys has put aside what these write
+        kept |= rotations.named(action.get(KEPT, ""))
+    return {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
 
 
 def remove(armature) -> bool:
@@ -145,7 +160,7 @@ def _unstar(track) -> None:
 
 def _tracks(armature) -> list:
     data = armature.animation_data
-    return [track for track in data.nla_tracks if track.name in (TRACK, BEFORE)] if data else []
+    return [track for track in data.nla_tracks if track.name in HAIR] if data else []
 
 
 def _actions(armature) -> list:

@@ -8,6 +8,7 @@ import zlib
 import bpy
 import numpy as np
 
+from .actions import HAIR, as_before
 from .animated import animated, strips_of
 from .unkeyed import PLACE, value_of
 
@@ -39,11 +40,11 @@ def rigging(things) -> int:
     return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
 
 
-def posture(things, live: dict[str, dict[str, list]]) -> int:
+def posture(things) -> int:
     """A number that changes when one of these objects, or one that it depends on, is placed or posed otherwise by values
-    that no animation writes: those count in all frames. Of bones in `live` the channels there count, in place of theirs.
+    that no animation writes: those count in all frames. Hair bones count as they are without the hair's motion.
     """
-    return zlib.crc32(repr([_held(thing, live) for thing in _reached(things)]).encode())
+    return zlib.crc32(repr([_held(thing) for thing in _reached(things)]).encode())
 
 
 def _reached(things) -> list:
@@ -94,8 +95,8 @@ def _object(thing) -> list:
     return found
 
 
-def _held(thing, live: dict[str, dict[str, list]]) -> list:
-    moving = animated(thing.animation_data)
+def _held(thing) -> list:
+    moving, live = animated(thing.animation_data, HAIR), as_before(thing)
     found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
     found += [_mode(thing, "", moving), _lists(thing), *(_read(data) for data in _animation(thing))]
     if thing.pose is not None:
@@ -184,8 +185,9 @@ def _animated_by(data) -> list:
     """Action, strips and drivers."""
     found = _values(data, _settings(data))
     for track in data.nla_tracks:
-        found += [track.name, track.mute, track.is_solo]
-    for strip in strips_of(data):
+        if track.name not in HAIR or track.is_solo:
+            found += [track.name, track.mute, track.is_solo]
+    for strip in strips_of(data, HAIR):
         found += [strip.name, *_values(strip, _settings(strip)), *(_keys(curve) for curve in strip.fcurves)]
     for curve in data.drivers:
         driver = curve.driver

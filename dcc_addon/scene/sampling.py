@@ -4,6 +4,7 @@
 import math
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 
 import bpy
@@ -17,9 +18,9 @@ from ..services.axes import to_core
 from ..services.hidden import unhidden
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
+from . import actions, rotations
 from . import armature as armature_reader
 from . import body as body_reader
-from . import rotations
 from .binding import bind_places, hidden
 from .carried import bodies_of, hairs_of
 from .layers import layer_of, working_in
@@ -84,11 +85,9 @@ def rigging_of(armature, scene) -> int:
 
 def posture_of(armature, scene) -> int:
     """A number that changes when this armature, or what it depends on, is posed otherwise by what is not keyed; hair bones
-    count as they are without the live view.
+    count as they are without the hair's motion.
     """
-    kept = rotations.named(armature.neuralocks_character.rig_kept)
-    own = {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
-    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)], own)
+    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
 
 
 def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
@@ -256,8 +255,8 @@ class _Recording:
 
 
 class stepping:
-    """While frames are stepped: the live view is off, its hair bones are turned as without it, and the current frame comes
-    back at the end, with poses that are not keyed.
+    """While frames are stepped: the live view is off, hair bones are turned as without it and without baked keys, and the
+    current frame comes back at the end, with poses that are not keyed.
     """
 
     def __init__(self, scene):
@@ -271,10 +270,14 @@ class stepping:
             text = armature.neuralocks_character.rig_kept
             self._live[armature.name_full] = rotations.kept(armature, rotations.named(text))
             rotations.give_back(armature, text)
+        self._keyed = ExitStack()
+        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):
+            self._keyed.enter_context(actions.without(armature))
         session.paused += 1
 
     def __exit__(self, *_):
         try:
+            self._keyed.close()
             self._scene.frame_set(self._frame[0], subframe=self._frame[1])
             self._unkeyed.put_back()
             for name, turned in self._live.items():

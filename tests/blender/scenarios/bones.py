@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, messages, refused
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
 
 
 def bones(folder: Path) -> None:
@@ -253,3 +253,52 @@ def renamed_bones(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     scene.frame_set(7)
     assert "hair_01" in messages()["Rig"], messages()  # the model was made for other bones
+
+
+def strands_beside_keyed_bones(folder: Path) -> None:
+    """Strands of a character whose hair bones are baked are those that it has without, or with live ones, shown and baked,
+    whether the track is muted or not; a track with the star plays alone, also for them.
+    """
+    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.session import session
+
+    needs_usd()
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands, out = scenes.hair(rig, 40, length=0.4), folder / "out.usdc"
+    make_live(rig, strands, resolve=True)
+    expected = {frame: points_at(strands, frame) for frame in (3, 11, 20)}
+
+    def as_baked() -> None:
+        assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
+        for frame, points in expected.items():
+            assert apart(baked_points(out, "/Character/Hair_Hair", frame), points) < SAME
+
+    def same() -> None:
+        for frame, points in expected.items():
+            assert apart(points_at(strands, frame), points) == 0.0
+        as_baked()
+        for frame, points in expected.items():
+            assert apart(points_at(strands, frame), points) == 0.0
+        notice(rig, scene)
+        assert not session.rigs["Rig"].stale and not messages(), messages()
+
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    rig.neuralocks_character.rig_live = True
+    same()
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    same()
+    track = rig.animation_data.nla_tracks["Neuralocks Hair"]
+    for muted in (True, False):
+        track.mute = muted
+        same()
+    track.is_solo = True
+    notice(rig, scene)
+    assert session.rigs["Rig"].stale
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    expected = {frame: points_at(strands, frame) for frame in expected}
+    assert not session.rigs["Rig"].stale and track.is_solo
+    as_baked()
+    track.is_solo = False
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
