@@ -3,7 +3,7 @@
 
 import hashlib
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from neuralocks_core import model as model_file
@@ -113,6 +113,7 @@ def bake(
     notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
     if (loop or cuts is None) and strand_model.spec.bins:
         notes += [text for rig in shot.rigs for text in rig.cut_notes(loop)]
+    notes += _unheard(strand_model, look)
     return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
 
 
@@ -141,6 +142,18 @@ def described(shot: Shot) -> list[dict]:
             "how": item.attachment.how,
         }
         for item in shot.grooms
+    ]
+
+
+def _unheard(model: StrandModel, material: Material) -> list[str]:
+    """The note on constants that are not as in the one material that a model was trained with."""
+    varied = model.meta["training"].get("options", {}).get("random_materials", True)
+    plain = replace(material, clumping=Material.clumping)  # whose effect no network learns
+    if varied or plain == Material():
+        return []
+    return [
+        "the model was trained with one material, so stiffness, weight and damping change nothing; "
+        "train one with random_materials=True, as the other ways of training do"
     ]
 
 

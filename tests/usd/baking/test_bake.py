@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
+from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage
@@ -142,6 +143,19 @@ def test_a_moving_root_moves_the_hair_and_its_history(tmp_path, model):
     shift = world_points(shots[1], 9.0) - world_points(shots[0], 9.0)
     assert np.abs(np.median(shift[:, 0]) - 0.02 * 64) < 0.05
     assert np.ptp(shift, axis=0).max() > 1e-3  # acceleration changes the hair, not only its place
+
+
+def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
+    known, shot = model_file.read(still_model), write_shot(tmp_path)
+    meta = known.meta | {"training": {"options": {"random_materials": False}}}
+    one = model_file.write(tmp_path / "one.neuralocks", meta, known.graphs)
+
+    def notes(which, **options):
+        return bake(shot, tmp_path / "b.usdc", which, frames=[2], **options).notes
+
+    assert any("weight and damping change nothing" in note for note in notes(one, material={"damping": 20}))
+    for which, options in ((one, {}), (one, {"material": {"clumping": 60}}), (still_model, {"material": "weight=2"})):
+        assert not any("change nothing" in note for note in notes(which, **options))
 
 
 def test_frames_without_animation_are_said(tmp_path, still_model):
