@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor
+from torch.nn.functional import normalize, one_hot, pad
 
 FOLD = 1e-6
 """Smallest 1 + cos of a turn: keeps opposite edges finite in value and gradient."""
@@ -47,7 +48,7 @@ def direct_frames(edges: Tensor) -> Tensor:
 
 def loop_frames(edges: Tensor) -> Tensor:
     """Exact parallel transport along every edge, one after the other: (..., E, 3) -> (..., E, 4)."""
-    steps = turn(edges[..., :-1, :], edges[..., 1:, :])
+    steps = _steps(edges)
     frames = [torch.zeros_like(steps[..., 0, :])]
     frames[0][..., 0] = 1.0
     for i in range(steps.shape[-2]):
@@ -62,9 +63,28 @@ def scan_frames(edges: Tensor) -> Tensor:
     """
     first = torch.zeros_like(edges[..., :1, :1])
     identity = torch.cat([first + 1.0, first, first, first], dim=-1)
-    frames = torch.cat([identity, turn(edges[..., :-1, :], edges[..., 1:, :])], dim=-2)
+    frames = torch.cat([identity, _steps(edges)], dim=-2)
     hop = 1
     while hop < frames.shape[-2]:
         frames = torch.cat([frames[..., :hop, :], product(frames[..., hop:, :], frames[..., :-hop, :])], dim=-2)
         hop *= 2
     return frames
+
+
+def _steps(edges: Tensor) -> Tensor:
+    """The turns (..., E - 1, 4) from each edge to the next, all of unit length: they are multiplied on along the strand.
+
+    An edge of no length goes on as the one before it. A fold, half a turn about any axis across, has no gradient.
+    """
+    steps = turn(edges[..., :-1, :], edges[..., 1:, :])
+    if (steps.detach().square().sum(-1) > 0.999).all():  # nearly always, and what follows takes time
+        return steps
+    there = (edges != 0).any(-1)
+    first = there.byte().argmax(-1, keepdim=True)
+    source = torch.where(there, torch.arange(edges.shape[-2], device=edges.device), first).cummax(-1).values
+    edges = edges.take_along_dim(source[..., None], dim=-2)
+    a, b = edges[..., :-1, :], edges[..., 1:, :]
+    with torch.no_grad():
+        across = torch.linalg.cross(a, one_hot(a.abs().argmin(-1), 3).to(a))
+        half = pad(normalize(across, dim=-1), (1, 0))
+    return torch.where((a * b).sum(-1, keepdim=True) < FOLD - 1.0, half, turn(a, b))

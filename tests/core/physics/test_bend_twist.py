@@ -54,9 +54,53 @@ def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
     assert along[0] < 1e-9 and along[1] > 0.05
 
 
+@pytest.mark.parametrize("form", [Cosserat.LOOP, Cosserat.SCAN])
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_what_lies_behind_a_fold_is_as_stiff_as_ever(form, dtype):
+    """A fold is half a turn, about any axis: in its own frame the rest of the strand bends as if it were not there."""
+    drawn = _bent_behind()
+    folded = drawn.clone()
+    folded[:, 12:] = 2 * drawn[:, 11:12] - drawn[:, 12:]
+    there, without = (bend_twist(x.to(dtype), rods(straight().to(dtype)), form=form) for x in (folded, drawn))
+    fold = bend_twist(_fold().to(dtype), rods(straight().to(dtype)), form=form)
+    assert (there - fold).item() == pytest.approx(without.item(), rel=1e-3) and fold.item() > without.item()
+
+
+@pytest.mark.parametrize("form", [Cosserat.LOOP, Cosserat.SCAN])
+@pytest.mark.parametrize("doubled", [0, 1, 12])
+def test_a_doubled_point_turns_nothing(form, doubled):
+    """Neither in the energy nor in the gradient of the other points."""
+    gradients, energies = [], []
+    for double in (False, True):
+        x = _bent_behind().requires_grad_()
+        points = [x, straight()]
+        if double:
+            points = [torch.cat([p[:, : doubled + 1], p[:, doubled:]], dim=1) for p in points]
+        strain = bend_difference(*points, form)
+        energies.append(strain.square().sum())
+        gradients.append(torch.autograd.grad(energies[-1], x)[0])
+    torch.testing.assert_close(energies[1], energies[0])
+    torch.testing.assert_close(gradients[1], gradients[0])
+
+
 def test_folding_back_is_finite_in_value_and_gradient():
     back = torch.tensor([[0.0, 0, 0], [0, -1, 0], [0, -2, 0], [0, -1, 0], [0, 0, 0], [0, -1, 0]])[None] * 0.01
     for form in Cosserat:
         x = back.clone().requires_grad_()
         bend_twist(x, rods(straight(6, 0.05).float()), form=form).sum().backward()
         assert x.grad.isfinite().all()
+
+
+def _bent_behind():
+    """A strand straight down to its middle, and curled from there."""
+    x, angle = straight(), 0.6 * torch.arange(11, dtype=torch.float64)
+    x[:, 13:, 0] += 0.008 * (torch.cos(angle) - 1)
+    x[:, 13:, 2] += 0.008 * torch.sin(angle)
+    return x
+
+
+def _fold():
+    """A straight strand that goes back over itself from its middle on."""
+    x = straight()
+    x[:, 12:] = 2 * x[:, 11:12] - x[:, 12:]
+    return x
