@@ -51,16 +51,15 @@ class Beginning:
             if name in training
         }
 
-    def check(self, spec: BoundarySpec, options) -> None:
-        """Refuse a training whose network is of another kind than the model's; arguments as of `differences`.
+    def check(self, spec: BoundarySpec, options, resume: bool) -> None:
+        """Refuse a training, begun or resumed, whose network is of another kind than the model's; see `differences`.
 
         Raises:
             NeuralocksError: the model reads or answers something else.
         """
         if other := self.differences(spec, options):
-            raise NeuralocksError(
-                f"{self.path}: differs from this training in {', '.join(other)}; begin with another model, or with nothing"
-            )
+            remedy = "resume with the settings it began with" if resume else "begin with another model, or with nothing"
+            raise NeuralocksError(f"{self.path}: differs from this training in {', '.join(other)}; {remedy}")
 
     def differences(self, spec: BoundarySpec, options) -> list[str]:
         """In what the model's network is of another kind than a training's.

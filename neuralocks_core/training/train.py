@@ -87,7 +87,7 @@ def train_strands(
     start = beginning_of(work, begin, resume)
     beginning = Beginning(start) if start else None
     if beginning:
-        beginning.check(scene.spec, options)
+        beginning.check(scene.spec, options, resume)
     if not any(groom.valid.any() for groom in scene.grooms):
         raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
     report = _Reporter(progress)

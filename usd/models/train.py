@@ -126,7 +126,7 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
     beginning = Beginning(model.shipped() if begin in (None, SHIPPED) else begin)
     if begin is None and beginning.differences(spec, options):
         return None
-    beginning.check(spec, options)
+    beginning.check(spec, options, resume)
     return beginning.path
 
 

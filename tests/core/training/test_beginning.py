@@ -21,6 +21,7 @@ from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RegressionOptions
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.train import train_strands
+from neuralocks_core.training.work import keep_beginning
 
 SPEC = BoundarySpec()
 
@@ -70,7 +71,7 @@ def test_with_a_shorter_history_the_network_answers_as_the_model_does_where_noth
     short = replace(SPEC, bins=SPEC.bins[:-3], taper=0.2)
     net, strands, frames = _normalised(motion, 1, short)
     beginning = Beginning(path)
-    beginning.check(short, RegressionOptions(motion=motion))
+    beginning.check(short, RegressionOptions(motion=motion), resume=False)
     beginning.fill(net)
     longer = torch.nn.functional.pad(frames[:1], (0, SPEC.size - short.size)).numpy()
     wanted = _offsets(model.read(path).graphs, strands.numpy(), longer)
@@ -163,6 +164,9 @@ def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
             train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1, **options), begin=begin)
     with pytest.raises(NeuralocksError, match="a.neuralocks: the training in .* did not begin with it"):
         train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1), begin=path, resume=True)
+    keep_beginning(path, work)
+    with pytest.raises(NeuralocksError, match="in static; resume with the settings it began with$"):
+        train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1, static=True), resume=True)
     assert (work / "checkpoint.npz").read_bytes() == b"hours"
 
 

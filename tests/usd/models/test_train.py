@@ -36,6 +36,8 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
     assert begins_with("nothing", False, SPEC, LIKE) is None
     with pytest.raises(NeuralocksError, match="strands.neuralocks: differs from this training in static"):
         begins_with("shipped", False, SPEC, STILL)
+    with pytest.raises(NeuralocksError, match="differs from this training in static; resume with the settings"):
+        begins_with("shipped", True, SPEC, STILL)
     with pytest.raises(NeuralocksError, match="none.neuralocks: no such model file"):
         begins_with(tmp_path / "none.neuralocks", False, SPEC, LIKE)
 
