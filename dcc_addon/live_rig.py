@@ -85,7 +85,7 @@ def rest(armature) -> None:
 
 
 def show_rest(armature) -> None:
-    """The rotations from before; the model stays bound."""
+    """The rotations from before, but for bones that were keyed meanwhile; the model stays bound."""
     settings = armature.neuralocks_character
-    if rotations.give_back(armature, settings.rig_kept):
+    if rotations.give_back(armature, settings.rig_kept, keyed=True):
         settings.rig_kept = ""

@@ -24,15 +24,16 @@ KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
 
 
 def kept(armature, bones) -> str:
-    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each, and where it
-    is at rest, by which it is known under another name.
+    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each, where it is at
+    rest, by which it is known under another name, and the modes that animation writes.
     """
-    found = {}
+    found, written = {}, animated(armature.animation_data)
     for name in bones:
         bone = armature.pose.bones.get(name)
         if bone is not None:
             mode, *channels = KEPT
-            found[name] = [getattr(bone, mode), *(list(getattr(bone, channel)) for channel in channels), _place(bone)]
+            values = (list(getattr(bone, channel)) for channel in channels)
+            found[name] = [getattr(bone, mode), *values, _place(bone), _modes(bone, written)]
     return json.dumps(found)
 
 
@@ -44,17 +45,33 @@ def named(text: str) -> dict[str, list]:
         return {}
 
 
-def give_back(armature, text: str) -> bool:
-    """Turn bones as `kept` found them, those that are still there; whether there was anything to give back."""
-    found = named(text)
-    for name, (mode, quaternion, euler, axis_angle, *place) in found.items():
-        bone = _bone(armature, name, place, found) if armature.pose else None
-        if bone is not None:
+def give_back(armature, text: str, keyed: bool = False) -> bool:
+    """Turn bones as `kept` found them, those that are still there; whether there was anything to give back. With `keyed`
+    those that animation has come to turn since, as Blender's Bake Action does, are left to that.
+    """
+    found, written = named(text), animated(armature.animation_data) if keyed else set()
+    for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
+        bone = _bone(armature, name, more, found) if armature.pose else None
+        if bone is not None and (since := _written_since(bone, mode, more, written)):
+            bone.rotation_mode = since
+        elif bone is not None:
             bone.rotation_mode = mode  # first, as it writes the values of its mode from those of the last one
             bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
     if found:
         armature.update_tag()
     return bool(found)
+
+
+def _modes(bone, written: set[str]) -> list[str]:
+    """Modes of CHANNELS whose values are among the paths written."""
+    return [mode for mode, channel in CHANNELS.items() if bone.path_from_id(channel) in written]
+
+
+def _written_since(bone, mode: str, more: list, written: set[str]) -> str:
+    """The mode in which animation turns a bone that it did not turn when it was kept; empty where there is none."""
+    then, found = (more[1] if len(more) > 1 else list(CHANNELS)), _modes(bone, written)
+    plays = mode in found or (mode not in CHANNELS and "XYZ" in found)  # all orders of Euler angles are one channel
+    return "" if plays else next((each for each in found if each not in then), "")
 
 
 def _place(bone) -> list[float]:

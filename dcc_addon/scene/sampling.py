@@ -269,7 +269,7 @@ class stepping:
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
             text = armature.neuralocks_character.rig_kept
             self._live[armature.name_full] = rotations.kept(armature, rotations.named(text))
-            rotations.give_back(armature, text)
+            rotations.give_back(armature, text, keyed=True)
         self._keyed = ExitStack()
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):
             self._keyed.enter_context(actions.without(armature))

@@ -101,3 +101,53 @@ def keys_that_do_not_play(folder: Path) -> None:
     if hasattr(action, "slots"):
         rig.animation_data.action_slot = action.slots.new("OBJECT", "Other")
         bakes()
+
+
+def baked_by_blender(folder: Path) -> None:
+    """What Blender's own Bake Action makes of live hair bones plays on when Live is off, in Euler angles, which it did not
+    bake, or not; a bone that has keys in its own mode, too, gets that back.
+    """
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    scene.neuralocks.armature, own, tail = rig, rig.neuralocks_character, rig.pose.bones["hair.02"]
+    tail.rotation_mode = "QUATERNION"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def turns(frame):
+        scene.frame_set(frame)
+        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+
+    own.rig_live = True
+    live = {frame: turns(frame) for frame in (3, 12, 20)}
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.nla.bake(
+        frame_start=1,
+        frame_end=24,
+        only_selected=False,
+        visual_keying=True,
+        use_current_action=True,
+        bake_types={"POSE"},
+    )
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for shown in (True, False):
+        for frame, expected in live.items():
+            assert apart(turns(frame), expected) < SAME, (shown, frame)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"), copy=True)
+        own.rig_live = False
+    assert rig.pose.bones["hair.01"].rotation_mode == "QUATERNION" and not own.rig_kept and not messages(), messages()
+    with bpy.data.libraries.load(str(folder / "shot.blend")) as (_, there):
+        there.objects = ["Rig"]
+    assert there.objects[0].pose.bones["hair.01"].rotation_mode == "QUATERNION"
+
+    tail.rotation_mode = "XYZ"
+    tail.keyframe_insert("rotation_euler", frame=1)
+    own.rig_live = True
+    turns(5)
+    assert tail.rotation_mode == "AXIS_ANGLE" and not messages(), messages()
+    tail.keyframe_insert("rotation_axis_angle", frame=5)
+    own.rig_live = False
+    assert tail.rotation_mode == "XYZ"
