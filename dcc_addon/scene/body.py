@@ -47,8 +47,11 @@ def read(mesh_object, armature) -> BodyArrays:
         points = basis
         for block in keys.key_blocks:
             if block != keys.reference_key:
-                offsets = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
-                shapes[block.name] = offsets * _mask(block, groups, weights, len(points))
+                if keys.use_relative:
+                    offsets = _coordinates(block.data) - _coordinates((block.relative_key or block).data)
+                    shapes[block.name] = offsets * _mask(block, groups, weights, len(points))
+                else:  # Blender blends the keys as they are, without their groups
+                    shapes[block.name] = _coordinates(block.data) - basis
     body = BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
     for modifier in _before_armature(mesh_object):
         if modifier.type == "MIRROR" and modifier.show_render:
@@ -137,12 +140,17 @@ def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
 
 def shape_values(mesh_object, graph) -> np.ndarray:
     """Values (B,) of the shape keys as `graph` has them, in the order of `BodyArrays.shapes`; the file's own follow only
-    the view layer that is shown.
+    the view layer that is shown. Absolute keys are blended by the two that are next in time, as with linear interpolation.
     """
     keys = mesh_object.data.shape_keys
     if not keys or len(keys.key_blocks) < 2:
         return np.zeros(0)
     keys = keys.evaluated_get(graph)
+    if not keys.use_relative:
+        blocks = sorted(keys.key_blocks, key=lambda block: block.frame)
+        frames, each = [block.frame for block in blocks], np.eye(len(blocks))
+        shares = {b.name: np.interp(keys.eval_time, frames, each[row]) for row, b in enumerate(blocks)}
+        return np.array([shares[b.name] for b in keys.key_blocks if b != keys.reference_key])
     return np.array([0.0 if b.mute else b.value for b in keys.key_blocks if b != keys.reference_key])
 
 

@@ -57,6 +57,28 @@ def body_as_drawn(_folder: Path) -> None:
     assert _same(rig, body) == 2 * half
 
 
+def absolute_shape_keys(_folder: Path) -> None:
+    """Absolute shape keys, which the time alone blends, without their groups and values, deform the body as drawn."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    body = scenes.body(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    body.shape_key_add(name="Basis")
+    for number, name in enumerate(("wide", "tall", "deep")):
+        for point in body.shape_key_add(name=name).data:
+            point.co[number] *= 1.3
+    keys = body.data.shape_keys
+    keys.key_blocks["tall"].vertex_group, keys.key_blocks["tall"].mute = "head", True
+    keys.key_blocks["deep"].relative_key = keys.key_blocks["wide"]
+    keys.use_relative = False
+    for frame, time in ((1, 4.0), (9, 27.0), (12, 99.0)):
+        keys.eval_time = time
+        keys.keyframe_insert("eval_time", frame=frame)
+    _same(rig, body)
+    sampled = session.rigs["Rig"]
+    assert np.allclose(sampled.clip.shape_at([sampled.clip.times[-1]]), [0, 0, 1])
+
+
 def rigid_bodies(_folder: Path) -> None:
     """A chosen body that rides on a bone as a whole moves with it, by whatever constraint; one that only turns towards a
     bone does not ride on it.
