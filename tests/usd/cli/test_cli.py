@@ -94,6 +94,14 @@ def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
     assert done.stderr == ""
 
 
+@pytest.mark.skipif(os.name != "posix", reason="closes a shell's streams")
+def test_a_caller_that_closed_the_streams_gets_its_files(tmp_path, model):
+    shot, baked = write_shot(tmp_path), tmp_path / "baked.usdc"
+    words = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(baked), "--model", str(model)]
+    assert subprocess.run(["sh", "-c", '"$@" >&- 2>&-', "sh", *words], cwd=ROOT).returncode == 0
+    assert baked.exists()
+
+
 def test_an_empty_word_is_refused(tmp_path, capsys):
     """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
     for words in (("bake", "s.usda", "-o", "o.usdc", "--head", ""), ("rig", "inspect", "s.usda", "--chains", " ")):
