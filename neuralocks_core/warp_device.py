@@ -3,10 +3,12 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
 from types import ModuleType
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.own_folder import own_folder, writable
 
 
 def start_warp(device: str) -> ModuleType:
@@ -16,7 +18,7 @@ def start_warp(device: str) -> ModuleType:
         device: "cpu", "cuda" or "cuda:N".
 
     Raises:
-        NeuralocksError: warp is not installed, or has no such device.
+        NeuralocksError: warp is not installed, has no such device, or no folder for what it compiles.
     """
     try:
         import warp as wp
@@ -25,12 +27,22 @@ def start_warp(device: str) -> ModuleType:
     wp.config.log_level = wp.LOG_ERROR
     wp.config.enable_backward = False
     with _quiet() if device == "cpu" else nullcontext():
-        wp.init()
+        _init(wp)
     try:
         wp.get_device(device)
     except Exception as unknown:
         raise NeuralocksError(f"device {device}: not found by warp; use cpu") from unknown
     return wp
+
+
+def _init(wp: ModuleType) -> None:
+    """Initialise warp, with another folder for what it compiles where its own cannot be written."""
+    with suppress(OSError):
+        wp.init()
+        if writable(Path(wp.config.kernel_cache_dir)):
+            return
+    wp.config.kernel_cache_dir = str(own_folder("warp") / wp.config.version)
+    wp.init()
 
 
 @contextmanager

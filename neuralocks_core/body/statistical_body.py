@@ -11,6 +11,7 @@ import numpy as np
 from neuralocks_core.character import Body, Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import connected_pieces
+from neuralocks_core.own_folder import own_folder, writable
 
 DEFAULT_PHENOTYPE = {"gender": 1.0, "age": 2 / 3, "muscle": 0.5, "weight": 0.45, "height": 0.5, "proportions": 0.6}
 """A young adult woman; anny's parameters lie in 0..1 (gender 1 is female, age 2/3 is 25 years)."""
@@ -107,11 +108,14 @@ def statistical_body(phenotype: dict[str, float] | None = None) -> StatisticalBo
 def _load_anny():
     try:
         from anny import Anny
+        from anny.paths import get_anny_cache_path, set_anny_cache_path
     except ImportError:
         remedy = "run: pip install 'neuralocks[body]'"
         raise NeuralocksError(f"anny: the statistical body is not installed; {remedy}") from None
     from neuralocks_core.warp_device import start_warp
 
+    if not writable(get_anny_cache_path()):
+        set_anny_cache_path(own_folder("anny"))
     start_warp("cpu")  # or it would tell of itself on standard output, where a command's answer belongs
     return Anny(rig="game_engine", topology="anny-quads", pose_parameterization="local-ref")
 

@@ -9,6 +9,7 @@ import signal
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +33,9 @@ class RolloutFarm:
         self.folder, self.count = Path(folder), count
         self.folder.mkdir(parents=True, exist_ok=True)
         context = multiprocessing.get_context("spawn")
-        self._processes = [
-            context.Process(target=_work, args=(scene, self.folder, range(i, count, processes)), daemon=True)
-            for i in range(processes)
-        ]
+        self._told, self._tell = context.Pipe(duplex=False)  # both kept: an end is closed with its last owner
+        work = [(scene, self.folder, range(i, count, processes), self._tell) for i in range(processes)]
+        self._processes = [context.Process(target=_work, args=each, daemon=True) for each in work]
 
     def __enter__(self) -> RolloutFarm:
         try:
@@ -70,6 +70,16 @@ class RolloutFarm:
     def failed(self) -> bool:
         """Whether a process ended by an error."""
         return any(process.exitcode not in (None, 0) for process in self._processes)
+
+    def failure(self, then: str) -> NeuralocksError:
+        """Why it failed; `then` is what to do once that is mended."""
+        if self._told.poll():
+            why = self._told.recv()
+        elif any((process.exitcode or 0) < 0 for process in self._processes):
+            why = "training: the solver's process was killed; free some memory"
+        else:
+            why = "training: the solver's process ended early; mend what it says above"
+        return NeuralocksError(f"{why}, and {then}")
 
 
 @contextmanager
@@ -134,17 +144,20 @@ def _path(folder: Path, index: int) -> Path:
     return folder / f"{index:06d}.npz"
 
 
-def _work(scene: TrainingScene, folder: Path, indices: range) -> None:
+def _work(scene: TrainingScene, folder: Path, indices: range, tell: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not inherited, as on Windows
     parent = multiprocessing.parent_process()
-    maker = RolloutMaker(scene)
-    for index in indices:
-        path = _path(folder, index)
-        if not path.exists():
-            rollout = maker.make(index)
-            try:
-                save(path, rollout)
-            except NeuralocksError as error:
-                raise SystemExit(f"error: {error}") from None
-        if parent is not None and not parent.is_alive():
-            return
+    try:
+        maker = RolloutMaker(scene)
+        for index in indices:
+            path = _path(folder, index)
+            if not path.exists():
+                save(path, maker.make(index))
+            if parent is not None and not parent.is_alive():
+                return
+    except NeuralocksError as error:
+        tell.send(str(error))
+        raise SystemExit(1) from None
+    except MemoryError:
+        tell.send("training: the solver has not enough memory; free some")
+        raise SystemExit(1) from None

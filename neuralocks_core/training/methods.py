@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.deformation.strand_session import strand_inputs
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -139,8 +138,6 @@ def wait(farm: RolloutFarm, count: int, say: Callable[[str], None], numbered: bo
         if (there := len(farm.files(count if numbered else None))) >= count:
             return
         if farm.failed() or not alive:
-            raise NeuralocksError(
-                "training: the solver's process ended early; unless it says why above, free some memory, and try again"
-            )
+            raise farm.failure("try again")
         say(f"{there} of {count}")
         time.sleep(0.2)

@@ -189,11 +189,9 @@ class _Run:
         began, last = time.monotonic() - meta["seconds"], time.monotonic()
         gauge = None
         for state in self.method.train(self.net, self._optimisers, step=meta["step"], done=min(spent, 1.0)):
-            if farm.failed() or held_farm.failed():
-                raise NeuralocksError(
-                    "training: the solver's process ended early; unless it says why above, free some memory, and go on "
-                    "with --resume"
-                )
+            for each in (farm, held_farm):
+                if each.failed():
+                    raise each.failure("go on with --resume")
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -90,3 +91,28 @@ def test_a_damaged_file_says_what_to_do(tmp_path, kept):
         farm.load(path)
     with pytest.raises(NeuralocksError, match="000000.npz: .* train without --resume"):
         checkpoint.load(path, {})
+
+
+class _Scene:
+    """Stands in for one that the solver refuses."""
+
+    def __getattr__(self, name):
+        raise NeuralocksError("warp: is not installed; install it")
+
+    def __reduce__(self):
+        return (_Scene, ())
+
+
+def test_a_process_that_fails_says_why(tmp_path, capfd):
+    with farm.RolloutFarm(_Scene(), tmp_path, 1) as workers:
+        workers._processes[0].join()
+        assert workers.failed()
+        assert str(workers.failure("try again")) == "warp: is not installed; install it, and try again"
+    assert capfd.readouterr().err == ""
+
+
+def test_memory_is_blamed_for_a_process_that_was_killed(tmp_path):
+    workers = farm.RolloutFarm(None, tmp_path, 1)
+    for status, why in ((-9, "was killed; free some memory, and"), (1, "mend what it says above, and")):
+        workers._processes[0] = SimpleNamespace(exitcode=status)
+        assert why in str(workers.failure("try again"))
