@@ -151,8 +151,7 @@ def clip_codes(stage: Usd.Stage, samples: list[float]) -> list[float]:
     """Time codes at which a bake reads the motion; `clip` in the description says why. The shot is one of frames."""
     second, start, end = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()
     before = [start] if samples[0] - start >= 0.1 * second - 1e-6 else []
-    after = [end] if end - samples[-1] >= 0.1 * second - 1e-6 else []
-    codes = [*before, *samples, *after]
+    codes = [*before, *samples, max(end, samples[-1])]
     gaps = [(a, b) for a, b in zip(codes, codes[1:]) if b - a > 0.0625 * second]
     return sorted({*codes, *(float(code) for a, b in gaps for code in range(math.ceil(a), math.ceil(b)))})
 

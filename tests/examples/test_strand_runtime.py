@@ -43,7 +43,7 @@ def test_a_runtime_written_from_the_description_has_the_hair_of_the_bake(tmp_pat
 
 @pytest.mark.parametrize("wider", [2, 6])
 def test_it_has_it_too_where_the_shot_is_longer_than_its_animation_and_between_samples(tmp_path, shot, wider):
-    """Two frames beyond the samples are no stand, six are one."""
+    """Two frames before the samples are no stand, six are one."""
     stage = Usd.Stage.Open(str(shot))
     stage.SetStartTimeCode(1 - wider)
     stage.SetEndTimeCode(40 + wider)

@@ -40,8 +40,8 @@ _HISTORY = (
 )
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
-    f"shot's range adds its start where that lies {STAND:g} s or more before the first of them, and its end where that lies so "
-    "long after the last: the character stands meanwhile. Where the range is less than that wider, it adds nothing. Between two "
+    f"shot's range adds its end where that lies after the last of them, and its start where that lies {STAND:g} s or more before "
+    "the first: the character stands meanwhile. A start less than that before it adds nothing. Between two "
     f"samples farther apart than {CLOSE:g} s each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
     f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second, a framesPerSecond-th of a second, counted "
     f"from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts"

@@ -15,8 +15,8 @@ SAME = 1e-4
 """Samples nearer to each other, in frames, are one: layer offsets and other programs' clocks part what was keyed together,
 and over so little time a rounding error of a pose is a blow."""
 STAND = 0.1
-"""A shot that begins or ends at least so long [s] before or after its samples shows a character that stands meanwhile. An
-exporter's range is often a frame or two wider than its samples: standing before them, it would start with a blow."""
+"""A shot that begins at least so long [s] before its samples shows a character that stands meanwhile. An exporter's range is
+often a frame or two wider than its samples: standing before them, it would start with a blow."""
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
@@ -35,7 +35,7 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     if stage.HasAuthoredTimeCodeRange():
         # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
         start, end, stand = stage.GetStartTimeCode(), stage.GetEndTimeCode(), (STAND - 1e-9) * border.rate
-        start, end = start if first - start >= stand else first, end if end - last >= stand else last
+        start, end = start if first - start >= stand else first, max(end, last)
         if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
             samples = [start, *samples, end]
             first, last = start, end
