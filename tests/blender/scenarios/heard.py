@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, messages, refused
+from tests.blender.checks import SAME, apart, choose, messages, refused
 
 
 def turned_otherwise(folder: Path) -> None:
@@ -121,7 +121,7 @@ def baked_by_blender(folder: Path) -> None:
 
     own.rig_live = True
     live = {frame: turns(frame) for frame in (3, 12, 20)}
-    bpy.context.view_layer.objects.active = rig
+    choose(rig)
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.nla.bake(
         frame_start=1,

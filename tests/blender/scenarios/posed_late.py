@@ -58,7 +58,8 @@ def rendered_late(folder: Path) -> None:
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)
     scene.render.engine, scene.render.filepath = "CYCLES", str(folder / "r_")
-    scene.cycles.samples, scene.render.resolution_x, scene.render.resolution_y = 1, 8, 8
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    scene.render.resolution_x = scene.render.resolution_y = 8
     scene.neuralocks.frame_start, scene.neuralocks.frame_end, scene.neuralocks.use_scene_range = 1, 24, False
     scene.frame_start, scene.frame_end = 5, 7
     for when, times in (("pre", 0), ("post", 1)):
