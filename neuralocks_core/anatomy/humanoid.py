@@ -9,6 +9,7 @@ meet.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -140,10 +141,17 @@ def find_joint(names, wanted: str) -> int:
         fact = (
             "several joints have that name; give its full path"
             if hits
-            else f"no such joint; it has {', '.join(map(leaf, names[:12]))} ..."
+            else f"no such joint{_alike(names, wanted)}; neuralocks inspect lists all"
         )
         raise NeuralocksError(f"joint '{wanted}': {fact}")
     return hits[0]
+
+
+def _alike(names, wanted: str) -> str:
+    """The joints that a misspelt name may stand for, as a question."""
+    spelt = {leaf(name).lower(): leaf(name) for name in names}
+    near = get_close_matches(leaf(wanted).lower(), spelt)
+    return f", perhaps {' or '.join(repr(spelt[each]) for each in near)}" if near else ""
 
 
 def _depth(joint: int, parents) -> int:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdGeom
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
@@ -125,6 +126,7 @@ def _rig(rig: StageRig) -> dict:
     return {
         "path": rig.path,
         "joints": len(rig.source.names),
+        "joint names": list(rig.source.names),
         "animated": rig.source.animated,
         "samples": len(rig.source.samples),
         "head": found.get("head"),
@@ -262,6 +264,8 @@ def as_text(facts: dict, indent: int = 0) -> str:
                     lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
                     continue
                 lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
+        elif name == "joint names":
+            lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
         elif isinstance(value, list):
             lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
         else:

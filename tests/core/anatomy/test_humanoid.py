@@ -247,8 +247,10 @@ def test_tails_that_hang_from_the_neck_are_no_head():
 def test_joints_by_hand_win_and_are_checked():
     paths, parents = rig("root\n a\n  b")
     assert find_humanoid(paths, parents, by_hand={"head": "b"})["head"] == 2
-    with pytest.raises(NeuralocksError, match="no such joint"):
+    with pytest.raises(NeuralocksError, match="'missing': no such joint; neuralocks inspect lists all"):
         find_humanoid(paths, parents, by_hand={"head": "missing"})
+    with pytest.raises(NeuralocksError, match="'Rot': no such joint, perhaps 'root'; "):
+        find_humanoid(paths, parents, by_hand={"head": "Rot"})
     with pytest.raises(NeuralocksError, match="no such meaning"):
         find_humanoid(paths, parents, by_hand={"skull": "b"})
 

@@ -198,9 +198,11 @@ def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
     assert (facts["unit [m]"], facts["up axis"], facts["rate [1/s]"], facts["frames"]) == (0.01, "Z", 24.0, [1.0, 9.0])
     rig, groom = facts["skeletons"][0], facts["grooms"][0]
     assert rig["head"].endswith("head") and abs(rig["head width [m]"] - 0.2) < 0.01 and rig["joints"] == 8
+    assert rig["joint names"][3] == "hips/spine/neck/head"
     assert groom["strands"] == 40 and "Skin" in groom["carried by"] and facts["stops"] == []
     assert status("inspect", shot) == 0
-    assert "head width [m]: 0.2" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "head width [m]: 0.2" in text and "joint names: hips, spine, neck, head, arm_L" in text
 
 
 def test_inspect_tells_of_a_model_what_a_person_reads(capsys):
