@@ -6,6 +6,7 @@ from pathlib import Path
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.progress import Progress
+from neuralocks_core.rig.finding import NoHairChains
 
 from ..border.damage import names_damage
 from ..border.stage_files import open_stage
@@ -48,6 +49,10 @@ def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:
         no_strands = error
     try:
         rigged = read_rigged_hair(path, skeleton=skeleton, head=head, baked_first=True)
+    except NoHairChains:
+        if find_curves(open_stage(path), grooms):
+            raise no_strands from None
+        raise NeuralocksError(f"{path}: holds no groom and no hair chains; give a bake") from None
     except NeuralocksError as error:
         raise (no_strands if find_curves(open_stage(path), grooms) else error) from None
     return rigged_scene(rigged), rigged.border

@@ -11,6 +11,7 @@ from usd.rig.picture import rigged_scene
 from usd.rig.stage import read_rigged_hair
 
 from ..rig_shots import EXAMPLE, model_for, small_shot
+from ..shots import write_shot
 
 
 def test_a_picture_of_mesh_hair(tmp_path):
@@ -68,3 +69,14 @@ def test_joints_without_a_mesh_have_no_picture(tmp_path):
     with pytest.raises(NeuralocksError, match="no mesh"):
         preview(path, tmp_path / "hair.png")
     assert not (tmp_path / "hair.png").exists()
+
+
+def test_a_character_without_hair_is_no_bake(tmp_path):
+    from usd.review.picture import preview
+
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    stage.RemovePrim("/Hero/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match=r"shot.usda: holds no groom and no hair chains; give a bake$"):
+        preview(path, tmp_path / "hair.png")
