@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from pxr import Sdf, Tf, Usd
 
 from neuralocks_core.errors import NeuralocksError
@@ -17,6 +16,7 @@ from neuralocks_core.progress import Progress, silent
 from ..border.damage import first_line, named
 from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
 from ..border.units import Border
+from ..shot.gaps import gaps
 from ..shot.notes import FEW, composition_notes, out_of_place
 from ..shot.recorded import KEY
 from .header import relative, repeat_metadata
@@ -248,12 +248,5 @@ def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd
 
 def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     """The notes on frames of the shot that no part has."""
-    frames = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6)) * frame + codes[0]
-    steps = np.diff(frames)
-    usual = np.median(steps) if len(steps) > 1 else frame
-    gaps = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
-    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
-    missed = usual * (1 - 1e-6)  # a shot need not begin and end with a frame, but less than a step of it is none
-    gaps = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + gaps
-    gaps += [f"after {codes[-1]:g}"] if last - frames[-1] >= missed else []
-    return [f"no part has samples {', '.join(gaps[:4])}{', ...' if len(gaps) > 4 else ''}"] if gaps else []
+    found = gaps(codes, frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
+    return [f"no part has samples {', '.join(found[:4])}{', ...' if len(found) > 4 else ''}"] if found else []

@@ -26,6 +26,7 @@ from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
+from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
 from ..shot.notes import (
@@ -197,7 +198,17 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     if joint:
         spoils += groom_notes(prim, groom, border)
     made = recorded(prim)
-    return facts | joint | groom_facts(groom) | ({"baked with": made} if made else {})
+    baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
+    return facts | joint | groom_facts(groom) | baked
+
+
+def _samples(prim, border: Border) -> dict:
+    """Which frames a bake holds."""
+    codes, stage = UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples(), prim.GetStage()
+    if not codes:
+        return {"number": 0}
+    missing = gaps(codes, border.frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
+    return {"first": codes[0], "last": codes[-1], "number": len(codes), "missing": missing}
 
 
 def groom_facts(groom: Groom) -> dict:

@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.cli.app import app
+from usd.review.inspect import inspect
 
 from ..shots import Recipe, samples, write_shot
 
@@ -126,6 +127,8 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
     told = json.loads(result.stdout)
     assert told["frames"] == [1, 2, 3, 4, 5, 9, 10, 11, 12]
     assert told["notes"] == ["no part has samples between 5 and 9"]
+    groom = inspect(tmp_path / "hair.usdc")["grooms"][0]
+    assert groom["samples"] == {"first": 1, "last": 12, "number": 9, "missing": ["between 5 and 9"]}
     whole = bake(shot, tmp_path / "whole.usdc", model).path
     for code in told["frames"]:
         assert (
