@@ -233,13 +233,17 @@ def _one_person(rig: StageRig, other: StageRig) -> bool:
 
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
-    """The note on a range of time codes that the animation does not reach, so that the character stands still."""
+    """The note on a range of time codes in most of which the animation does not lie, so that the character stands still."""
     samples = rig.source.samples
-    if len(samples) < 2 or (samples[0] <= last and first <= samples[-1]):
+    if len(samples) < 2:
         return []
+    within = min(samples[-1], last) - max(samples[0], first)
+    if within >= 0.5 * (last - first):  # a shot may have handles
+        return []
+    much, held = ("none of it", "a held pose") if within < 0 else ("little of it", "elsewhere a held pose")
     return [
-        f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, none of it within {first:g} to "
-        f"{last:g}: a held pose; check --frames, the shot's range and the layer offsets"
+        f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, {much} within {first:g} to "
+        f"{last:g}: {held}; check --frames, the shot's range and the layer offsets"
     ]
 
 

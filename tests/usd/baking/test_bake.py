@@ -161,7 +161,9 @@ def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
 def test_frames_without_animation_are_said(tmp_path, still_model):
     """A shot at 1001 whose animation stayed at 1: nothing is wrong with any file, and nothing moves."""
     shot = write_shot(tmp_path)
-    assert not any("held pose" in note for note in bake(shot, tmp_path / "a.usdc", still_model, frames="9:20").notes)
+    for frames, told in (("5:12", False), ("9", False), ("8:20", True)):
+        notes = bake(shot, tmp_path / "a.usdc", still_model, frames=frames).notes
+        assert any("little of it within 8 to 20: elsewhere a held pose" in note for note in notes) == told
     assert any("1 to 9" in note for note in bake(shot, tmp_path / "b.usdc", still_model, frames="1001:1003").notes)
     stage = Usd.Stage.Open(str(shot))
     stage.SetStartTimeCode(1001)
