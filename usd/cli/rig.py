@@ -26,7 +26,12 @@ def train(
     dynamic: Annotated[
         bool, typer.Option("--dynamic/--quasi-static", help="Learn lag, swing and settling, or held poses only.")
     ] = True,
-    seconds: Annotated[float | None, typer.Option(help="Seconds to train, besides simulating (see --clips) and the report; 120, and 75 quasi-static.")] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            help="Seconds to train, besides simulating (see --clips) and the report; 120, and 75 quasi-static."
+        ),
+    ] = None,
     steps: Annotated[int | None, typer.Option(help="Train this many steps instead; repeatable.")] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,

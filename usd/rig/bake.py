@@ -112,6 +112,8 @@ def bake_rig(
         *mirrored_notes(hair.source, hair.rig.chains),
         *_held(hair, turns),
     ]
+    if strength != 1 and not model.dynamic:
+        notes.append("--strength: the model knows held poses only, on which it has no effect; give a dynamic one")
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
     notes += hair.source.loop_notes(wanted, moved) if loop else []
     if (loop or cuts is None) and model.dynamic:

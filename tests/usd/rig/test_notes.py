@@ -108,6 +108,14 @@ def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
         bake_rig(shot, tmp_path / "out.usda", model, joints={"neck": "b03"})
 
 
+def test_a_strength_that_a_model_of_held_poses_does_not_have_is_told(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    for dynamic, strength, told in ((False, 0.5, True), (False, 1, False), (True, 0.5, False)):
+        model = model_for(read_rigged_hair(shot), dynamic)
+        notes = bake_rig(shot, tmp_path / "hair.usda", model, strength=strength).notes
+        assert any(note.startswith("--strength: ") for note in notes) == told
+
+
 def test_a_pattern_that_stands_for_nothing_is_refused(tmp_path):
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda"), chains=["hair_*", "tuft_*"])
     with pytest.raises(NeuralocksError, match=r"--chains tuft_\*: no joint of the hair has such a name"):
