@@ -9,6 +9,7 @@ from pxr import Usd, UsdSkel
 from scipy.spatial import cKDTree
 
 from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -170,6 +171,7 @@ def read_rig(
         if not headless:
             raise
         humanoid = Humanoid({})
+    notes += _twice(source, by_hand, humanoid)
     to_bind = to_bind_world(source, border, posed, humanoid)
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
@@ -213,3 +215,15 @@ def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
         return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
     except NeuralocksError as error:
         raise type(error)(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
+
+
+def _twice(source: JointSource, by_hand: dict[str, str], humanoid: Humanoid) -> list[str]:
+    """The notes on joints that the user gave a meaning while they have another one, too: one does not turn against itself."""
+    said = {}
+    for name in by_hand:
+        others = [other for other in humanoid if other != name and humanoid[other] == humanoid[name]]
+        if others:
+            joint = leaf(source.names[humanoid[name]])
+            meanings = " and ".join(sorted([name, *others]))
+            said[joint] = f"{source.path}: joint '{joint}' is {meanings} at once; check --joint and --head"
+    return list(said.values())

@@ -145,3 +145,11 @@ def test_arms_that_no_joint_continues_are_told_to_count_as_straight(tmp_path):
     (said,) = _said(path, "_lower_arm")
     assert "left_lower_arm, right_lower_arm" in said and said.endswith("--joint left_lower_arm=JOINT")
     assert not any("_lower_arm" in note for note in read_shot(path, joints=ELBOWS).notes)
+
+
+def test_a_joint_of_two_meanings_is_told(tmp_path):
+    path = write_shot(tmp_path)
+    for joints, told in (({"neck": "head"}, ["head and neck"]), ({"neck": "neck"}, [])):
+        for notes in (read_shot(path, joints=joints).notes, inspect(path, joints=joints)["spoils"]):
+            said = [note for note in notes if "at once" in note]
+            assert said == [f"/Hero/Rig: joint 'head' is {each} at once; check --joint and --head" for each in told]
