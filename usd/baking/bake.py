@@ -73,7 +73,7 @@ def bake(
         grooms: prim paths; all grooms if left out.
         skeleton: prim path of the skeleton; found if left out.
         head: joint that carries grooms for which no binding says so.
-        frames: `A:B[:STEP]`, or time codes in any order; the shot's range if left out.
+        frames: `FIRST:LAST[:STEP]`, or time codes in any order; the shot's range if left out.
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
         subframes: samples per frame, for motion blur.
         material: a Material, or words NAME=VALUE.

@@ -17,7 +17,7 @@ MOST_SUBFRAMES = 64
 
 
 def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
-    """`A:B[:STEP]` or a single `A` as (first, last, step); the step is a frame if left out.
+    """`FIRST:LAST[:STEP]` or a single `FIRST` as (first, last, step); the step is a frame if left out.
 
     Raises:
         NeuralocksError: it is something else.
@@ -27,10 +27,12 @@ def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
     except ValueError:
         parts = []
     if not 1 <= len(parts) <= 3 or not all(math.isfinite(p) for p in parts):
-        raise NeuralocksError(f"--frames {text}: is not A:B or A:B:STEP; write for example 1:48")
+        raise NeuralocksError(f"--frames {text}: is not FIRST:LAST[:STEP]; write for example 1:48")
     first, last, step = parts[0], parts[1] if len(parts) > 1 else parts[0], parts[2] if len(parts) > 2 else frame
     if last < first or step <= 0:
-        raise NeuralocksError(f"--frames {text}: the range is empty; B must not lie before A, and STEP must be above 0")
+        raise NeuralocksError(
+            f"--frames {text}: the range is empty; LAST must not lie before FIRST, and STEP must be above 0"
+        )
     return first, last, step
 
 
@@ -38,7 +40,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     """Ascending time codes without doubles.
 
     Args:
-        frames: None for the whole range, `A:B[:STEP]`, or any iterable of time codes.
+        frames: None for the whole range, `FIRST:LAST[:STEP]`, or any iterable of time codes.
         first, last: the shot's range.
         subframes: samples per frame: n adds the n - 1 times at equal steps after each frame, for motion blur.
         frame: time codes from one frame to the next.
@@ -52,7 +54,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         begin, end = on_frame(begin, first, frame), on_frame(end, first, frame)
         count = (end - begin) / step + 1e-6  # may overflow to infinity
         if not count * subframes < MOST:
-            raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames A:B:STEP")
+            raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames FIRST:LAST:STEP")
         count = math.floor(count) + 1
         whole = [on_frame(begin + i * step, first, frame) for i in range(count)]
     else:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .command import note, print_json
+from .command import counted, note, print_json
 from .options import (
     AsJson,
     Cuts,
@@ -86,8 +86,7 @@ def join_command(
     if as_json:
         print_json(vars(result) | {"path": str(result.path)})
     else:
-        first, last = result.frames[0], result.frames[-1]
-        typer.echo(f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} of {len(parts)} parts")
+        typer.echo(f"{result.path}: {_span(result.frames)} of {counted(len(parts), 'part')}")
 
 
 def simulate_command(
@@ -140,7 +139,9 @@ def _bake_report(result, as_json: bool) -> None:
     for groom in result.grooms:
         typer.echo(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}")
     taken = f", {result.resumed} taken over from an interrupted bake" if result.resumed else ""
-    first, last = result.frames[0], result.frames[-1]
-    typer.echo(
-        f"{result.path}: {len(result.frames)} samples from {first:g} to {last:g} in {result.seconds:.1f} s{taken}"
-    )
+    typer.echo(f"{result.path}: {_span(result.frames)} in {result.seconds:.1f} s{taken}")
+
+
+def _span(codes: list[float]) -> str:
+    first, last = codes[0], codes[-1]
+    return f"{counted(len(codes), 'sample')} {f'at {first:g}' if first == last else f'from {first:g} to {last:g}'}"

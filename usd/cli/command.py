@@ -25,7 +25,7 @@ def command_of(app: typer.Typer):
             def run(*args, **kwargs):
                 try:
                     with stoppable():
-                        _check_words(kwargs)
+                        _check_words(function, kwargs)
                         if usd:
                             _load_usd()
                         return function(*args, **kwargs)
@@ -60,19 +60,28 @@ def _paragraphs(text: str) -> str:
     return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
-def _check_words(given: dict) -> None:
+def _check_words(function, given: dict) -> None:
     """Refuse empty words, such as a script's variable that was never set leaves behind, and files whose names are no
     text: USD takes UTF-8 alone, whatever the disk allows.
     """
     for name, value in given.items():
         for word in value if isinstance(value, list) else [value]:
             if isinstance(word, str) and not word.strip():
-                raise NeuralocksError(f"{name.replace('_', '-')}: is empty; give a value, or leave it out")
+                raise NeuralocksError(f"{_as_typed(function, name)}: is empty; give a value, or leave it out")
             try:
                 str(word if isinstance(word, Path) else "").encode()
             except UnicodeEncodeError:
                 name = str(word).encode("utf-8", "backslashreplace").decode()
                 raise NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it") from None
+
+
+def _as_typed(function, name: str) -> str:
+    """An argument's name, or an option with its dashes."""
+    told = inspect.signature(function).parameters[name].annotation.__metadata__[0]
+    if isinstance(told, typer.models.ArgumentInfo):
+        return name
+    words = [word for word in (told.default, *(told.param_decls or ())) if isinstance(word, str)]
+    return max(words, key=len, default=f"--{name.replace('_', '-')}")
 
 
 def one_line(text) -> None:

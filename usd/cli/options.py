@@ -23,7 +23,7 @@ Joints = Annotated[
 ]
 Frames = Annotated[
     str | None,
-    typer.Option("--frames", help="FIRST:LAST or FIRST:LAST:STEP in time codes; the shot's range if left out."),
+    typer.Option("--frames", help="FIRST:LAST[:STEP] in time codes; the shot's range if left out."),
 ]
 Subframes = Annotated[int, typer.Option("--subframes", help="Samples per frame, at most 64, for motion blur.")]
 Materials = Annotated[

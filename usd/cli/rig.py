@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .command import command_of, counted, note, print_json
-from .options import AsJson, Cuts, Head, Joints, Loop, Seed, Skeleton, cut_codes, pairs
+from .options import AsJson, Cuts, Head, Joints, Loop, Seed, Skeleton, Subframes, cut_codes, pairs
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -89,9 +89,10 @@ def bake(
     out: Annotated[Path, typer.Option("-o", "--out", help="Override layer to write.")],
     model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
     frames: Annotated[
-        str | None, typer.Option(help="A:B[:STEP] to sample besides the animation's own; the shot's range if left out.")
+        str | None,
+        typer.Option(help="FIRST:LAST[:STEP] to sample besides the animation's own; the shot's range if left out."),
     ] = None,
-    subframes: Annotated[int, typer.Option(help="Samples a frame.")] = 1,
+    subframes: Subframes = 1,
     loop: Loop = False,
     strength: Annotated[
         float, typer.Option(help="Motion strength of a dynamic model, from 0 to 2; 1 is as trained.")

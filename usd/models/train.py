@@ -123,6 +123,8 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
 
     if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
         return None
+    if begin not in (None, SHIPPED) and not Path(begin).exists():
+        raise NeuralocksError(f"{begin}: no such model file; name another, '{SHIPPED}' or '{NOTHING}'")
     beginning = Beginning(model.shipped() if begin in (None, SHIPPED) else begin)
     if begin is None and beginning.differences(spec, options):
         return None

@@ -104,9 +104,15 @@ def test_a_caller_that_closed_the_streams_gets_its_files(tmp_path, model):
 
 def test_an_empty_word_is_refused(tmp_path, capsys):
     """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
-    for words in (("bake", "s.usda", "-o", "o.usdc", "--head", ""), ("rig", "inspect", "s.usda", "--chains", " ")):
+    for words in (
+        ("bake", "s.usda", "-o", "o.usdc", "--head", ""),
+        ("rig", "inspect", "s.usda", "--chains", " "),
+        ("train", "--character", "c.usda", "-o", "m.neuralocks", "--set", ""),
+    ):
         assert status(*words) == 1
-        assert capsys.readouterr().err == f"error: {words[-2][2:]}: is empty; give a value, or leave it out\n"
+        assert capsys.readouterr().err == f"error: {words[-2]}: is empty; give a value, or leave it out\n"
+    assert status("grow", "", "--character", "c.usda", "-o", "o.usda") == 1
+    assert capsys.readouterr().err.startswith("error: style: is empty")
 
 
 def test_a_seed_is_one_of_numpys(capsys):

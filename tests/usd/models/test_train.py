@@ -38,7 +38,9 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
         begins_with("shipped", False, SPEC, STILL)
     with pytest.raises(NeuralocksError, match="differs from this training in static; resume with the settings"):
         begins_with("shipped", True, SPEC, STILL)
-    with pytest.raises(NeuralocksError, match="none.neuralocks: no such model file"):
+    with pytest.raises(
+        NeuralocksError, match="none.neuralocks: no such model file; name another, 'shipped' or 'nothing'"
+    ):
         begins_with(tmp_path / "none.neuralocks", False, SPEC, LIKE)
 
 
