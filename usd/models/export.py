@@ -12,6 +12,8 @@ from neuralocks_core.files import as_path, atomic_write
 from ..border.stopping import check
 from .description import described
 
+DESCRIPTION = "description.json"
+
 
 def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=None, joints=None) -> list[Path]:
     """Write the graphs and `description.json` of a model file into a folder.
@@ -26,7 +28,8 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         The files written, `description.json` among them.
 
     Raises:
-        NeuralocksError: the model cannot be read or the folder not be written.
+        NeuralocksError: the model cannot be read, the folder not be written, or a `description.json` of somebody else is
+            in it.
     """
     file = model_file.read(model)
     folder = as_path(folder, "folder")
@@ -34,6 +37,8 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         raise NeuralocksError(
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
+    if not _ours(folder / DESCRIPTION):
+        raise NeuralocksError(f"{folder / DESCRIPTION}: is of something else; move it, or choose another folder")
     description = described(file)
     tables = {}
     with ExitStack() as all_or_none:
@@ -46,8 +51,19 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
             tables = export_grooms(shot, model, put, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
             description["grooms"] = {"arrays": ARRAYS, "files": tables}
-        files = dict(file.graphs) | {"description.json": json.dumps(description, indent=1).encode()}
+        files = dict(file.graphs) | {DESCRIPTION: json.dumps(description, indent=1).encode()}
         for name, data in files.items():
             put(name).write_bytes(data)
         check()
     return [folder / name for name in (*files, *tables)]
+
+
+def _ours(path: Path) -> bool:
+    """Whether a file may be replaced by a description: it is one, or is not there."""
+    if not path.exists():
+        return True
+    try:
+        told = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(told, dict) and {"units", "graphs", "model"} <= told.keys()

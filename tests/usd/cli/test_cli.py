@@ -186,6 +186,16 @@ def test_what_is_exported_without_a_name_is_the_shipped_model(tmp_path, capsys):
 def test_a_model_is_unpacked_with_its_description(tmp_path, capsys):
     assert status("export", "-o", tmp_path) == 0
     assert {"tail.onnx", "description.json"} <= {Path(line).name for line in capsys.readouterr().out.split()}
+    assert status("export", "-o", tmp_path) == 0, "its own files are replaced"
+
+
+def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
+    for text in ('{"units": 1}', "notes"):
+        (tmp_path / "description.json").write_text(text)
+        assert status("export", "-o", tmp_path) == 1
+        assert "description.json: is of something else" in capsys.readouterr().err
+        assert [path.name for path in tmp_path.iterdir()] == ["description.json"]
+        assert (tmp_path / "description.json").read_text() == text
 
 
 def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
