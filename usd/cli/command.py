@@ -5,6 +5,7 @@ import functools
 import importlib
 import inspect
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -71,8 +72,17 @@ def _check_words(function, given: dict) -> None:
             try:
                 str(word if isinstance(word, Path) else "").encode()
             except UnicodeEncodeError:
-                name = str(word).encode("utf-8", "backslashreplace").decode()
-                raise NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it") from None
+                raise _unreadable(word) from None
+
+
+def _unreadable(path: Path) -> NeuralocksError:
+    """Why a file's name came in as what is no text."""
+    try:
+        name = os.fsencode(path).decode("utf-8")
+    except UnicodeError:
+        name = str(path).encode("utf-8", "backslashreplace").decode()
+        return NeuralocksError(f"{name}: its name is not UTF-8, as USD needs; rename it")
+    return NeuralocksError(f"{name}: its name is UTF-8, but the locale is not; set LC_ALL=C.UTF-8")
 
 
 def _as_typed(function, name: str) -> str:

@@ -70,6 +70,14 @@ def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys)
         assert captured.out == "" and captured.err.count("\n") == 1 and "not UTF-8" in captured.err, captured
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names do not depend on the locale")
+def test_of_a_locale_that_is_no_utf_8_a_name_is_innocent(tmp_path):
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "usd", "inspect", "sch öt.usd".encode()]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, env=environment)
+    assert done.stderr == b"error: sch \\xf6t.usd: its name is UTF-8, but the locale is not; set LC_ALL=C.UTF-8\n"
+
+
 def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
     """A redirected stdout is often no UTF-8; the card's frames ended in a traceback there."""
     shot, baked = write_shot(tmp_path), tmp_path / "髪.usdc"
