@@ -64,14 +64,19 @@ class _Bar:
     def __init__(self, title: str):
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.table import Column
+        from rich.text import Text
+
+        class Left(TimeRemainingColumn):
+            def render(self, task):
+                return Text("left ").append_text(super().render(task))
 
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.percentage:>3.0f} %"),
             TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
+            Left(table_column=Column(no_wrap=True, min_width=13)),  # what a narrow terminal shows, whatever it cuts
             TextColumn("{task.fields[message]}"),
         )
         self._bar = Progress(*columns, console=Console(stderr=True), transient=True)

@@ -49,3 +49,12 @@ def test_quick_work_shows_nothing_and_slow_work_on_a_terminal_a_bar(monkeypatch,
         say(1, 2, "frame 1")
         say(0, 3, "another step")
     assert "baking" in capsys.readouterr().err
+
+
+def test_a_narrow_terminal_shows_the_time_left(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "30")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(progress, "QUIET_FOR", -1.0)
+    with progress.progress_bar("baking") as say:
+        say(1, 2, "a message that is long")
+    assert "left -:--:--" in capsys.readouterr().err
