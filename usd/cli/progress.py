@@ -71,12 +71,13 @@ class _Bar:
             def render(self, task):
                 return Text("left ").append_text(super().render(task))
 
+        # With widths of their own share and time stay whole where a narrow terminal cuts the others short.
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
+            TextColumn("{task.percentage:>3.0f} %", table_column=Column(no_wrap=True, min_width=5)),
             TimeElapsedColumn(),
-            Left(table_column=Column(no_wrap=True, min_width=13)),  # what a narrow terminal shows, whatever it cuts
+            Left(table_column=Column(no_wrap=True, min_width=13)),
             TextColumn("{task.fields[message]}"),
         )
         self._bar = Progress(*columns, console=Console(stderr=True), transient=True)

@@ -51,10 +51,11 @@ def test_quick_work_shows_nothing_and_slow_work_on_a_terminal_a_bar(monkeypatch,
     assert "baking" in capsys.readouterr().err
 
 
-def test_a_narrow_terminal_shows_the_time_left(monkeypatch, capsys):
+def test_a_narrow_terminal_shows_share_and_time_left(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "30")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(progress, "QUIET_FOR", -1.0)
     with progress.progress_bar("baking") as say:
         say(1, 2, "a message that is long")
-    assert "left -:--:--" in capsys.readouterr().err
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", capsys.readouterr().err)
+    assert re.search(r" 50 % +left -:--:-- ", plain)
