@@ -12,7 +12,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 
 from .bake import bake_command, join_command, simulate_command
-from .command import command_of, note, print_json
+from .command import command_of, note, one_line, print_json
 from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs
 from .rig import app as rig_app
 from .train import one_by_one, train_command
@@ -42,7 +42,11 @@ def main(arguments: list[str] | None = None) -> None:
     # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     words = sys.argv[1:] if arguments is None else arguments
-    app(one_by_one(words) if words[:1] == ["train"] else words)
+    try:
+        app(one_by_one(words) if words[:1] == ["train"] else words)
+    except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
+        one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
+        raise SystemExit(1) from None
 
 
 def _version(wanted: bool) -> None:

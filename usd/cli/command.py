@@ -33,11 +33,6 @@ def command_of(app: typer.Typer):
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
                     raise typer.Exit(1) from None
-                except BrokenPipeError:
-                    raise  # the reader has seen enough: typer ends without a word
-                except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
-                    one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
-                    raise typer.Exit(1) from None
                 except MemoryError:
                     one_line("error: not enough memory; work on fewer strands at a time, or on a larger machine")
                     raise typer.Exit(1) from None

@@ -92,9 +92,10 @@ def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
     command = [sys.executable, "-m", "usd", "inspect", str(write_shot(tmp_path))]
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 1 and done.stderr.startswith("error: output: ") and "Traceback" not in done.stderr
+    for words in (command, [*command[:3], "--version"], [*command[:3], "bake", "--help"]):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(words, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 1 and done.stderr.startswith("error: output: ") and "Traceback" not in done.stderr
     read, write = os.pipe()
     os.close(read)  # as `neuralocks inspect | head` does once it has its lines
     with open(write, "w") as gone:
