@@ -190,7 +190,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ("folder", "shot", "baked"):
         parser.add_argument(name, type=Path)
-    parser.add_argument("material", nargs="*", metavar="NAME=VALUE", type=lambda word: word.split("="))
+    # Without a default the error on an empty line would call it required.
+    parser.add_argument("material", nargs="*", default=[], metavar="NAME=VALUE", type=lambda word: word.split("="))
     given = parser.parse_args()
     numbers = {name: float(value) for name, value in given.material}
     if unknown := numbers.keys() - DEFAULT:
