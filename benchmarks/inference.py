@@ -22,7 +22,7 @@ clock = time.perf_counter
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--strands", type=int, nargs="+", default=[3000, 50000, 120000])

@@ -28,7 +28,7 @@ def main() -> None:
     from usd.review.demo import shipped_shot
     from usd.shot.stage import read_shot
 
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?")
     parser.add_argument("--shot", type=Path)
     parser.add_argument("--every", type=int, default=6)

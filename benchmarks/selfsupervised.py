@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("--groom", action="append", required=True)
     parser.add_argument("--motion", action="append", default=[])
     parser.add_argument("--steps", type=int, default=700)
-    parser.add_argument("--row", action="append", choices=list(ROWS))
+    parser.add_argument("--row", action="append", choices=list(ROWS), metavar="ROW", help="; ".join(ROWS))
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
