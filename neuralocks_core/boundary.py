@@ -175,11 +175,15 @@ class BoundarySampler:
                 known better than by the clip.
 
         Raises:
-            NeuralocksError: a time is not finite.
+            NeuralocksError: a time is not finite, or the times are no row of numbers.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
+        if times.ndim > 1:
+            raise NeuralocksError(f"times: are of shape {times.shape}; give (n,) seconds")
         if not np.isfinite(times).all():
             raise NeuralocksError("times: hold NaN or infinity; give seconds")
+        if not len(times):
+            return np.zeros((0, spec.size), np.float32)
         lags = spec.dt * np.arange(spec.steps + 2)
         position, turns = self._sample(times, lags)
         now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)

@@ -136,8 +136,11 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(NeuralocksError, match="reads 15 numbers"):
         model.evaluate(np.zeros((2, 3, 15)))
     assert np.isfinite(model.evaluate(np.full(15, 1e300))).all()
-    with pytest.raises(NeuralocksError, match="times: hold NaN"):
-        RigSampler(model.spec, hair.source.character, hair.source.clip).features([0.0, np.nan])
+    sampler = RigSampler(model.spec, hair.source.character, hair.source.clip)
+    for times, fact in (([0.0, np.nan], "hold NaN"), ([[0.5, 1.0]], r"are of shape \(1, 2\)")):
+        with pytest.raises(NeuralocksError, match=f"times: {fact}"):
+            sampler.features(times)
+    assert model.evaluate(sampler.features([])).shape == (0, len(model.chains), 4)
 
 
 @pytest.mark.parametrize(
