@@ -16,6 +16,7 @@ WORDS = (
     ("use another pattern or another --head", "use another pattern or another Head bone"),
     ("with --chains", "under Chains"),
     ("--chains", "Chains"),
+    ("; neuralocks inspect lists all", "; choose a bone of the rig"),
 )
 """What the command line says, and the panel; in this order."""
 

@@ -113,7 +113,7 @@ def bake_rig(
         *_held(hair, turns),
     ]
     if strength != 1 and not model.dynamic:
-        notes.append("--strength: the model knows held poses only, on which it has no effect; give a dynamic one")
+        notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
     notes += hair.source.loop_notes(wanted, moved) if loop else []
     if (loop or cuts is None) and model.dynamic:

@@ -113,7 +113,7 @@ def test_a_strength_that_a_model_of_held_poses_does_not_have_is_told(tmp_path):
     for dynamic, strength, told in ((False, 0.5, True), (False, 1, False), (True, 0.5, False)):
         model = model_for(read_rigged_hair(shot), dynamic)
         notes = bake_rig(shot, tmp_path / "hair.usda", model, strength=strength).notes
-        assert any(note.startswith("--strength: ") for note in notes) == told
+        assert any(note.startswith("motion strength: ") for note in notes) == told
 
 
 def test_a_pattern_that_stands_for_nothing_is_refused(tmp_path):
