@@ -31,7 +31,7 @@ from .baked import Baked, read_baked
 STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
 REFERENCE_STRANDS = 200
-COLLISION_FRAMES, DEEPEST_FRAMES = 32, 6
+COLLISION_FRAMES, DEEPEST_FRAMES = 32, 3
 """Frames in which distances to the body are measured: so many evenly over the bake, and those in which hair seems deepest."""
 COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
 """Most own vertices whose distances are measured, evenly along the strands, and most places of them in all frames."""
@@ -174,6 +174,7 @@ class _Subject:
         resolver = self._resolver
         if resolver.at_rest is None or not len(self._own):
             return {}
+        resolver.prepare()
         rig, baked = self.item.attachment.rig, self.baked
         at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
         every = np.arange(len(baked.codes))
