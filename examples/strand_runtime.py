@@ -186,14 +186,20 @@ def largest_difference(folder: Path, shot: Path, baked: Path, material: dict[str
     return worst
 
 
+def setting(word: str) -> tuple[str, float]:
+    """The name and the number of NAME=VALUE; a ValueError tells argparse that a word is none."""
+    name, value = word.split("=")
+    return name, float(value)
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ("folder", "shot", "baked"):
         parser.add_argument(name, type=Path)
     # Without a default the error on an empty line would call it required.
-    parser.add_argument("material", nargs="*", default=[], metavar="NAME=VALUE", type=lambda word: word.split("="))
+    parser.add_argument("material", nargs="*", default=[], metavar="NAME=VALUE", type=setting)
     given = parser.parse_args()
-    numbers = {name: float(value) for name, value in given.material}
+    numbers = dict(given.material)
     if unknown := numbers.keys() - DEFAULT:
         parser.error(f"no such material: {', '.join(unknown)}; there are {', '.join(DEFAULT)}")
     print(f"{largest_difference(given.folder, given.shot, given.baked, numbers):.2e} m at most from the bake")

@@ -15,13 +15,14 @@ def batches(grooms: Sequence[StageGroom]) -> list[list[StageGroom]]:
     It depends on the grooms alone, not on what is asked of them: so every part of a bake has the same.
     """
     found: list[list[StageGroom]] = []
+    strands = 0
     for item in grooms:
-        last = found[-1] if found else []
-        count = sum(each.groom.strand_count for each in last) + item.groom.strand_count
-        if last and _head(last[0]) == _head(item) and count <= TOGETHER:
-            last.append(item)
+        strands += item.groom.strand_count
+        if found and _head(found[-1][0]) == _head(item) and strands <= TOGETHER:
+            found[-1].append(item)
         else:
             found.append([item])
+            strands = item.groom.strand_count
     return found
 
 

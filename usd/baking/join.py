@@ -17,7 +17,7 @@ from ..border.damage import first_line, named
 from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
 from ..border.units import Border
 from ..shot.gaps import gaps
-from ..shot.notes import FEW, composition_notes, out_of_place
+from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
 from .header import relative, repeat_metadata
 from .override import deliver
@@ -242,8 +242,7 @@ def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd
     found = {groom: _gaps(list(sources), frame, stage) for groom, sources in plan.items()}
     if len({tuple(sources) for sources in plan.values()}) == 1:
         return next(iter(found.values()))
-    lines = [f"{groom}: {note}" for groom, notes in found.items() for note in notes]
-    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more grooms have such gaps"]
+    return few([f"{groom}: {note}" for groom, notes in found.items() for note in notes], "grooms have such gaps")
 
 
 def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:

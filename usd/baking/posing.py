@@ -47,7 +47,10 @@ class GroomPoser:
         self._resolvers: list[tuple[slice | np.ndarray, Resolver]] = []
         with preparing():  # or 150 MB of a large groom would stay allocated
             self._placers = [GroomPlacer(item) for item in items]
-            self._session = StrandSession(model, StrandSet.joined([placer.strands for placer in self._placers]))
+            sets = [placer.strands for placer in self._placers]
+            self._session = StrandSession(model, StrandSet.joined(sets))
+            ends = np.cumsum([0, *(len(each.rest) for each in sets)])
+            self._rows = [slice(first, end) for first, end in zip(ends, ends[1:])]  # of each groom among all strands
             self._session.anchor(self._sampler.held_bind(self._material))
             if resolve and character.body is not None:
                 self._resolvers = [
@@ -71,14 +74,12 @@ class GroomPoser:
         moved = self._displacement(time_code, joints)
         # Each chunk's points take the place of its displacement where they are as many.
         in_place = all(placer.same_size for placer in self._placers)
-        count = sum(placer.item.point_count for placer in self._placers)
-        points, row, strand = moved.reshape(-1, 3) if in_place else np.empty((count, 3), np.float32), 0, 0
-        for placer in self._placers:
-            placed = placer.at(time_code, joints, points[row : row + placer.item.point_count])
-            own = moved[strand : strand + placer.item.groom.strand_count]
+        ends = np.cumsum([0, *(placer.item.point_count for placer in self._placers)])
+        points = moved.reshape(-1, 3) if in_place else np.empty((ends[-1], 3), np.float32)
+        for placer, rows, first, end in zip(self._placers, self._rows, ends, ends[1:]):
+            placed, own = placer.at(time_code, joints, points[first:end]), moved[rows]
             for strands in chunks(len(own)):
                 placed.put(strands, own[strands].copy())
-            row, strand = row + len(placed.points), strand + len(own)
         return points
 
     def moved(self, time_code: float) -> np.ndarray:
@@ -92,7 +93,8 @@ class GroomPoser:
             for rows, resolver in self._resolvers:
                 part = moved[rows]
                 resolver.apply(part, joints, shape, self._model.map)
-                moved[rows] = part
+                if not isinstance(rows, slice):  # else it is a view
+                    moved[rows] = part
             if moved.nbytes > LARGE:
                 give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
         return moved
@@ -100,11 +102,9 @@ class GroomPoser:
     def _alike(self) -> list[slice | np.ndarray]:
         """Strands of grooms with the same part of the body in their reach: each groom is moved as if it were alone."""
         found: dict[float, list] = {}
-        first, character = 0, self._placers[0].item.attachment.character
-        for placer in self._placers:
-            rows = np.arange(first, first + len(placer.strands.rest))
-            found.setdefault(reach(character, placer.strands), []).append(rows)
-            first += len(rows)
+        for placer, rows in zip(self._placers, self._rows):
+            far = reach(placer.item.attachment.character, placer.strands)
+            found.setdefault(far, []).append(np.arange(rows.start, rows.stop))
         return [slice(None)] if len(found) == 1 else [np.concatenate(rows) for rows in found.values()]
 
     def _vector(self, time_code: float, joints: np.ndarray) -> np.ndarray:

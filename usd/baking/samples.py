@@ -89,7 +89,7 @@ def write_samples(
 def _carried(item: StageGroom) -> list:
     """How a groom was read, as far as its samples depend on it: which joints of which skeleton, from where, which cuts."""
     found, character = item.attachment, item.attachment.character
-    joints = {name: int(joint) for name, joint in character.humanoid.items()}
+    joints = {name: int(joint) for name, joint in character.humanoid.items()} | {"": int(character.carrying_joint)}
     return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
 
 

@@ -271,7 +271,9 @@ def _carried_by(rig: StageRig, joint: int) -> Character:
     head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
     if head == joint:
         return rig.character
-    if head is not None and skeleton.below(head)[joint] and joint != _head_by_name(rig):
+    below = head is not None and skeleton.below(head)[joint]
+    # A neck that the user calls the head does not make a part of it of the head that names find.
+    if below and not ("head" in rig.by_hand and joint == _head_by_name(rig)):
         return replace(rig.character, carrier=joint)
     return replace(rig.character, humanoid=_humanoid(rig, head=skeleton.names[joint]))
 

@@ -53,9 +53,9 @@ class HairSearch:
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others, and are not closed."""
-        closed = [] if self._named else [prim for prim in curves if is_closed(prim)]
-        self._controls += [str(prim.GetPath()) for prim in closed]
-        curves = [prim for prim in curves if prim not in closed]
+        if not self._named:
+            self._controls += [str(prim.GetPath()) for prim in curves if is_closed(prim)]
+            curves = [prim for prim in curves if not is_closed(prim)]
         empty = [] if self._named else without_points(curves)
         self._notes += few([no_points(str(prim.GetPath())) for prim in empty])
         return [prim for prim in curves if prim not in empty]

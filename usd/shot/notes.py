@@ -88,9 +88,9 @@ def first_of(rigs: Sequence[StageRig]) -> list[str]:
     ]
 
 
-def few(lines: list[str]) -> list[str]:
+def few(lines: list[str], others: str = "prims are left out like that") -> list[str]:
     """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
-    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more prims are left out like that"]
+    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more {others}"]
 
 
 def no_points(path: str) -> str:
