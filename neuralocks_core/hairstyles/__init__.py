@@ -14,6 +14,7 @@ from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp, from_head
 from neuralocks_core.hairstyles.shaping import shaped
 from neuralocks_core.hairstyles.style import Style
+from neuralocks_core.hairstyles.variation import Variation
 from neuralocks_core.strands.strand_set import root_uv
 
 STYLES = {**loose.STYLES, **tied.STYLES}
@@ -32,6 +33,7 @@ def grow(
     count: int,
     seed: int = 0,
     body: tuple[np.ndarray, np.ndarray] | Obstacle | None = None,
+    variation: int = 0,
 ) -> Groom:
     """Grow a hairstyle.
 
@@ -42,6 +44,7 @@ def grow(
         seed: the same one gives the same groom.
         body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made of them,
             which is worth keeping for several styles; without one, a usual head, neck and shoulders.
+        variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
 
     Raises:
         NeuralocksError: an unknown style, or a strand count out of range.
@@ -53,10 +56,16 @@ def grow(
     random = np.random.default_rng(seed)
     obstacle = body if isinstance(body, Obstacle) else Obstacle(scalp, body)
     size = scalp.radius / 0.1
-    chosen = STYLES[style]
+    chosen, varied = STYLES[style], Variation.numbered(variation, style) if variation else None
+    if varied:
+        chosen = chosen.varied(varied)
     site = _site(chosen, scalp, count, random, size)
     axis = chosen.axis(site, scalp, obstacle)
+    if varied:
+        axis = varied.trimmed(axis, site)
     points = shaped(axis, site, chosen.shape, obstacle, size)
+    if varied:
+        points = varied.pressed(points, obstacle, size)
     if chosen.shape.vertices == STEPS:
         points = evenly(points, STEPS).astype(np.float32)
         points[:, 0] = axis[:, 0]

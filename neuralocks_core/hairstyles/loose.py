@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
 from neuralocks_core.hairstyles.style import Style
+from neuralocks_core.hairstyles.variation import Variation
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,13 @@ class Loose(Style):
 
     def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
         return march(site, self.plan(site), scalp, obstacle, STEPS)
+
+    def varied(self, variation: Variation) -> Loose:
+        return replace(
+            self,
+            shape=variation.of_shape(self.shape),
+            plan=lambda site: variation.of_plan(self.plan(site), site),
+        )
 
 
 def _falling(

@@ -13,6 +13,7 @@ from neuralocks_core.hairstyles.growth import Site
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
+from neuralocks_core.hairstyles.variation import Variation
 
 
 @dataclass(frozen=True)
@@ -29,3 +30,7 @@ class Style(ABC):
     @abstractmethod
     def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
         """(S, K, 3) float32 [m]: strands from their roots, before they are waved or curled."""
+
+    @abstractmethod
+    def varied(self, variation: Variation) -> Style:
+        """The same style, otherwise."""

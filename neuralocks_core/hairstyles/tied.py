@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
 from neuralocks_core.hairstyles.style import Style
+from neuralocks_core.hairstyles.variation import Variation
 
 _ON_HEAD, _TAIL = 18, 60
 
@@ -35,6 +36,10 @@ class Tied(Style):
         for _ in range(4):  # round the corner at the tie
             points[:, 1:-1] = (points[:, :-2] + 2 * points[:, 1:-1] + points[:, 2:]) / 4
         return evenly(points.astype(np.float32), self.shape.vertices)
+
+    def varied(self, variation: Variation) -> Tied:
+        tie = tuple(float(a + b) for a, b in zip(self.tie, variation.tie, strict=True))
+        return replace(self, shape=variation.of_shape(self.shape), tie=tie)
 
 
 @dataclass(frozen=True, eq=False)

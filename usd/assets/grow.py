@@ -28,6 +28,7 @@ def grow(
     count: int = 10_000,
     seed: int = 0,
     *,
+    variation: int = 0,
     skeleton: str | None = None,
     head: str | None = None,
     tell: Callable[[list[str]], None] | None = None,
@@ -40,6 +41,7 @@ def grow(
         out: USD file to write.
         count: strands, 1 to 150,000.
         seed: the same one gives the same groom.
+        variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
         skeleton, head: as for `bake`.
         tell: called with notes for the user.
 
@@ -52,7 +54,7 @@ def grow(
     check_not_input(out, rig.source.prim.GetStage())
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
-    return write_groom(out, Barber(rig.character).grow(style, count, seed), rig.border)
+    return write_groom(out, Barber(rig.character).grow(style, count, seed, variation), rig.border)
 
 
 class Barber:
@@ -63,9 +65,9 @@ class Barber:
             raise NeuralocksError("character: hair needs a head to grow on; give a character with skin, or a groom")
         self.character = character
 
-    def grow(self, style: str, count: int, seed: int) -> Groom:
+    def grow(self, style: str, count: int, seed: int, variation: int = 0) -> Groom:
         """A groom in bind-world metres."""
-        groom = grow_style(style, self._scalp, count, seed, self._obstacle)
+        groom = grow_style(style, self._scalp, count, seed, self._obstacle, variation)
         return replace(groom, points=(groom.points @ self.character.facing).astype(np.float32))
 
     @cached_property

@@ -214,13 +214,21 @@ def grow_command(
     out: Out,
     count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
     seed: Seed = 0,
+    variation: Annotated[
+        int,
+        typer.Option(
+            min=0, help="Number of a variation: cut, parted, waved and laid otherwise; 0 is the style itself."
+        ),
+    ] = 0,
     skeleton: Skeleton = None,
     head: Head = None,
 ) -> None:
     """Grow a hairstyle on a character and write it as a USD groom."""
     from ..assets.grow import grow
 
-    typer.echo(str(grow(style, character, out, count, seed, skeleton=skeleton, head=head, tell=note)))
+    typer.echo(
+        str(grow(style, character, out, count, seed, variation=variation, skeleton=skeleton, head=head, tell=note))
+    )
 
 
 @command("demo")

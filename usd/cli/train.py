@@ -53,6 +53,9 @@ def train_command(
     head: Head = None,
     joint: Joints = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
+    variations: Annotated[
+        int, typer.Option(min=0, max=1000, help="Of each style of the library, beside the style itself.")
+    ] = 0,
     rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
     method: Annotated[
@@ -81,7 +84,7 @@ def train_command(
     with _telling_how_to_go_on(out), progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
-            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, rollouts=rollouts, processes=processes,
+            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, rollouts=rollouts, processes=processes,
             credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))

@@ -40,6 +40,7 @@ def train(
     joints: dict[str, str] | None = None,
     begin: str | Path | None = None,
     resume: bool = False,
+    variations: int = 0,
     rollouts: int = 1200,
     processes: int = 1,
     credits=(),
@@ -62,6 +63,7 @@ def train(
         begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
             it reads are the shipped model's.
         resume: go on with an interrupted training.
+        variations: of each style of the library, beside the style itself.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
@@ -103,8 +105,9 @@ def train(
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
     begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
-        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed, tell=tell, **history
-    )
+        character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
+        variations=variations, tell=tell, **history,
+    )  # fmt: skip
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,

@@ -45,6 +45,7 @@ def training_scene(
     head: str | None = None,
     joints: dict[str, str] | None = None,
     seed: int = 0,
+    variations: int = 0,
     tell: Callable[[list[str]], None] | None = None,
     **settings,
 ) -> TrainingScene:
@@ -59,6 +60,7 @@ def training_scene(
         head: joint that is the head, where its name does not tell.
         joints: semantic joint -> joint, where names do not tell.
         seed: of everything random.
+        variations: of each style of the library, beside the style itself.
         tell: called with notes for the user.
         **settings: further fields of TrainingScene.
 
@@ -72,7 +74,7 @@ def training_scene(
     notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
     for source in grooms or [str(character)]:
-        found += _library(rig.character, seed) if source == LIBRARY else _file(source, rig, head, notes)
+        found += _library(rig.character, seed, variations) if source == LIBRARY else _file(source, rig, head, notes)
     clips = tuple(read_clip(path, rig.character) for path in motion)
     if tell:
         tell(list(dict.fromkeys(notes)))
@@ -95,9 +97,13 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     return [strands for strands in found if strands.valid.any()]
 
 
-def _library(character: Character, seed: int) -> list[StrandSet]:
+def _library(character: Character, seed: int, variations: int) -> list[StrandSet]:
     barber = Barber(character)
-    return [_strands(barber.grow(style, MOST_STRANDS, seed + i), character) for i, style in enumerate(STYLES)]
+    return [
+        _strands(barber.grow(style, MOST_STRANDS, seed + i, variation), character)
+        for variation in range(1 + variations)
+        for i, style in enumerate(STYLES)
+    ]
 
 
 def _strands(groom: Groom, character: Character) -> StrandSet:

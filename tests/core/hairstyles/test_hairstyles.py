@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The library grows every style on any scalp: the right number of strands, from the skin and out of the body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,6 +10,8 @@ import trimesh
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles import MOST_STRANDS, STYLES, Obstacle, Scalp, from_head, grow
+from neuralocks_core.hairstyles.growth import Site
+from neuralocks_core.hairstyles.variation import Variation
 from neuralocks_core.strands.strand_set import strand_set
 
 CENTRE = np.array([0.0, 1.66, 0.03])
@@ -52,6 +56,43 @@ def test_the_seed_decides(style):
     first, again, other = (grow(style, SCALP, 50, seed, OBSTACLE).points for seed in (1, 1, 2))
     assert first.tobytes() == again.tobytes()
     assert first.tobytes() != other.tobytes()
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_variations_are_of_one_scalp_and_none_is_like_another(style):
+    """Each number is another cut of the style, the same for every seed; hair may be pressed into the skin, not through it."""
+    grooms = [grow(style, SCALP, 60, 1, OBSTACLE, variation=number) for number in (0, 1, 2, 3, 4, 5)]
+    points = [groom.points.reshape(60, -1, 3) for groom in grooms]
+    collider = Collider(*BODY)
+    for some in points:
+        assert np.abs(collider.distance(some[:, 0])[0]).max() < 2e-4
+        assert collider.distance(some.reshape(-1, 3))[0].min() > -0.03
+        assert np.linalg.norm(np.diff(some, axis=1), axis=2).sum(axis=1).min() > 0.0005
+    tips = [some[:, -1] for some in points]
+    apart = [np.linalg.norm(a - b, axis=1).mean() for i, a in enumerate(tips) for b in tips[:i]]
+    assert min(apart) > 0.001
+    again = grow(style, SCALP, 60, 2, OBSTACLE, variation=1).points.reshape(60, -1, 3)
+    length = [np.linalg.norm(np.diff(some, axis=1), axis=2).sum(axis=1).mean() for some in (points[1], again)]
+    assert length[1] == pytest.approx(length[0], rel=0.2)
+
+
+def test_a_variation_cuts_presses_and_waves_as_it_says():
+    plain = Variation.numbered(1, "bob")
+    points = grow("long_straight", SCALP, 200, 1, OBSTACLE).points.reshape(200, -1, 3)
+    site = Site(roots=None, seen=None, guide=None, of_clump=np.full((200, 4), 0.5), own=np.zeros((200, 4)))
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    cut = replace(plain, keep=0.5, layers=0.0).trimmed(points, site)
+    assert np.linalg.norm(np.diff(cut, axis=1), axis=2).sum(axis=1) == pytest.approx(length / 2, rel=0.02)
+    layered = replace(plain, keep=1.0, layers=0.4).trimmed(points, site)
+    assert np.linalg.norm(np.diff(layered, axis=1), axis=2).sum(axis=1) == pytest.approx(0.8 * length, rel=0.02)
+    np.testing.assert_array_equal(replace(plain, sunk=0.0).pressed(points, OBSTACLE, 0.9), points)
+    pressed = replace(plain, sunk=0.005).pressed(points, OBSTACLE, 0.9)
+    np.testing.assert_array_equal(pressed[:, 0], points[:, 0])
+    deeper = OBSTACLE.distance(points.reshape(-1, 3))[0] - OBSTACLE.distance(pressed.reshape(-1, 3))[0]
+    assert 0.001 < deeper.max() < 0.006
+    assert deeper.min() > -5e-4
+    assert replace(plain, wave=0.004, pitch=0.1).of_shape(STYLES["bob"].shape).wave == 0.004
+    assert replace(plain, wave=0.004).of_shape(STYLES["coils"].shape).wave == 0
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -12,6 +12,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.assets.groom import import_groom
 from usd.assets.grow import grow
+from usd.models import training_scene as training_scene_module
+from usd.models.training_scene import training_scene
 from usd.shot.stage import read_rigs, read_shot
 
 from ..shots import Recipe, write_shot
@@ -29,6 +31,19 @@ def test_a_style_grows_on_the_head_and_is_repeatable(tmp_path):
     roots = points[0].reshape(60, -1, 3)[:, 0]
     centre = character.canonical_to_bind[:3, 3] + character.head_centre
     assert np.linalg.norm(roots - centre, axis=1).max() < 0.2
+
+
+def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatch):
+    monkeypatch.setattr(training_scene_module, "STYLES", {"bob": None, "coils": None})
+    monkeypatch.setattr(training_scene_module, "MOST_STRANDS", 40)
+    few, many = (training_scene(BODY, ["library"], variations=count).grooms for count in (0, 2))
+    assert (len(few), len(many)) == (2, 6)
+    for groom, same in zip(few, many[:2], strict=True):
+        np.testing.assert_array_equal(groom.rest, same.rest)
+    # What `grow --variation` gives is what is learned from.
+    path = grow("coils", BODY, tmp_path / "coils.usda", count=40, seed=1, variation=2)
+    (own,) = training_scene(BODY, [str(path)]).grooms
+    np.testing.assert_allclose(own.rest, many[5].rest, atol=1e-6)
 
 
 @pytest.mark.parametrize("unit, up", [(0.01, "Z"), (0.0254, "Y")])
