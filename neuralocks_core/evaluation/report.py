@@ -43,6 +43,9 @@ LABELS = {
 }
 """Name of a measure -> what a person reads, unit, remark."""
 
+EACH = 8
+"""Grooms of which each has tables of its own; of more, one table tells the mean and the worst, and so many are drawn."""
+
 PLOTS = (".png", ".svg", ".pdf")
 """Endings of files that `Card.plot` writes."""
 
@@ -77,7 +80,13 @@ class Card:
         encoding = encoding or "utf-8"
         page = io.TextIOWrapper(io.BytesIO(), encoding=encoding, errors="backslashreplace", newline="\n")
         console = Console(file=page, width=100, force_terminal=False, highlight=False)
-        for name, values in self.grooms.items():
+        if len(self.grooms) > EACH:
+            console.print(self._overview(f"{len(self.grooms)} grooms", self.grooms))
+            bakes = {name: rows["bake"] for name, rows in self.compared.items() if "bake" in rows}
+            if bakes:
+                console.print(self._overview(f"{len(bakes)} grooms, against the reference", bakes))
+            console.print("- each groom's own numbers are in --json", markup=False)
+        for name, values in self.grooms.items() if len(self.grooms) <= EACH else ():
             console.print(self._measures(name, values))
             if self.compared.get(name):
                 console.print(self._comparison(name))
@@ -87,7 +96,7 @@ class Card:
         return page.buffer.getvalue().decode(encoding).rstrip() + "\n"
 
     def plot(self, path: str | os.PathLike) -> Path:
-        """Draw the tip curves, one row a groom: sideways, up and forward over time.
+        """Draw the tip curves, one row for each of the grooms with most strands: sideways, up and forward over time.
 
         Args:
             path: the file to write; its ending, one of PLOTS, chooses the kind.
@@ -99,17 +108,18 @@ class Card:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        rows = max(len(self.curves), 1)
-        figure = Figure(figsize=(12, 2.9 * rows), layout="constrained")
+        drawn = sorted(self.curves, key=lambda name: -self.grooms[name].get("strands", 0))[:EACH]
+        figure = Figure(figsize=(12, 2.9 * max(len(drawn), 1)), layout="constrained")
         FigureCanvasAgg(figure)
-        axes = figure.subplots(rows, 3, squeeze=False, sharex="row")
+        axes = figure.subplots(max(len(drawn), 1), 3, squeeze=False, sharex="row")
         style = {
             "reference": {"color": "black", "lw": 2.2},
             "bake": {"color": "tab:red", "lw": 1.6},
             "held pose": {"color": "tab:blue", "lw": 1, "ls": "--"},
             "rigid": {"color": "0.6", "lw": 1, "ls": ":"},
         }
-        for row, (name, curves) in zip(axes, self.curves.items(), strict=False):
+        for row, name in zip(axes, drawn, strict=False):
+            curves = self.curves[name]
             for axis, (panel, direction) in enumerate(zip(row, ("sideways", "up", "forward"), strict=True)):
                 for who, curve in curves.items():
                     if who != "times":
@@ -131,6 +141,22 @@ class Card:
             if key in LABELS:
                 label, unit, remark = LABELS[key]
                 table.add_row(label, _number(value), unit, remark)
+        return table
+
+    def _overview(self, title, grooms):
+        """Of each measure the mean over the grooms, every strand counting alike, and the one farthest from nothing."""
+        from rich.table import Table
+
+        table = Table(title=title, title_justify="left")
+        for heading in ("", "mean", "most", "", "in"):
+            table.add_column(heading, justify="right" if heading in ("mean", "most") else "left")
+        for key, (label, unit, _) in LABELS.items():
+            found = {name: values[key] for name, values in grooms.items() if _finite(values.get(key))}
+            if found:
+                most = max(found, key=lambda name: abs(found[name]))
+                strands = [self.grooms[name].get("strands", 1) for name in found]
+                mean = np.average(list(found.values()), weights=strands)
+                table.add_row(label, _number(mean), _number(found[most]), unit, most)
         return table
 
     def _comparison(self, name):
@@ -161,6 +187,10 @@ def check_plot(path: str | os.PathLike) -> Path:
     if find_spec("matplotlib") is None:
         raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[compare]'")
     return path
+
+
+def _finite(value) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
 
 
 def _number(value) -> str:

@@ -27,6 +27,23 @@ def test_text_holds_every_number_and_note():
     assert "nan" not in text
 
 
+def test_of_many_grooms_one_table_tells_mean_and_worst(tmp_path):
+    """Hair in hundreds of prims: nobody reads hundreds of tables, and no picture is as tall."""
+    grooms = {f"/Hair/lock{i}": {"strands": 1 + i % 2, "droop_cm": -float(i), "settling_s": np.nan} for i in range(40)}
+    compared = {name: {"bake": {"motion_ratio": 0.5}, "rigid": {"motion_ratio": 0.0}} for name in grooms}
+    text = Card("bake", grooms, compared, notes=("a note",)).text()
+    assert len(text.splitlines()) < 25
+    (row,) = [line for line in text.splitlines() if "droop" in line]
+    mean = np.average(-np.arange(40.0), weights=[1, 2] * 20)
+    assert all(word in row for word in (f"{mean:.3g}", "-39", "/Hair/lock39", "cm"))
+    assert "settling" not in text
+    assert "motion ratio" in text
+    assert "a note" in text
+    curves = {name: {"times": np.arange(3.0), "bake": np.zeros((3, 3))} for name in grooms}
+    picture = Card("bake", grooms, {}, curves).plot(tmp_path / "curves.svg").read_text()
+    assert picture.count("tips, up") == 8
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8", None])
 def test_text_can_be_written_in_the_code_page_asked_for(encoding):
     measured = card()
