@@ -17,7 +17,6 @@ from pathlib import Path
 import torch
 
 from neuralocks_core.boundary import BoundarySpec
-from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -53,7 +52,6 @@ ROWS = {
 def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollouts: int) -> None:
     """Train and measure each variant; prints a Markdown table as it goes."""
     coder = kept_coder(work)
-    codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
     scenes = {"rollouts": scene, "held_out": replace(scene, held_out=True)}
     files = {name: sorted((work / name).glob("*.npz"))[:rollouts] for name in scenes}
     print(f"{len(files['rollouts'])} rollouts, {budget} each, seed {scene.seed}\n")
@@ -66,7 +64,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
         spec = change.get("spec", scene.spec)
         banks = {}
         for name, which in scenes.items():
-            bank = banks[name] = RolloutBank(which, codes)
+            bank = banks[name] = RolloutBank(which, coder.codes_of)
             bank.rollouts = [load(path) for path in files[name]]
             if spec != scene.spec:
                 maker = RolloutMaker(which)

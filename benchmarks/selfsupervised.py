@@ -18,7 +18,6 @@ import torch
 
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.physics.bend_twist import Cosserat
-from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -50,7 +49,6 @@ ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {
 def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
     """Train and measure each variant; prints a Markdown table as it goes."""
     coder = kept_coder(work)
-    codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
     files = sorted((work / "held_out").glob("*.npz"))
     names = "position static motion motion_static motion_ratio velocity droop penetration".split()
     print(f"{steps} steps each, seed {scene.seed}; rigid hair: motion and velocity 1, motion ratio and droop 0\n")
@@ -60,13 +58,13 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
         options, spec = ROWS[row]
         options, own = replace(options, steps=steps), replace(scene, spec=spec or scene.spec)
         held_scene = replace(own, held_out=True)
-        held = RolloutBank(held_scene, codes)
+        held = RolloutBank(held_scene, coder.codes_of)
         held.rollouts = [load(path) for path in files]
         if spec is not None:
             maker = RolloutMaker(held_scene)
             held.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files, held.rollouts)]
         start = time.monotonic()
-        method = MomentMethod(own, codes, options, None, lambda done, message: None)
+        method = MomentMethod(own, coder.codes_of, options, None, lambda done, message: None)
         torch.manual_seed(options.seed)
         net = StrandNet(own.spec.size, motion=options.motion)
         history = own.spec.slices["history"]

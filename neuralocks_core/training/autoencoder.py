@@ -13,7 +13,7 @@ from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
-from neuralocks_core.strands.strand_set import K
+from neuralocks_core.strands.strand_set import K, StrandSet, scalp_local
 from neuralocks_core.training.descent import Schedule, descend
 
 LATENT, HIDDEN = 32, 256
@@ -136,6 +136,10 @@ class StrandAutoencoder(nn.Module):
         """(n, 24, 3) strands -> (n, 32) float32 codes."""
         flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 3 * K)).to(self.mean.device)
         return self.encode(flat).cpu().numpy()
+
+    def codes_of(self, strands: StrandSet) -> np.ndarray:
+        """(S, 32) float32 codes of a groom's strands."""
+        return self.codes(scalp_local(strands))
 
 
 def _mlp(inputs: int, hidden: int, outputs: int) -> nn.Sequential:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.deformation.strand_session import strand_inputs
+from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -28,12 +29,12 @@ STEPS_EACH = 10
 
 def method_of(
     scene: TrainingScene,
-    codes: list[np.ndarray],
+    codes: Callable[[StrandSet], np.ndarray],
     options: RegressionOptions | SelfSupervisedOptions,
     farm: RolloutFarm,
     report: Callable[[float, str], None],
 ) -> RolloutMethod | MomentMethod:
-    """The method that the kind of options asks for; see `train.train_strands` for the arguments."""
+    """The method that the kind of options asks for; `codes` as for `RolloutBank`, else see `train.train_strands`."""
     kind = MomentMethod if isinstance(options, SelfSupervisedOptions) else RolloutMethod
     return kind(scene, codes, options, farm, report)
 
@@ -85,7 +86,7 @@ class MomentMethod:
 
     def __init__(self, scene, codes, options: SelfSupervisedOptions, farm, report):
         self.options = options
-        self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
+        self.inputs = [strand_inputs(groom, codes(groom)) for groom in scene.grooms]
         self.pool = MomentPool(
             replace(scene, strands=options.strands),
             supported=options.supported,

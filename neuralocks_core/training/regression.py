@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,9 +19,10 @@ from torch import Tensor, nn
 
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.materials import MARGIN, NO_PLANE
-from neuralocks_core.strands.strand_set import K
+from neuralocks_core.strands.strand_set import K, StrandSet
 from neuralocks_core.training.descent import Descended, Schedule, descend, muon
 from neuralocks_core.training.farm import load
+from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
 
@@ -50,6 +52,7 @@ class RegressionOptions:
         settling: weight of the error of frame differences, relative to the strand's own frame difference.
         parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
         collision: weight of the depth under the target's body plane, in strand lengths.
+        mirror: share of the rollouts of a step that are seen in a mirror.
         output: "direction" or "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
         static: learn without history (the quasi-static variant, and the baseline of equal budget).
@@ -70,6 +73,7 @@ class RegressionOptions:
     settling: float = 0.3
     parting: float = 0.3
     collision: float = 45.0
+    mirror: float = 0.0
     output: str = "direction"
     motion: str = "modulated"
     static: bool = False
@@ -91,15 +95,21 @@ class RolloutBank:
 
     Args:
         scene: the one that the rollouts were made from.
-        codes: latent codes of each groom's strands, one (S, 32) a groom.
+        codes: gives latent codes (S, 32) of strands.
     """
 
-    def __init__(self, scene: TrainingScene, codes: list[np.ndarray]):
-        self.inputs = [strand_inputs(groom, code) for groom, code in zip(scene.grooms, codes)]
+    def __init__(self, scene: TrainingScene, codes: Callable[[StrandSet], np.ndarray]):
+        self._scene, self._codes = scene, codes
+        self.inputs = [strand_inputs(groom, codes(groom)) for groom in scene.grooms]
         self.lengths = [groom.length for groom in scene.grooms]
         self.rollouts: list[Rollout] = []
         self.material = scene.spec.slices["material"]
         self._seen: set[Path] = set()
+
+    @cached_property
+    def _mirrored(self) -> list[np.ndarray]:
+        """As `inputs`, of the grooms seen in a mirror."""
+        return [strand_inputs(groom, self._codes(groom)) for groom in map(mirrored_strands, self._scene.grooms)]
 
     def add(self, files: list[Path]) -> None:
         """Read the files that are new."""
@@ -128,14 +138,17 @@ class RolloutBank:
             late = rng.integers(max(rollout.first, 1), len(rollout.vectors), size=options.moments)
             moments = np.stack([late - 1, late], axis=1).ravel()
             chosen = rollout.strands[pick]
-            rows["strands"].append(self.inputs[rollout.groom][chosen])
-            rows["rest"].append(rollout.rest[pick])
-            rows["length"].append(self.lengths[rollout.groom][chosen])
             frames = np.concatenate([rollout.vectors[moments], rollout.bind[None]])
             frames[:, self.material] = rollout.materials[pick[0]]
+            inputs, sides = self.inputs, np.ones(3, np.float32)
+            if options.mirror and rng.random() < options.mirror:
+                inputs, sides, frames = self._mirrored, POLAR, mirrored_vectors(self._scene.spec, frames)
+            rows["strands"].append(inputs[rollout.groom][chosen])
+            rows["rest"].append(rollout.rest[pick] * sides)
+            rows["length"].append(self.lengths[rollout.groom][chosen])
             rows["frames"].append(frames)
-            rows["moved"].append(rollout.moved[moments[:, None], pick])
-            rows["planes"].append(rollout.planes[moments[:, None], pick])
+            rows["moved"].append(rollout.moved[moments[:, None], pick] * sides)
+            rows["planes"].append(rollout.planes[moments[:, None], pick] * np.append(sides, 1))
         batch = {name: torch.from_numpy(np.stack(values)).to(options.device) for name, values in rows.items()}
         batch["moved"] = batch["moved"].float() * STEP
         batch["planes"] = batch["planes"].float()

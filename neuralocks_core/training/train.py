@@ -120,9 +120,8 @@ def _trained(
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
         coder = beginning.coder() if beginning else _coder(scene, work, options, report)
-        codes = [coder.codes(scalp_local(groom)) for groom in scene.grooms]
-        method = method_of(scene, codes, options, farm, report)
-        run = _Run(scene, method, RolloutBank(scene_out, codes), saved, beginning, resume and saved.exists())
+        method = method_of(scene, coder.codes_of, options, farm, report)
+        run = _Run(scene, method, RolloutBank(scene_out, coder.codes_of), saved, beginning, resume and saved.exists())
         gauge = run.train(farm, held_farm, report)
     card = {**run.card(), **_inputs_of(scene, coder, beginning), "options": asdict(options, dict_factory=_plain)}
     description = {
