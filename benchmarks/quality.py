@@ -12,7 +12,8 @@ through the roots of each folder's files and through the scalp (`real_grooms.py`
 The scripted clips are made of the gestures that training draws at random, with sizes near the middle of the random
 ones': no clip was trained on, but it is motion of that kind. All is measured on the network's 24 vertices, before hair
 is kept out of the body. `echo` is the speed of the tips half a second to two seconds after a stop, in percent of the
-solver's largest after it, `echo error` that of their difference from the solver's. The floor is measured from one
+solver's largest after it, `echo error` that of their difference from the solver's. `mirror` is how far the network's answer is
+from what it answers to the same hair and motion in a mirror, rms, in percent of how far hair is from rest. The floor is measured from one
 history's length on, and the columns after it are the network's in the same frames.
 """
 
@@ -36,6 +37,7 @@ from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import strands_on
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
 from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 
 SEED = 7001
@@ -90,15 +92,19 @@ class Bench:
         """Collision vertices at rest, canonical (V, 3)."""
         return self.character.canonical(self.body.shaped(self.shape))
 
-    def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times) -> np.ndarray:
-        """The network's displacement (T, n, 24, 3)."""
-        key = (id(model), style)
+    def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times, mirror=False) -> np.ndarray:
+        """The network's displacement (T, n, 24, 3); with `mirror`, what it answers to the same in a mirror, put right."""
+        key = (id(model), style, mirror)
         if key not in sessions:
-            sessions[key] = StrandSession(model, self.styles[style])
+            groom = self.styles[style]
+            sessions[key] = StrandSession(model, mirrored_strands(groom) if mirror else groom)
         clip = replace(clip, shape=np.tile(self.shape, (len(clip.times), 1)))
         sampler = model.sampler(self.character, clip)
-        sessions[key].anchor(sampler.held_bind(shape=self.shape))
-        return np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in sampler.vectors(times)])
+        read = np.concatenate([sampler.held_bind(shape=self.shape)[None], sampler.vectors(times)])
+        bind, *vectors = mirrored_vectors(model.spec, read) if mirror else read
+        sessions[key].anchor(bind)
+        moved = np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in vectors])
+        return moved * POLAR if mirror else moved
 
 
 def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarray, rest: np.ndarray) -> list[float]:
@@ -184,6 +190,8 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
             row |= zip(("inside", "inside 3 mm", "inside, worst frame", "inside, worst mm"), depth, strict=True)
             row["solver inside"] = inside(bench, truth, heads, posed, rest)[0]
             still = times >= stop + model.spec.steps * DT
+            seen = bench.predicted(sessions, style, model, clip, times, mirror=True)
+            row["mirror %"] = 100 * np.sqrt(np.square(seen - moved).mean() / max(np.square(moved).mean(), 1e-12))
             row["still jitter mm"] = metrics.jitter(points[still]) if still.sum() > 1 else float("nan")
     if floor and len(times) > 70:
         known = models["network"].spec.steps
