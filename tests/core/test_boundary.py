@@ -9,6 +9,7 @@ from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
+from tests.core.rig.builders import character as with_elbows
 from tests.core.rigs import HEAD, bind, moved, person
 
 SPEC = BoundarySpec(bins=(1,) * 30, taper=0.0)
@@ -35,11 +36,24 @@ def test_constant_speed_is_no_motion():
     assert np.abs(history(sampler.vectors([0.0, 0.5, 1.5]))).max() < 1e-5
 
 
+def turning(rate):
+    """A turn about the world's y axis at so many rad/s."""
+    return lambda t: rotation.from_vector(np.outer(rate * t, [0, 1, 0]))
+
+
 def test_spin_is_read_in_head_axes():
-    turn = np.stack([np.zeros(90), 2.0 * np.arange(90) / 30, np.zeros(90)], axis=-1)
-    clip = moved(np.arange(90) / 30, None, lambda t: rotation.from_vector(turn))
+    """A head that is bent by 0.7 rad about its x axis has the world's y axis at (0, cos 0.7, -sin 0.7)."""
+    clip = moved(np.arange(90) / 30, None, lambda t: turning(2.0)(t) @ rotation.from_vector([0.7, 0, 0]))
     assert history(BoundarySampler(SPEC, person(), clip).vectors([2.0]))[0, 0, 3:6] == pytest.approx(
-        [0, 2, 0], abs=1e-4
+        [0, 2 * np.cos(0.7), -2 * np.sin(0.7)], abs=1e-4
+    )
+
+
+def test_a_turn_beyond_what_was_learned_is_cut_off():
+    """Sampled finely, or it would be taken for a slower turn the other way."""
+    clip = moved(np.arange(0, 2, 1 / 240), None, turning(60.0))
+    assert history(BoundarySampler(SPEC, person(), clip).vectors([1.5]))[0, :, 3:6] == pytest.approx(
+        np.tile([0, BoundarySampler.SPIN_LIMIT, 0], (30, 1)), abs=1e-4
     )
 
 
@@ -110,6 +124,30 @@ def test_the_bind_pose_held_is_the_anchor():
     assert np.array_equal(sampler.vectors([0.0])[0], sampler.held_bind())
 
 
+def test_arms_bound_down_read_as_arms_bound_out():
+    """One held pose of one character, bound in T-pose and with its arms 50 degrees down: an arm's turn is told from T-pose."""
+    t_pose, down, held = with_elbows(), np.radians(50.0), rotation.from_vector([0.3, 0.2, -0.6])
+    bound, posed = [t_pose.skeleton.bind.copy() for _ in range(2)], []
+    lowered = {side: rotation.from_vector([0, 0, -sign * down]) for side, sign in (("left", 1), ("right", -1))}
+    for side, turn in lowered.items():
+        arm, elbow = t_pose.humanoid[f"{side}_upper_arm"], t_pose.humanoid[f"{side}_lower_arm"]
+        bound[1][elbow, :3, 3] = bound[1][arm, :3, 3] + turn @ (bound[1][elbow, :3, 3] - bound[1][arm, :3, 3])
+    for own, back in zip(bound, (False, True)):
+        posed.append(own.copy())
+        for side, turn in lowered.items():
+            posed[-1][t_pose.humanoid[f"{side}_upper_arm"], :3, :3] = held @ turn.T if back else held
+    people = [Character(Skeleton(t_pose.skeleton.names, t_pose.skeleton.parents, own)) for own in bound]
+    read = [BoundarySampler(SPEC, who, Clip([0.0], [pose])).vectors([0.0])[0] for who, pose in zip(people, posed)]
+    assert read[1] == pytest.approx(read[0], abs=1e-6)
+    for who, own, angle in zip(people, bound, (0.0, down)):
+        sampler = BoundarySampler(SPEC, who, Clip([0.0], [own]))
+        assert np.array_equal(sampler.vectors([0.0])[0], sampler.held_bind())
+        left, right = sampler.held_bind()[SPEC.slices["pose"]].reshape(-1, 2, 3)[4:]
+        c, s = np.cos(angle), np.sin(angle)
+        assert left == pytest.approx(np.array([[c, -s, 0], [s, c, 0]]), abs=1e-6)
+        assert right == pytest.approx(np.array([[c, s, 0], [-s, c, 0]]), abs=1e-6)
+
+
 def test_one_time_or_many_give_the_same_bits():
     clip = moved(np.arange(0, 2, 1 / 24), None, swing)
     sampler = BoundarySampler(BoundarySpec(), person(), clip)
@@ -118,12 +156,16 @@ def test_one_time_or_many_give_the_same_bits():
     assert all(np.array_equal(sampler.vectors([t])[0], row) for t, row in zip(times, together))
 
 
-def test_a_loop_has_no_seam():
+@pytest.mark.parametrize("sway", [0.1, 0.0])
+def test_a_loop_has_no_seam(sway):
+    """Also one in which somebody walks: it goes on from where it has come to, and at constant speed nothing is felt."""
     times = np.linspace(0, 2, 49)
-    clip = moved(times, lambda t: np.stack([0.1 * np.sin(np.pi * t), 0 * t, 0 * t], -1), loop=True)
+    clip = moved(times, lambda t: np.stack([1.5 * t + sway * np.sin(np.pi * t), 0 * t, 0 * t], -1), loop=True)
     sampler = BoundarySampler(SPEC, person(), clip)
     assert sampler.vectors([0.05]) == pytest.approx(sampler.vectors([2.05]), abs=1e-5)
     assert np.abs(sampler.vectors([0.0]) - sampler.vectors([2.0])).max() < 1e-5
+    felt = np.abs(history(sampler.vectors([0.05]))).max()
+    assert felt == pytest.approx(sway * np.pi**2 / 9.81, rel=0.02, abs=1e-5)
 
 
 def test_a_teleport_is_bounded():

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The body is measured on its own skin, in its own shape, and read within what a network learned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Body, Character, Skeleton
 from neuralocks_core.measures import AVERAGE, HIGHEST, LOWEST, body_measures
 from tests.core.rigs import HEAD, POSITIONS, moved, person
 
@@ -108,6 +110,24 @@ def test_shapes_of_the_face_do_not_count_and_those_of_the_body_do():
     assert body_measures(character, weights[2])[[0, 2, 3, 9]] == pytest.approx(1.2 * still[[0, 2, 3, 9]])
     both = body_measures(character, weights[0] + weights[2])
     assert np.array_equal(both, body_measures(character, weights[2]))
+
+
+def test_a_body_that_changes_in_time_is_measured_as_it_is_then():
+    """A head that grows a tenth wider while the clip lasts."""
+    head = _ball(POSITIONS[HEAD] + [0, 0.02, 0], [0.085, 0.13, 0.104], HEAD)
+    pieces = head, _ball([0, 1.3, 0], 0.11, SPINE)
+    wider = np.concatenate([points for points, _, _ in pieces]) * [0.1, 0, 0]
+    clip = replace(moved([0.0, 1.0]), shape=[[0.0], [1.0]])
+    read = BoundarySampler(SPEC, _dressed(*pieces, shapes={"wide": wider}), clip).vectors([0.0, 0.5, 1.0])
+    assert read[:, SPEC.slices["shape"]][:, 0] == pytest.approx(0.085 * np.array([1, 1.05, 1.1]), rel=1e-6)
+
+
+def test_arms_behind_the_head_are_so_far_behind_it():
+    skeleton = person().skeleton
+    behind = skeleton.bind.copy()
+    behind[4:, 2, 3] -= 0.03
+    character = Character(Skeleton(skeleton.names, skeleton.parents, behind))
+    assert body_measures(character)[6:9] == pytest.approx([0.2, 0.2, 0.03])
 
 
 def test_a_network_reads_no_more_than_it_learned():

@@ -106,6 +106,12 @@ def test_settling_of_a_decaying_swing():
     assert metrics.jitter(still) == 0
 
 
+def test_what_stops_at_once_has_settled_at_its_last_moving_sample():
+    points = np.zeros((len(TIMES), 1, 24, 3))
+    points[:, 0, :, 0] = np.minimum(TIMES, 0.5)[:, None]
+    assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
+
+
 def test_echo_of_a_decaying_swing():
     """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; nothing that stands echoes."""
     points, _ = swinging(amplitude=0.2, frequency=4, decay=3)

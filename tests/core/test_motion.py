@@ -29,6 +29,14 @@ def test_a_loop_goes_on():
     assert np.allclose(clip.at([0.4]), clip.at([-1.6]))
 
 
+def test_a_joint_that_grows_is_half_grown_halfway():
+    clip = moved([0.0, 1.0], head_turn=lambda t: rotation.from_vector(np.outer(t, [0, 1.0, 0])))
+    grown = clip.joints.copy()
+    grown[1, HEAD, :3, :3] *= 2
+    half = Clip(clip.times, grown).at([0.5])[0, HEAD, :3, :3]
+    np.testing.assert_allclose(half, 1.5 * rotation.from_vector([0, 0.5, 0]), atol=1e-12)
+
+
 def test_mirrored_and_flat_joints_blend_too():
     clip = moved([0.0, 1.0], head_turn=lambda t: rotation.from_vector(np.stack([0 * t, t, 0 * t], axis=-1)))
     odd = clip.joints.copy()

@@ -70,6 +70,33 @@ def test_stepped_animation_has_no_cuts():
     assert not len(find_cuts(Clip(t, joints), who.head))
 
 
+@pytest.mark.parametrize("short", ["before", "after"])
+def test_a_jump_beside_a_shorter_step_is_as_far_as_it_is(short):
+    """0.6 m in 1/24 s are a cut, 0.6 m/s would not be: what is compared are ways over the jump's own step."""
+    who = character()
+    steps = np.full(20, 1 / 24)
+    steps[8 if short == "before" else 10] = 1 / 60
+    joints = np.tile(who.skeleton.bind, (21, 1, 1, 1))
+    joints[10:, who.head, 0, 3] += 0.6
+    times = np.cumsum([0, *steps])
+    assert find_cuts(Clip(times, joints), who.head) == pytest.approx([times[10]])
+
+
+@pytest.mark.parametrize(("apart", "cuts"), [(9, 0), (15, 2)])
+def test_jumps_that_follow_each_other_within_a_fifth_of_a_second_are_none(apart, cuts):
+    who, t, joints = walking(rate=60)
+    joints[30:, who.head, 0, 3] += 1
+    joints[30 + apart :, who.head, 0, 3] += 1
+    assert len(find_cuts(Clip(t, joints), who.head)) == cuts
+
+
+def test_a_metre_between_samples_far_apart_is_no_cut():
+    who = character()
+    joints = np.tile(who.skeleton.bind, (12, 1, 1, 1))
+    joints[6:, who.head, 0, 3] += 1
+    assert not len(find_cuts(Clip(0.2 * np.arange(12), joints), who.head))
+
+
 def cut_clip():
     """A character that is put 5 m aside after a second: who, times, joints before, joints after, clip."""
     who, t, joints = walking(rate=30)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bending and twisting: curvature, transported frames, and what each form gets wrong."""
 
+import math
+
 import pytest
 import torch
 
 from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
 from neuralocks_core.physics.rods import rods
-from neuralocks_core.physics.transport import loop_frames, scan_frames
+from neuralocks_core.physics.transport import conjugate, direct_frames, loop_frames, product, scan_frames
 from tests.core.physics.strands import moved, straight
 
 
@@ -27,18 +29,18 @@ def test_an_arch_bent_from_straight_has_the_energy_of_its_curvature():
 def test_the_two_exact_transports_agree_and_are_orthogonal_to_the_tangent(curls):
     edges = torch.nn.functional.normalize(moved(curls).diff(dim=-2), dim=-1)
     torch.testing.assert_close(scan_frames(edges), loop_frames(edges), atol=1e-14, rtol=0)
+    # A director that stands across the root edge is carried along as one that stands across each edge.
+    director = torch.linalg.cross(edges[:, :1], torch.tensor([0.3, -0.5, 0.8], dtype=torch.float64).expand(4, 1, 3))
+    carried = _turned(scan_frames(edges), director)
+    assert (carried * edges).sum(-1).abs().max() < 1e-13 and carried.norm(dim=-1).min() > 0.1
     strain = bend_difference(moved(curls), curls, Cosserat.SCAN)
     torch.testing.assert_close(strain, bend_difference(moved(curls), curls, Cosserat.LOOP), atol=1e-13, rtol=0)
 
 
 def test_transported_frames_turn_the_root_edge_into_each_edge(curls):
-    from neuralocks_core.physics.transport import conjugate, direct_frames, product
-
     edges = torch.nn.functional.normalize(curls.diff(dim=-2), dim=-1)
-    root = torch.nn.functional.pad(edges[..., :1, :].expand_as(edges), (1, 0))
     for frames in (scan_frames(edges), direct_frames(edges)):
-        turned = product(product(frames, root), conjugate(frames))[..., 1:]
-        torch.testing.assert_close(turned, edges, atol=1e-12, rtol=0)
+        torch.testing.assert_close(_turned(frames, edges[..., :1, :]), edges, atol=1e-12, rtol=0)
 
 
 def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
@@ -89,6 +91,24 @@ def test_folding_back_is_finite_in_value_and_gradient():
         x = back.clone().requires_grad_()
         bend_twist(x, rods(straight(6, 0.05).float()), form=form).sum().backward()
         assert x.grad.isfinite().all()
+
+
+def test_straight_transport_through_more_than_half_a_turn_in_a_plane_is_exact():
+    """In a plane there is no twist to invent; past half a turn its quaternions come on the other side of the double cover."""
+    count = torch.arange(24, dtype=torch.float64)
+    x, rest = (
+        0.01 / step * torch.stack([torch.cos(step * count), torch.sin(step * count), 0 * count], -1)[None]
+        for step in (0.5, 0.4)
+    )
+    exact, direct = (bend_difference(x, rest, form).norm(dim=-1) for form in (Cosserat.EXACT, Cosserat.DIRECT))
+    torch.testing.assert_close(direct, exact)
+    torch.testing.assert_close(exact, torch.full_like(exact, math.sin(0.25) - math.sin(0.2)))
+
+
+def _turned(frames, vectors):
+    """Vectors (..., 3) turned by quaternions (..., 4) of unit length."""
+    pure = torch.nn.functional.pad(vectors.expand(*frames.shape[:-1], 3), (1, 0))
+    return product(product(frames, pure), conjugate(frames))[..., 1:]
 
 
 def _bent_behind():

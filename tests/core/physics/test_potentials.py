@@ -168,6 +168,8 @@ def test_the_style_fades_with_the_distance_to_the_body():
     r = rods(rest)
     expected = (r.mass[0] * (1 - (far[0] / 0.03).clamp_max(1)) * 7.0 * 3e-4).sum()
     assert hair_style(x, r, far, 7.0).item() == pytest.approx(expected.item())
+    at_skin = hair_style(x, r, torch.zeros_like(far), 7.0)
+    assert hair_style(x, r, torch.full_like(far, -0.002), 7.0) == at_skin, "deeper is not held more"
 
 
 def test_each_frame_of_a_batch_may_have_neighbours_of_its_own(curls):

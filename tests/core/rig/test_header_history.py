@@ -72,6 +72,25 @@ def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, opti
         assert np.abs(felt[200:]).max() < 1e-5, damaged
 
 
+def test_the_header_passes_on_no_more_of_a_teleport_and_of_a_spin_than_the_bake(tmp_path):
+    """0.2 m from one frame to the next are 18 g, of which 6 are felt; of 60 rad/s 25 are."""
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    who, t = character(), np.arange(90) / 30
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, 0, 3] += np.where(t > 1, 0.2, 0.0)
+    joints[:, who.head, :3, :3] = from_vector(np.outer(60.0 * np.clip(t - 1.5, 0, 0.2), [0, 1, 0]))
+    wanted = RigSampler(model.spec, who, Clip(t, joints)).features(t)[:, 15:]
+    quaternions = to_quaternion(joints[:, who.head, :3, :3])
+    rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
+    ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, wanted.shape[1])
+    felt, asked = (values.reshape(len(t), -1, 2, 3) for values in (ours, wanted))
+    assert np.abs(asked).max(axis=(0, 1, 3)) == pytest.approx([6, 25], rel=1e-4)
+    np.testing.assert_allclose(felt[:, :, 1], asked[:, :, 1], atol=0.01)
+    # The header's accelerations lie between its frames: half of each is in the step before.
+    np.testing.assert_allclose(felt[:, 0, 0], (asked[:, 0, 0] + asked[:, 1, 0]) / 2, atol=0.01)
+
+
 def test_a_report_gives_the_size_that_the_compiler_finds(tmp_path):
     export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
     program = """#include "hair.h"
