@@ -29,7 +29,6 @@ def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
     points = np.asarray(points, float)
     edges = np.linalg.norm(np.diff(points, axis=-2), axis=-1)
     ends = np.cumsum(counts)
-    edges[..., ends[:-1][(ends[:-1] > 0) & (ends[:-1] < points.shape[-2])] - 1] = 0.0
     total = np.concatenate([np.zeros((*edges.shape[:-1], 1)), np.cumsum(edges, axis=-1)], axis=-1)
     last = np.clip(ends - 1, 0, None)
     return np.where(np.asarray(counts) > 1, total[..., last] - total[..., np.clip(ends - counts, 0, last)], 0.0)

@@ -18,6 +18,12 @@ def test_quaternions_and_vectors_agree_with_matrices():
     assert np.allclose(turned, b / np.linalg.norm(b, axis=1, keepdims=True))
 
 
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_opposite_directions_are_half_a_turn_apart(axis):
+    """About any axis across; the cross product with a fixed one vanishes for some."""
+    np.testing.assert_allclose(rotation.between(axis, -axis) @ axis, -axis, atol=1e-12)
+
+
 def test_products_of_quaternions_of_any_length_turn_by_b_and_then_a():
     a, b = np.random.default_rng(0).normal(size=(2, 5, 3, 4))
     product = rotation.quaternion_product(a, b)

@@ -146,10 +146,8 @@ def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called
 
 def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
     path = edited(tmp_path, renamed, Recipe(bound="none"))
-    try:
+    with pytest.raises(NeuralocksError, match="--head"):
         bake(path, tmp_path / "out.usdc", model)
-    except NeuralocksError as error:
-        assert "--head" in str(error)
     assert bake(path, tmp_path / "out.usdc", model, head="bone3").grooms[0]["joint"].endswith("bone3")
 
 
@@ -160,6 +158,8 @@ WRONG = {
     "skeleton": ({"skeleton": "/Nope"}, "/Nope: no such skeleton"),
     "head": ({"head": "nose"}, "nose"),
     "frames": ({"frames": "5:1"}, "5:1"),
+    "no step": ({"frames": "1:5:0"}, "1:5:0: the range is empty"),
+    "a step back": ({"frames": "1:5:-1"}, "1:5:-1: the range is empty"),
     "words as frames": ({"frames": "a:b"}, "a:b"),
     "endless frames": ({"frames": "0:1e12"}, "samples"),
     "more frames than numbers": ({"frames": "0:1e300:1e-300"}, "samples"),

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.materials import RANGES, Material
@@ -38,6 +39,12 @@ def test_a_lock_is_what_ties_join(locks):
     np.testing.assert_allclose(
         np.square(locks.tie), EACH / (EACH - 1), rtol=1e-4
     )  # from the mean of the others, not of all
+
+
+def test_a_hair_is_as_stiff_as_a_rod_that_is_held_at_one_end(locks):
+    """Its lowest mode is at the first root of cos x cosh x = -1, and x^4 B / L^4 is its stiffness per mass."""
+    root = brentq(lambda x: np.cos(x) * np.cosh(x) + 1, 1, 3)
+    np.testing.assert_allclose(locks.rod[::EACH], root**4 / LENGTHS**4, rtol=1e-3)
 
 
 def test_a_hair_that_nothing_ties_goes_its_own_way(locks):

@@ -110,6 +110,21 @@ def test_spring_bones_rest_and_depend_on_the_frame_rate():
     assert np.abs(ends[0] - ends[1]).max() > 1e-3
 
 
+def test_a_spring_bone_goes_on_as_its_specification_says():
+    """A bone that stands out backward and is pulled down: both frames by hand."""
+    who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.6, -0.3))])
+    step, drag, stiffness, gravity = 0.1, 0.4, 1.0, 0.5
+    pull = np.array([0, 0, -1.0]) * stiffness * step + np.array([0, -1.0, 0]) * gravity * step
+    tails = [np.array([0, 0, -0.3])] * 2
+    for _ in range(2):
+        free = tails[-1] + (tails[-1] - tails[-2]) * (1 - drag) + pull
+        tails.append(0.3 * free / np.linalg.norm(free))
+    heads = np.tile(np.eye(4), (1, 2, 1, 1))
+    turns = spring_bones(find_chains(who), heads, step, SpringSettings(stiffness, drag, gravity))
+    found = from_quaternion(turns[0, :, 0]) @ [0, 0, -0.3]
+    assert found == pytest.approx(np.array(tails[2:]), abs=1e-6)
+
+
 def with_balls() -> tuple[HairRig, float]:
     """A body of two balls, around the head and in the chest, and a hanging chain; and their radius."""
     rig = branched()
