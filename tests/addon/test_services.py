@@ -1,29 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's services, without Blender."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import trimesh
 from pxr import Sdf
 
-from dcc_addon.services import axes, bones, card, names, panel_errors, rig, widths
+from dcc_addon.services import axes, bones, card, names, panel_errors, rig
 from dcc_addon.services.history import SampledBoundary
-from dcc_addon.services.live import LiveHair
 from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
-from neuralocks_core.groom import Groom
-from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector, transformed
-from neuralocks_core.runtime import StrandModel
-from tests.core.rig.builders import character as with_elbows
 from tests.core.rigs import moved, person
 
 BONES = ("hips", "spine", "neck", "head", "upper_arm.L", "upper_arm.R")
@@ -180,43 +172,6 @@ def test_a_mirrored_body_is_turned_right_side_out(side):
     points, triangles, _ = rig.skin(body, np.diag([side, 1, 1, 1]))
     a, b, c = np.moveaxis(points[triangles].astype(float), 1, 0)
     assert np.einsum("fi,fi->", a, np.cross(b, c)) / 6 == pytest.approx(2 * ball.volume, rel=1e-5)
-
-
-@pytest.mark.parametrize(("shape", "power"), [(0.0, 1.0), (0.5, 2.0), (-0.5, 0.5)])
-def test_strands_thin_out_as_cycles_draws_them(shape, power):
-    """Blender: (1 - t) ^ (1 / (1 - shape)), below 0 ^ (1 + shape), from the tip's radius to the root's."""
-    t = np.linspace(0, 1, 5)
-    hair = Groom("hair", np.outer(t, [0, 0, 0.2]), np.array([5]), None)
-    assert widths.radii(hair, 3.0, 1.0, shape, pointed=False) == pytest.approx(1 + 2 * (1 - t) ** power, rel=1e-6)
-    assert widths.radii(hair, 3.0, 1.0, shape, pointed=True)[-1] == 0
-
-
-def test_a_bone_scaled_to_nothing_has_no_turn_of_its_own():
-    own = np.stack([np.zeros((3, 3)), 2 * from_vector([0, 0, 0.5])])[None]
-    turns = bones.own_turns(own, SimpleNamespace(row=lambda frame: 0), np.array([0, 1]), np.array([1]))
-    assert turns[0] == pytest.approx(np.array([[1, 0, 0, 0], [np.cos(0.25), 0, 0, np.sin(0.25)]]), abs=1e-6)
-
-
-def test_live_hair_leaves_an_arm_that_the_network_does_not_read():
-    """One time and one answer of the network, a forearm beside the hair or in it."""
-    who, ball = with_elbows(), trimesh.creation.icosphere(3, 0.1)
-    leaves = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
-    arm = leaves.index("left_lower_arm")
-    head, hand = ball.vertices + [0, 1.68, 0], ball.vertices + who.skeleton.bind[arm, :3, 3]
-    joints = np.repeat([who.head, arm], len(ball.vertices))[:, None]
-    faces = np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
-    who = replace(who, body=Body(np.concatenate([head, hand]), faces, joints, np.ones(joints.shape)))
-    root = np.array([0.102, 1.68, 0])
-    hair = Groom(
-        "hair", (root + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])).astype(np.float32), np.array([24]), None
-    )
-    poses = np.tile(who.skeleton.bind, (2, 1, 1, 1))
-    poses[1, arm, :3, 3] = root + [0.1, -0.2, 0]
-    live = LiveHair(hair, who, StrandModel.load())
-    live.follow(Clip([0.0, 1.0], poses))
-    for resolve in (False, True):
-        beside, within = (live.points(0.0, pose, np.eye(4), resolve=resolve).copy() for pose in poses)
-        assert (np.abs(within - beside).max() > 0.01) == resolve
 
 
 def test_a_motion_in_parts_is_the_whole():

@@ -3,6 +3,7 @@
 
 import shutil
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -86,7 +87,9 @@ def drawn_alike(folder: Path) -> None:
     are no points, are refused.
     """
     if "set_types" not in bpy.types.Curves.bl_rna.functions:
-        kinds = ["CATMULL_ROM"] if "add_curves" in bpy.types.Curves.bl_rna.functions else []
+        if "add_curves" not in bpy.types.Curves.bl_rna.functions:
+            raise SkipTest("scripts make no curves in this Blender")
+        kinds = ["CATMULL_ROM"]
     else:
         kinds = ["CATMULL_ROM", "POLY", "NURBS", "BEZIER"]
     scene = bpy.context.scene

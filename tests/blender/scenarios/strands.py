@@ -2,6 +2,7 @@
 """Where strands come from and what they hang on."""
 
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -221,7 +222,7 @@ def new_hair(folder: Path) -> None:
     skin.data.uv_layers.new(name="UVMap")
     bpy.context.view_layer.objects.active = skin
     if bpy.app.version < (4, 0):
-        return
+        raise SkipTest("older ones add hair without a modifier of its own")
     assert bpy.ops.object.curves_empty_hair_add() == {"FINISHED"}
     strands = bpy.context.active_object
     strands.name = "Strands"

@@ -7,6 +7,11 @@ import pytest
 from neuralocks_core.animation.random_motion import KINDS, random_clip, scripted_clip
 from tests.core.rigs import HEAD, person
 
+TURNS = {"shake": 12, "turn": 12, "nod": 12, "bow": 30, "tilt": 12, "hold": 12}
+"""By how much the head turns at least [degrees],"""
+TRAVELS = {"sway": 0.05, "translate": 0.25, "jump": 0.25, "walk": 0.25, "fall_and_stop": 0.25}
+"""and how far it goes [m]."""
+
 
 def acceleration(clip):
     head = clip.joints[:, HEAD, :3, 3]
@@ -34,10 +39,11 @@ def test_scripted_clips_do_what_they_say_and_end_still(kind):
     head = clip.joints[:, HEAD]
     travel = np.ptp(head[:, :3, 3], axis=0)
     turned = np.degrees(np.arccos(np.clip((np.trace(head[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))).max()
-    if kind in ("shake", "turn", "nod", "tilt", "hold"):
-        assert turned > 12
-    if kind in ("translate", "jump", "walk", "fall_and_stop"):
-        assert travel.max() > 0.25
+    assert kind in TURNS | TRAVELS
+    if kind in TURNS:
+        assert turned > TURNS[kind]
+    if kind in TRAVELS:
+        assert travel.max() > TRAVELS[kind]
     if kind in ("fall_and_stop", "hold"):
         assert acceleration(clip)[-15:].max() < 1e-6
 

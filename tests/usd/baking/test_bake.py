@@ -214,7 +214,7 @@ def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_s
     assert any("hero.usda" in note and "SEARCH_PATH" in note for note in notes["cache"])
 
 
-def test_other_values_than_a_cores_own_are_refused(tmp_path, model):
+def test_a_bake_over_its_own_shot_is_refused(tmp_path, model):
     shot = write_shot(tmp_path)
     with pytest.raises(NeuralocksError, match="part of the shot"):
         bake(shot, shot, model)

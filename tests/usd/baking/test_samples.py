@@ -76,7 +76,8 @@ def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model)
         with pytest.raises(KeyboardInterrupt):
             bake(shot, out, model, progress=stop)
         assert not out.exists()
-        assert abs(bake(shot, out, again).resumed - taken) <= 1
+        resumed = bake(shot, out, again).resumed
+        assert abs(resumed - taken) <= 1 if taken else resumed == 0
         out.unlink()
 
 
