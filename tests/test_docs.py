@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the documents name exists: linked files, files and modules of the tree, what modules define, options."""
+"""What the documents name exists: linked files and headings, files and modules of the tree, what modules define, arguments,
+options.
+"""
 
 import ast
 import re
@@ -60,6 +62,45 @@ def test_what_is_named_exists(document):
     assert not missing
 
 
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_headings_that_are_linked_are_there(document):
+    """As GitHub makes anchors of them: in small letters, spaces as hyphens, without other signs."""
+    for file, anchor in re.findall(r"\]\(([^)#:\s]*)#([^)\s]+)\)", (ROOT / document).read_text("utf-8")):
+        there = ((ROOT / document).parent / file if file else ROOT / document).read_text("utf-8")
+        headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", there, flags=re.M | re.S), re.M)
+        assert anchor in {re.sub(r"[^\w\- ]", "", each.lower()).replace(" ", "-") for each in headings}, (file, anchor)
+
+
+@cache
+def arguments() -> dict[str, set[str]]:
+    """What functions, classes and `Class.method`s can be given by name; those of one name count as one."""
+    found: dict[str, set[str]] = {}
+
+    def add(name, node):
+        taken = {each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
+        found.setdefault(name, set()).update(taken)
+
+    for path in (path for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                add(node.name, node)
+            elif isinstance(node, ast.ClassDef):
+                fields = {each.target.id for each in node.body if isinstance(each, ast.AnnAssign)}
+                found.setdefault(node.name, set()).update(fields)
+                for method in (each for each in node.body if isinstance(each, ast.FunctionDef)):
+                    add(node.name if method.name == "__init__" else f"{node.name}.{method.name}", method)
+    return found
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_arguments_that_are_named_can_be_given(document):
+    for code in re.findall(r"`([^`\n]+)`", (ROOT / document).read_text("utf-8")):
+        for name, given in re.findall(r"([A-Za-z_][\w.]*)\(([^()]*\w=[^()]*)\)", code):
+            # What stands before a dot may be a class or a module.
+            known = arguments().get(name) or arguments().get("" if name[0].isupper() else name.split(".")[-1], set())
+            assert set(re.findall(r"(\w+)=", given)) <= known, code
+
+
 def test_the_map_names_modules_that_are_there():
     """`docs/architecture.md`, Where things are: whatever is in a table's code stands for a module or a folder."""
     map_ = (ROOT / "docs/architecture.md").read_text("utf-8").split("## Where things are")[1].split("\n## ")[0]
@@ -115,13 +156,19 @@ def imported(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_commands_have_the_options_that_are_written(document):
-    """Of lines that begin with `neuralocks`; what its commands take stands in the sources of the command line."""
+    """Of lines that begin with `neuralocks` and one of its commands."""
+    typer = pytest.importorskip("typer")
+    from usd.cli.app import app
+
     text = (ROOT / document).read_text("utf-8")
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "usd").rglob("*.py"))
-    taken = {f"--{name.replace('_', '-')}" for name in re.findall(r"^    (\w+): ", sources, re.M)}
-    taken |= set(re.findall(r"--[a-z][a-z-]+", sources))
     for line in re.findall(r"neuralocks (?:rig )?[a-z]+[^#`\n]*", text):
-        assert set(re.findall(r"(?<!\w)--[a-z][a-z-]+", line)) <= taken, line
+        if not (written := set(re.findall(r"(?<!\w)--[a-z][a-z-]+", line))):
+            continue
+        command = typer.main.get_command(app)
+        for word in line.split()[1:]:
+            command = getattr(command, "commands", {}).get(word, command)
+        options = {option for each in command.params for option in (*each.opts, *each.secondary_opts)}
+        assert written <= options | {"--help"}, line
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
