@@ -6,7 +6,8 @@
 The groom is grown on the shipped character. Bakes and posing alone take turns, as the speed of a machine changes
 while they run. Memory is the peak of the bake's own process above what it held once the shot was read; the number of
 frames is doubled at last to see whether it grows. Run it on an idle machine; on a busy one only the CPU times and the
-memory say something.
+memory say something. What is baked, some gigabytes, lies meanwhile in the folder that the environment variable
+NEURALOCKS_SCRATCH names, or else where the system keeps temporary files.
 """
 
 import argparse

@@ -23,6 +23,7 @@ import argparse
 import json
 from collections import defaultdict
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from real_grooms import on_head
@@ -43,12 +44,13 @@ from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
 SEED = 7001
 STRANDS = 120
 DT = 1 / 30
+CHARACTER = Path(__file__).resolve().parents[1] / "examples/shot/body.usdc"
 
 
 class Bench:
     """One character with hairstyles that no model has seen."""
 
-    def __init__(self, character_path: str, styles: list[str] | None, grooms: list[str], shape: int | None):
+    def __init__(self, character_path: str | Path, styles: list[str] | None, grooms: list[str], shape: int | None):
         from neuralocks_core.hairstyles import STYLES
         from usd.models.training_scene import training_scene
 
@@ -128,7 +130,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", help="the shipped one if left out")
     parser.add_argument("--static", help="a model trained without history, with the same budget")
-    parser.add_argument("--character", default="examples/shot/body.usdc")
+    parser.add_argument("--character", default=CHARACTER, help="examples/shot/body.usdc if left out")
     parser.add_argument("--style", action="append")
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--motion", action="append", default=[], help="BVH or USD clips in place of the scripted ones")
