@@ -112,6 +112,14 @@ def strand_points(strands: int, vertices: int) -> np.ndarray:
     return points + 0.004 * np.sin(9 * s + rng.uniform(0, 6, (strands, 1, 3))) * s
 
 
+def add_curves(stage, path: str, points: np.ndarray) -> None:
+    """Straight curves (n, 2, 3) [m], of two points each, without a binding."""
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr("linear")
+    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    curves.CreateCurveVertexCountsAttr([2] * len(points))
+
+
 def _matrix(to_stage: np.ndarray, position: np.ndarray) -> np.ndarray:
     """A joint's stage-space transform: a plain rotation into stage axes, and its place."""
     matrix = np.eye(4)

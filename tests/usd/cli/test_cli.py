@@ -10,23 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from neuralocks_core import model as model_file
 from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
-from usd.cli.app import main
 from usd.review.inspect import inspect
 
+from ..commands import status
 from ..shots import Recipe, write_shot
 
 ROOT = Path(__file__).parents[3]
 GROOMS = ROOT.parent / "shared" / "data" / "grooms"
-
-
-def status(*words) -> int:
-    """Exit status of a command line."""
-    with pytest.raises(SystemExit) as caught:
-        main([str(word) for word in words])
-    return int(caught.value.code or 0)
 
 
 def test_bake_is_the_python_function(tmp_path, model, capsys):
@@ -154,66 +146,6 @@ def test_wrong_usage_is_status_two(capsys):
     assert status("bake") == 2
     assert status("bake", "a.usd", "-o", "b.usdc", "--jobs", "many") == 2
     assert status("unknown") == 2
-
-
-def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
-    shot, written, write = write_shot(tmp_path), [], Path.write_bytes
-
-    def full(self, data):
-        if len(written) == 2:
-            raise OSError(28, "No space left on device")
-        written.append(self)
-        return write(self, data)
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    assert status("export", model, "-o", tmp_path / "onnx", "--shot", shot) == 1
-    assert "no space left" in capsys.readouterr().err
-    assert len(written) == 2 and list(tmp_path.iterdir()) == [shot]
-
-
-def test_export_unpacks_plain_onnx(tmp_path, model, capsys):
-    import onnxruntime
-
-    assert status("export", model, "-o", tmp_path / "onnx") == 0
-    description = json.loads((tmp_path / "onnx" / "description.json").read_text())
-    for name, graph in description["graphs"].items():
-        session = onnxruntime.InferenceSession(tmp_path / "onnx" / name, providers=["CPUExecutionProvider"])
-        assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
-    assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
-    capsys.readouterr()
-
-
-def test_what_is_exported_without_a_name_is_the_shipped_model(tmp_path, capsys):
-    assert status("export", "-o", tmp_path) == 0
-    assert len(capsys.readouterr().out.split()) == 5
-    description = (tmp_path / "description.json").read_text()
-    assert len(description) < 20_000 and "curve" not in json.loads(description)["model"]["training"]
-    assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model_file.shipped()).graphs["tail.onnx"]
-    assert status("export", "-o", tmp_path, "--groom", "/Hair") == 1 and "--shot" in capsys.readouterr().err
-
-
-def test_a_model_is_unpacked_with_its_description(tmp_path, capsys):
-    assert status("export", "-o", tmp_path) == 0
-    assert {"tail.onnx", "description.json"} <= {Path(line).name for line in capsys.readouterr().out.split()}
-    assert status("export", "-o", tmp_path) == 0, "its own files are replaced"
-
-
-def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
-    for text in ('{"units": 1}', "notes"):
-        (tmp_path / "description.json").write_text(text)
-        assert status("export", "-o", tmp_path) == 1
-        assert "description.json: is of something else" in capsys.readouterr().err
-        assert [path.name for path in tmp_path.iterdir()] == ["description.json"]
-        assert (tmp_path / "description.json").read_text() == text
-
-
-def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
-    file = model_file.read(model)
-    bad = model_file.write(tmp_path / "bad.neuralocks", file.meta, file.graphs | {"tail.onnx": b"nonsense"})
-    for words in (("export", bad, "-o", tmp_path / "onnx"), ("inspect", bad)):
-        assert status(*words) == 1
-        error = capsys.readouterr().err
-        assert error.count("\n") == 1 and "bad.neuralocks: tail.onnx cannot be loaded" in error
 
 
 def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):

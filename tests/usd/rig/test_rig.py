@@ -14,9 +14,8 @@ from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
 from usd.review.evaluate import evaluate
-from usd.review.inspect import as_text, inspect
 from usd.rig.bake import bake_rig
-from usd.rig.stage import BAKED, describe_chains, read_rigged_hair, weight_notes
+from usd.rig.stage import BAKED, describe_chains, read_rigged_hair
 from usd.shot.stage import read_shot
 
 from ...blenders import installed
@@ -145,18 +144,6 @@ def test_hair_starts_anew_after_a_cut(tmp_path):
             bake_rig(shot, tmp_path / "bad.usda", model, **options)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"), [({"bind": False}, "no bindTransforms"), ({"head_moves": False}, "is not animated")]
-)
-def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
-    """And nothing is written."""
-    model = model_for(read_rigged_hair(small_shot(tmp_path / "good.usda")))
-    shot = small_shot(tmp_path / "bad.usda", **options)
-    with pytest.raises(NeuralocksError, match=words):
-        bake_rig(shot, tmp_path / "out.usda", model)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
-
-
 def test_a_full_disk_is_not_a_damaged_shot(tmp_path):
     resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
     shot = small_shot(tmp_path / "shot.usda")
@@ -172,146 +159,12 @@ def test_a_full_disk_is_not_a_damaged_shot(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["shot.usda"]
 
 
-@pytest.mark.parametrize("first", [float("nan"), float("-inf"), 99.0])
-def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, first):
-    shot = small_shot(tmp_path / "shot.usda")
-    stage = Usd.Stage.Open(str(shot))
-    model = model_for(read_rigged_hair(shot))
-    stage.SetStartTimeCode(first)
-    stage.SetEndTimeCode(24)
-    stage.GetRootLayer().Save()
-    out = bake_rig(shot=shot, out=tmp_path / "out.usda", model=model)
-    assert out.samples == len(read_rigged_hair(shot).source.time_codes)
-
-
-def test_a_held_head_is_that_of_a_held_pose(tmp_path):
-    """Reading, or in a still: the hair hangs from the bent head as it does in a shot that passes through the pose."""
-    moving = small_shot(tmp_path / "moving.usda")
-    model = model_for(read_rigged_hair(moving))
-    stage = Usd.Stage.Open(str(small_shot(tmp_path / "held.usda")))
-    rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
-    bent = rotations.Get(5)
-    rotations.Clear()
-    rotations.Set(bent, 1)
-    stage.Save()
-    bake_rig(moving, tmp_path / "moving_hair.usda", model)
-    result = bake_rig(tmp_path / "held.usda", tmp_path / "held_hair.usda", model, frames="1:3")
-    assert any("held pose" in note for note in result.notes)
-    there = hair_turns(tmp_path / "moving_hair.usda", [5])
-    assert np.abs(there[..., 1:]).max() > 0.01
-    for code in (1, 3):
-        assert np.abs(hair_turns(result.path, [code]) - there).max() < 1e-6
-
-
-def test_joints_elsewhere_may_have_the_names_of_hair_joints(tmp_path):
-    """A tail's are no hair's: rigs name every chain hair_0, joint1."""
-    plain = small_shot(tmp_path / "plain.usda")
-    model = model_for(read_rigged_hair(plain))
-    text = small_shot(tmp_path / "tailed.usda").read_text()
-    stage = Usd.Stage.Open(str(tmp_path / "tailed.usda"))
-    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig"))
-    extra = ["hips/hair_0", "hips/hair_0/hair_1"]
-    skeleton.GetJointsAttr().Set([*skeleton.GetJointsAttr().Get(), *extra])
-    for attribute in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()):
-        matrices = list(attribute.Get())
-        attribute.Set(Vt.Matrix4dArray([*matrices, *[Gf.Matrix4d().SetTranslate((0, 0.9, -0.1))] * 2]))
-    stage.Save()
-    assert (tmp_path / "tailed.usda").read_text() != text
-    for name in ("plain", "tailed"):
-        bake_rig(tmp_path / f"{name}.usda", tmp_path / f"{name}_hair.usda", model)
-    turns = [hair_turns(tmp_path / f"{name}_hair.usda", range(1, 26)) for name in ("plain", "tailed")]
-    assert np.array_equal(*turns)
-
-
-def test_a_body_that_nothing_animates_stays_where_it_rests(tmp_path):
-    """Where a parent moves the character, the bake's animation lists hair joints alone: rest scales have more digits than
-    an animation's.
-    """
-    shot = small_shot(tmp_path / "shot.usda")
-    stage = Usd.Stage.Open(str(shot))
-    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig"))
-    UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel().ClearTargets(True)
-    rest = list(skeleton.GetRestTransformsAttr().Get())
-    rest[0] = Gf.Matrix4d().SetScale(0.01) * rest[0]
-    rest[1] = rest[1] * Gf.Matrix4d().SetScale(100)
-    skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray(rest))
-    turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Who")).AddRotateXOp()
-    for frame in range(1, 26):
-        turn.Set(30 * float(np.sin(frame / 4)), frame)
-    stage.Save()
-    result = bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))
-    baked = Usd.Stage.Open(str(result.path))
-    animation = UsdSkel.Animation(baked.GetPrimAtPath(result.animation))
-    assert [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()] == ["hair_0", "hair_1", "hair_2"]
-
-
 def test_commands_for_strands_say_what_is_for_joints(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     baked = bake_rig(shot, tmp_path / "rig.usda", model_for(read_rigged_hair(shot), dynamic=True))
     for use in (read_shot, evaluate):
         with pytest.raises(NeuralocksError, match="hair that is joints of /Who/.* is moved by 'neuralocks rig bake'"):
             use(baked.path)
-
-
-def test_hair_with_a_skeleton_of_its_own_is_told_what_it_needs(tmp_path):
-    """Not that the body's skeleton, which comes first, has no hair; with the joint named it is read."""
-    stage = Usd.Stage.Open(str(small_shot(tmp_path / "shot.usda")))
-    Sdf.CopySpec(stage.GetRootLayer(), "/Who/Rig", stage.GetRootLayer(), "/Who/Wig")
-    body, wig = (UsdSkel.Skeleton(stage.GetPrimAtPath(f"/Who/{name}")) for name in ("Rig", "Wig"))
-    for skeleton, old, new in ((body, "hair", "tie"), (wig, "head", "top")):
-        skeleton.GetJointsAttr().Set([joint.replace(old, new) for joint in skeleton.GetJointsAttr().Get()])
-    stage.GetPrimAtPath("/Who/Motion").GetAttribute("joints").Set(wig.GetJointsAttr().Get())
-    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetSkeletonRel().SetTargets(["/Who/Wig"])
-    stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="^/Who/Wig: no joint is named like a head; name it with --head JOINT"):
-        read_rigged_hair(tmp_path / "shot.usda")
-    assert "note: /Who/Wig: no joint is named like a head" in as_text(inspect(tmp_path / "shot.usda"))
-    assert len(read_rigged_hair(tmp_path / "shot.usda", head="top").rig.chains) == 3
-
-
-def test_an_animation_that_usd_ignores_is_named_as_such(tmp_path):
-    """With rotations alone UsdSkel shows the rest pose: it is not that nobody animated the head."""
-    model = model_for(read_rigged_hair(small_shot(tmp_path / "shot.usda")))
-    stage = Usd.Stage.Open(str(tmp_path / "shot.usda"))
-    stage.GetPrimAtPath("/Who/Motion").RemoveProperty("scales")
-    stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="/Who/Motion: no scales, .*author all three channels"):
-        bake_rig(tmp_path / "shot.usda", tmp_path / "out.usda", model)
-
-
-def test_an_animation_that_is_switched_off_is_not_played(tmp_path):
-    """USD shows the rest pose of a skeleton whose animation prim is inactive."""
-    model = model_for(read_rigged_hair(small_shot(tmp_path / "shot.usda")))
-    stage = Usd.Stage.Open(str(tmp_path / "shot.usda"))
-    stage.GetPrimAtPath("/Who/Motion").SetActive(False)
-    stage.GetRootLayer().Save()
-    query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")))
-    assert not query.GetAnimQuery()
-    with pytest.raises(NeuralocksError, match="/Who/Motion: is inactive, so UsdSkel ignores it; activate it"):
-        bake_rig(tmp_path / "shot.usda", tmp_path / "out.usda", model)
-
-
-def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
-    """They are read as if they did."""
-    hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.5))
-    assert "do not sum to one" in weight_notes(hair.source)[0]
-    assert hair.rig.weights.sum(axis=1) == pytest.approx(1)
-
-
-def test_vertices_without_weights_are_told_as_such(tmp_path):
-    hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.0))
-    (note,) = weight_notes(hair.source)
-    assert "have no weights; read as if they were bound to the first joint" in note
-
-
-def test_a_range_that_the_animation_does_not_reach_is_told(tmp_path):
-    shot = small_shot(tmp_path / "shot.usda")
-    model = model_for(read_rigged_hair(shot))
-    assert any(
-        "none of it within 5000 to 5003" in n
-        for n in bake_rig(shot, tmp_path / "a.usda", model, frames="5000:5003").notes
-    )
-    assert not any("none of it" in note for note in bake_rig(shot, tmp_path / "b.usda", model).notes)
 
 
 def test_the_example_and_its_command_line(tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which curves are hair, and which skeleton and joint carries them."""
+"""Which skeleton and joint carries a groom, and what is odd about the way it lies there."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
-from ..shots import HEAD, Recipe, strand_points, write_shot
+from ..shots import HEAD, Recipe, add_curves, strand_points, write_shot
 
 
 @pytest.mark.parametrize(
@@ -174,72 +174,10 @@ def test_hair_at_the_origin_is_not_another_characters(tmp_path, bound, places):
         assert pairs == [(name, name) for name in ("/A", "/B") if chosen is None or chosen.startswith(name)]
 
 
-def _curves(stage, path, points):
-    """Curves (n, 2, 3) [m] without a binding."""
-    curves = UsdGeom.BasisCurves.Define(stage, path)
-    curves.CreateTypeAttr("linear")
-    curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
-    curves.CreateCurveVertexCountsAttr([2] * len(points))
-
-
-def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
-    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
-    roots = np.random.default_rng(0).uniform(-4, 4, (50, 1, 3)) * [1, 0, 1] + [6, 0, 0]
-    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
-    stage.GetRootLayer().Save()
-    path = stage.GetRootLayer().realPath
-    shot = read_shot(path)
-    assert [item.path for item in shot.grooms] == ["/Hero/Hair"]
-    assert sum("/Set/Grass" in note and "--groom" in note for note in shot.notes) == 1
-    facts = inspect(path)
-    assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
-    assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
-    assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
-    for number in range(30):
-        Sdf.CopySpec(stage.GetRootLayer(), "/Set/Grass", stage.GetRootLayer(), f"/Set/Grass{number}")
-    stage.GetRootLayer().Save()
-    assert len([note for note in read_shot(path).notes if "Grass" in note or "28 more" in note]) == 4
-    stage.RemovePrim("/Set")
-    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Set")
-    _curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
-    stage.RemovePrim("/Hero/Hair")
-    stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
-        read_shot(path)
-    assert len(inspect(path)["stops"]) == 1
-
-
-def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
-    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
-    UsdGeom.BasisCurves.Define(stage, "/Hero/Empty")
-    stage.GetRootLayer().Save()
-    path = stage.GetRootLayer().realPath
-    shot, facts = read_shot(path), inspect(path)
-    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] == [groom["path"] for groom in facts["grooms"]]
-    assert any("/Hero/Empty" in note for note in shot.notes) and any("/Hero/Empty" in note for note in facts["spoils"])
-    with pytest.raises(NeuralocksError, match="no points"):
-        read_shot(path, ["/Hero/Empty"])
-
-
-def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_path):
-    for name, frames in (("hero", 9), ("doll", 0)):
-        write_shot(tmp_path, Recipe(frames=frames), name)
-    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
-    UsdGeom.SetStageMetersPerUnit(stage, 1)
-    for name in ("hero", "doll"):
-        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{name}.usda", "/Hero")
-    stage.GetRootLayer().Save()
-    shot = read_shot(tmp_path / "shot.usda")
-    assert [item.path for item in shot.grooms] == ["/hero/Hair"]
-    assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
-    with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
-        read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
-
-
 def test_fur_that_one_joint_cannot_carry_is_said(tmp_path):
     stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
     skin = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr().Get())
-    _curves(stage, "/Hero/Fur", np.stack([skin, skin + [0, 0.02, 0]], axis=1))
+    add_curves(stage, "/Hero/Fur", np.stack([skin, skin + [0, 0.02, 0]], axis=1))
     stage.GetRootLayer().Save()
     notes = read_shot(stage.GetRootLayer().realPath).notes
     assert sum("will leave the skin" in note for note in notes) == 1
@@ -280,7 +218,7 @@ def test_a_groom_of_another_unit_than_the_stage_is_told_so(tmp_path):
     groom = Usd.Stage.CreateNew(str(tmp_path / "groom.usda"))
     UsdGeom.SetStageMetersPerUnit(groom, 1)
     UsdGeom.SetStageUpAxis(groom, "Z")
-    _curves(groom, "/Hair", strand_points(40, 2))
+    add_curves(groom, "/Hair", strand_points(40, 2))
     groom.SetDefaultPrim(groom.GetPrimAtPath("/Hair"))
     groom.Save()
     stage.RemovePrim("/Hero/Hair")

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks export`: a model as plain ONNX files, whole or not at all."""
+
+import json
+from pathlib import Path
+
+from neuralocks_core import model as model_file
+
+from ..commands import status
+from ..shots import write_shot
+
+
+def test_plain_onnx_with_its_description(tmp_path, model, capsys):
+    """Of the shipped model, where none is named."""
+    import onnxruntime
+
+    assert status("export", "-o", tmp_path) == 0
+    told = capsys.readouterr().out.split()
+    text = (tmp_path / "description.json").read_text()
+    description = json.loads(text)
+    assert len(told) == 5 and {Path(line).name for line in told} >= {"description.json", *description["graphs"]}
+    assert len(text) < 20_000 and "curve" not in description["model"]["training"]
+    for name, graph in description["graphs"].items():
+        assert (tmp_path / name).read_bytes() == model_file.read(model_file.shipped()).graphs[name]
+        session = onnxruntime.InferenceSession(tmp_path / name, providers=["CPUExecutionProvider"])
+        assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
+    assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
+    assert status("export", model, "-o", tmp_path) == 0, "its own files are replaced"
+    assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model).graphs["tail.onnx"]
+    assert status("export", "-o", tmp_path, "--groom", "/Hair") == 1 and "--shot" in capsys.readouterr().err
+
+
+def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
+    shot, written, write = write_shot(tmp_path), [], Path.write_bytes
+
+    def full(self, data):
+        if len(written) == 2:
+            raise OSError(28, "No space left on device")
+        written.append(self)
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert status("export", model, "-o", tmp_path / "onnx", "--shot", shot) == 1
+    assert "no space left" in capsys.readouterr().err
+    assert len(written) == 2 and list(tmp_path.iterdir()) == [shot]
+
+
+def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
+    for text in ('{"units": 1}', "notes"):
+        (tmp_path / "description.json").write_text(text)
+        assert status("export", "-o", tmp_path) == 1
+        assert "description.json: is of something else" in capsys.readouterr().err
+        assert [path.name for path in tmp_path.iterdir()] == ["description.json"]
+        assert (tmp_path / "description.json").read_text() == text
+
+
+def test_a_graph_that_cannot_be_loaded_is_one_line_from_every_command(tmp_path, model, capsys):
+    file = model_file.read(model)
+    bad = model_file.write(tmp_path / "bad.neuralocks", file.meta, file.graphs | {"tail.onnx": b"nonsense"})
+    for words in (("export", bad, "-o", tmp_path / "onnx"), ("inspect", bad)):
+        assert status(*words) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "bad.neuralocks: tail.onnx cannot be loaded" in error

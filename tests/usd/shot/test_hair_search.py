@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which curves are hair of a character that moves."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, add_curves, write_shot
+
+
+def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
+    roots = np.random.default_rng(0).uniform(-4, 4, (50, 1, 3)) * [1, 0, 1] + [6, 0, 0]
+    add_curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot = read_shot(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"]
+    assert sum("/Set/Grass" in note and "--groom" in note for note in shot.notes) == 1
+    facts = inspect(path)
+    assert [groom["path"] for groom in facts["grooms"]] == ["/Hero/Hair"] and not facts["stops"]
+    assert sum("/Set/Grass" in note for note in facts["spoils"]) == 1
+    assert [item.path for item in read_shot(path, ["/Set"]).grooms] == ["/Set/Grass"]
+    for number in range(30):
+        Sdf.CopySpec(stage.GetRootLayer(), "/Set/Grass", stage.GetRootLayer(), f"/Set/Grass{number}")
+    stage.GetRootLayer().Save()
+    assert len([note for note in read_shot(path).notes if "Grass" in note or "28 more" in note]) == 4
+    stage.RemovePrim("/Set")
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Set")
+    add_curves(stage, "/Set/Grass", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.RemovePrim("/Hero/Hair")
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
+        read_shot(path)
+    assert len(inspect(path)["stops"]) == 1
+
+
+def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    UsdGeom.BasisCurves.Define(stage, "/Hero/Empty")
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    shot, facts = read_shot(path), inspect(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] == [groom["path"] for groom in facts["grooms"]]
+    assert any("/Hero/Empty" in note for note in shot.notes) and any("/Hero/Empty" in note for note in facts["spoils"])
+    with pytest.raises(NeuralocksError, match="no points"):
+        read_shot(path, ["/Hero/Empty"])
+
+
+def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_path):
+    for name, frames in (("hero", 9), ("doll", 0)):
+        write_shot(tmp_path, Recipe(frames=frames), name)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("hero", "doll"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{name}.usda", "/Hero")
+    stage.GetRootLayer().Save()
+    shot = read_shot(tmp_path / "shot.usda")
+    assert [item.path for item in shot.grooms] == ["/hero/Hair"]
+    assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
+    with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
+        read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
