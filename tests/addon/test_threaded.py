@@ -2,6 +2,7 @@
 """Work beside Blender that does not end well."""
 
 import gc
+import time
 import weakref
 
 import pytest
@@ -31,7 +32,8 @@ def test_what_stopped_work_had_open_is_closed_at_once(how):
         job = Threaded(work).start()
         if how == "cancelled":
             job.cancel()
-        job._thread.join()
+        while job.running:
+            time.sleep(0.001)
         del job
         assert opened[0]() is None
     finally:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes that simulate while a network trains."""
 
+import multiprocessing
 import os
 import signal
-import subprocess
 import sys
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,16 +16,13 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.training import checkpoint, farm, methods
 
-ASK = [sys.executable, "-c", "import signal; print(signal.getsignal(signal.SIGINT) == signal.SIG_IGN)"]
 
-
-@pytest.mark.skipif(sys.platform == "win32", reason="there each process says so itself")
-def test_ctrl_c_reaches_the_trainer_alone():
-    """A terminal sends it to all; each simulation ended in a traceback beside the trainer's `stopped`."""
-    before = signal.getsignal(signal.SIGINT)
-    with farm._deaf_to_interrupts():
-        inside = subprocess.run(ASK, capture_output=True, text=True, check=True).stdout.strip()
-    assert inside == "True" and signal.getsignal(signal.SIGINT) is before
+def farm_of(monkeypatch, folder, *processes):
+    """A farm with stand-ins for its processes."""
+    each = iter(processes)
+    context = SimpleNamespace(Pipe=multiprocessing.Pipe, Process=lambda **_: next(each))
+    monkeypatch.setattr(multiprocessing, "get_context", lambda method: context)
+    return farm.RolloutFarm(None, folder, 2, len(processes))
 
 
 class _Process:
@@ -52,11 +50,10 @@ class _Process:
 def test_one_that_cannot_start_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
-    workers = farm.RolloutFarm(None, tmp_path, 2, processes=2)
-    workers._processes = [_Process(), _Process(starts=False)]
-    with pytest.raises(OSError, match="no memory"), workers:
+    first = _Process()
+    with pytest.raises(OSError, match="no memory"), farm_of(monkeypatch, tmp_path, first, _Process(starts=False)):
         pass
-    assert workers._processes[0].ended
+    assert first.ended
     assert "OMP_NUM_THREADS" not in os.environ and os.environ["OPENBLAS_NUM_THREADS"] == "3"
 
 
@@ -94,25 +91,34 @@ def test_a_damaged_file_says_what_to_do(tmp_path, kept):
 
 
 class _Scene:
-    """Stands in for one that the solver refuses."""
+    """Stands in for one that the solver refuses; it knows whether Ctrl-C was heard where it arrived."""
+
+    def __init__(self):
+        self.deaf = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
 
     def __getattr__(self, name):
-        raise NeuralocksError("warp: is not installed; install it")
+        raise NeuralocksError(f"warp: is not installed; install it (deaf: {self.deaf})")
 
     def __reduce__(self):
         return (_Scene, ())
 
 
-def test_a_process_that_fails_says_why(tmp_path, capfd):
+def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path, capfd):
+    """A terminal sends it to all; a simulation that hears it ends in a traceback beside the trainer's `stopped`."""
+    before = signal.getsignal(signal.SIGINT)
     with farm.RolloutFarm(_Scene(), tmp_path, 1) as workers:
-        workers._processes[0].join()
+        assert signal.getsignal(signal.SIGINT) is before
+        while workers.alive:
+            time.sleep(0.01)
         assert workers.failed()
-        assert str(workers.failure("try again")) == "warp: is not installed; install it, and try again"
+        deaf = sys.platform != "win32"  # there each process says so itself, once it has its scene
+        said = f"warp: is not installed; install it (deaf: {deaf}), and try again"
+        assert str(workers.failure("try again")) == said
     assert capfd.readouterr().err == ""
 
 
-def test_memory_is_blamed_for_a_process_that_was_killed(tmp_path):
-    workers = farm.RolloutFarm(None, tmp_path, 1)
-    for status, why in ((-9, "was killed; free some memory, and"), (1, "mend what it says above, and")):
-        workers._processes[0] = SimpleNamespace(exitcode=status)
-        assert why in str(workers.failure("try again"))
+@pytest.mark.parametrize(
+    ("status", "why"), [(-9, "was killed; free some memory, and"), (1, "mend what it says above, and")]
+)
+def test_memory_is_blamed_for_a_process_that_was_killed(tmp_path, monkeypatch, status, why):
+    assert why in str(farm_of(monkeypatch, tmp_path, SimpleNamespace(exitcode=status)).failure("try again"))
