@@ -7,21 +7,16 @@ import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.rig import RigModel, rig_spec
-from neuralocks_core.rig.network import feature_columns, input_limits
 from usd.rig.stage import BAKED
+
+from ..rig_models import random_rig_model
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mesh_hair"
 
 
 def model_for(hair, dynamic=False) -> RigModel:
     """Random weights for the chains of a stage."""
-    rng = np.random.default_rng(0)
-    spec = rig_spec(dynamic)
-    size, layers = len(feature_columns(spec)), []
-    for out in (16, 16, 3 * len(hair.rig.chains)):
-        layers.append((rng.normal(0, 0.4 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
-        size = out
-    return RigModel(hair.rig.chains, spec, tuple(layers), input_limits(spec))
+    return random_rig_model(hair.rig.chains, rig_spec(dynamic), gain=0.4)
 
 
 def small_shot(
@@ -85,9 +80,13 @@ def small_shot(
     return path
 
 
-def hair_turns(path, codes):
-    """Rotations (T, 3, 4) of the three moving joints as UsdSkel has them."""
+def hair_turns(path, codes, who="Who") -> np.ndarray:
+    """Rotations (T, 3, 4) wxyz that a bake gives the three moving joints of a small shot's character."""
     stage = Usd.Stage.Open(str(path))
-    animation = UsdSkel.Animation(stage.GetPrimAtPath(f"/Who/Rig/{BAKED}"))
-    rotations = animation.GetRotationsAttr()
-    return np.array([[[q.GetReal(), *q.GetImaginary()] for q in list(rotations.Get(c))[2:5]] for c in codes])
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(f"/{who}/Rig/{BAKED}"))
+    return np.array([rotations(animation, code)[2:5] for code in codes])
+
+
+def rotations(animation: UsdSkel.Animation, code) -> np.ndarray:
+    """(J, 4) wxyz of an animation at a time code."""
+    return np.array([(q.GetReal(), *q.GetImaginary()) for q in animation.GetRotationsAttr().Get(code)])

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms and legs are found where names say nothing, and are those that names tell where they do."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from neuralocks_core.anatomy.humanoid import find_humanoid
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.formats.bvh import read_bvh
+from tests.shared_data import SHARED
 
-REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "motion"
+REAL = SHARED / "motion"
 JOINTS = {  # name: parent, place: +Z ahead, the character's left at +X
     "root": (None, (0, 0, 0)),
     "pelvis": ("root", (0, 1.0, 0)),

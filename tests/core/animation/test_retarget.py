@@ -11,9 +11,9 @@ from neuralocks_core.animation.retarget import retarget
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.formats.bvh import read_bvh
 from neuralocks_core.rotation import from_vector
+from tests.shared_data import SHARED
 
-HERE = Path(__file__).resolve()
-REAL = HERE.parents[4] / "shared" / "data" / "motion"
+REAL = SHARED / "motion"
 FILES = sorted(REAL.glob("*.bvh"))
 needs_capture = pytest.mark.skipif(not FILES, reason="the shared motion capture is not there")
 
@@ -23,7 +23,7 @@ def woman():
     pytest.importorskip("pxr")
     from usd.shot.stage import read_rigs
 
-    return read_rigs(HERE.parents[3] / "examples" / "shot" / "body.usdc")[0].character
+    return read_rigs(Path(__file__).parents[3] / "examples" / "shot" / "body.usdc")[0].character
 
 
 @cache

@@ -2,7 +2,6 @@
 """BVH files give the motion they hold, and hostile ones one clear line."""
 
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ from hypothesis import strategies as st
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.bvh import read_bvh
 from neuralocks_core.formats.bvh_words import PIECE, Words
+from tests.shared_data import SHARED
 
-REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "motion"
+REAL = SHARED / "motion"
 
 TEXT = """HIERARCHY
 ROOT hips

@@ -15,8 +15,9 @@ from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import strand_set
 from tests.core.formats.groom_files import COUNTS, FILES, POINTS, put, tressfx_text, write_hair
+from tests.shared_data import SHARED
 
-DATA = Path(__file__).parents[4] / "shared" / "data" / "grooms"
+DATA = SHARED / "grooms"
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from neuralocks_core.preview import pictures as preview
 from neuralocks_core.preview import plain_canvas, shading
 from neuralocks_core.preview.canvas import open_canvas
 from neuralocks_core.preview.film import Detail, Film, Scene
+from tests.full_disk import room_for
 
 CENTRE = np.array([0.0, 1.5, 0.0])
 SMALL = Detail(2000, 16, 1, 1)
@@ -151,15 +152,9 @@ def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatc
 
 def test_a_clip_that_the_disk_cuts_short_leaves_the_earlier_one(tmp_path, capfd):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
-    resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
     (tmp_path / "hair.mp4").write_text("earlier")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    try:
-        with pytest.raises(NeuralocksError, match="no space left"):
-            preview.render(scene(), tmp_path / "hair.mp4", size=(96, 128), detail=SMALL)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with pytest.raises(NeuralocksError, match="no space left"), room_for(1000):
+        preview.render(scene(), tmp_path / "hair.mp4", size=(96, 128), detail=SMALL)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["earlier"]
     assert capfd.readouterr().err == ""
 

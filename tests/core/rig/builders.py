@@ -6,8 +6,9 @@ import numpy as np
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
-from neuralocks_core.rig.network import feature_columns, held_features, input_limits
+from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_quaternion
+from tests.rig_models import random_rig_model
 
 
 def character(extra=(), turn=None) -> Character:
@@ -50,18 +51,10 @@ def skin(who: Character, joints: dict[str, tuple]) -> SkinnedMesh:
 
 def random_model(joints=(4, 4, 4, 4), hidden=16, seed=0, spec: BoundarySpec | None = None) -> RigModel:
     """Chains of these lengths and a network of random weights, without a trained meaning."""
-    rng = np.random.default_rng(seed)
     rows = []
     for c, count in enumerate(joints):
         rows += tail(f"hair_{c}", count + 1, at=(0.1 * np.cos(c), 1.6, 0.1 * np.sin(c)))
-    chains = find_chains(character(rows))
-    spec = rig_spec() if spec is None else spec
-    size = len(feature_columns(spec))
-    layers = []
-    for out in (hidden, hidden, 3 * len(chains)):
-        layers.append((rng.normal(0, 1 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
-        size = out
-    return RigModel(chains, spec, tuple(layers), input_limits(spec))
+    return random_rig_model(find_chains(character(rows)), rig_spec() if spec is None else spec, hidden, seed)
 
 
 def model_of(kind) -> RigModel:

@@ -14,11 +14,12 @@ from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
 
+from ...shared_data import SHARED
 from ..commands import status
 from ..shots import Recipe, write_shot
 
 ROOT = Path(__file__).parents[3]
-GROOMS = ROOT.parent / "shared" / "data" / "grooms"
+GROOMS = SHARED / "grooms"
 
 
 def test_bake_is_the_python_function(tmp_path, model, capsys):

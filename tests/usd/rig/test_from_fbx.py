@@ -17,6 +17,7 @@ from usd.rig.bake import bake_rig  # noqa: E402
 from usd.rig.stage import describe_chains, read_rigged_hair  # noqa: E402
 
 from ..fbx_rigs import FRAMES, write_character  # noqa: E402
+from ..rig_shots import rotations  # noqa: E402
 
 
 def trained(hair, dynamic) -> RigModel:
@@ -24,11 +25,6 @@ def trained(hair, dynamic) -> RigModel:
     if dynamic:
         return train_dynamic(hair.rig, steps=3, clips=2, clip_seconds=1.0, batch=8, report_poses=0)
     return train_static(hair.rig, steps=3, batch=4, report_poses=0)
-
-
-def rotations(animation, code) -> np.ndarray:
-    """(J, 4) wxyz of a SkelAnimation."""
-    return np.array([(q.GetReal(), *q.GetImaginary()) for q in animation.GetRotationsAttr().Get(code)])
 
 
 @pytest.mark.parametrize(("joints", "dynamic"), [(24, True), (62, False)])

@@ -19,6 +19,8 @@ from usd.rig.stage import BAKED, describe_chains, read_rigged_hair
 from usd.shot.stage import read_shot
 
 from ...blenders import installed
+from ...full_disk import room_for
+from ...shared_data import SHARED
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 
@@ -145,17 +147,11 @@ def test_hair_starts_anew_after_a_cut(tmp_path):
 
 
 def test_a_full_disk_is_not_a_damaged_shot(tmp_path):
-    resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    try:
-        for name in ("out.usda", "out.usdc"):
-            with pytest.raises(NeuralocksError, match=f"{name}: .*(no space|cannot be written)"):
-                bake_rig(shot, tmp_path / name, model)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    for name in ("out.usda", "out.usdc"):
+        with pytest.raises(NeuralocksError, match=f"{name}: .*(no space|cannot be written)"), room_for(1000):
+            bake_rig(shot, tmp_path / name, model)
     assert [path.name for path in tmp_path.iterdir()] == ["shot.usda"]
 
 
@@ -200,7 +196,7 @@ def test_no_lock_of_the_shipped_networks_stands_out(path):
 
 def test_a_vrm_avatar_through_blender(tmp_path):
     """Its seven hair chains of one joint and an end are found, as its spring-bone groups name them."""
-    avatar = EXAMPLE.parents[2] / "shared" / "data" / "rigged" / "godette.vrm"
+    avatar = SHARED / "rigged" / "godette.vrm"
     blender = next(iter(installed()), None)
     if not avatar.is_file() or blender is None:
         pytest.skip("needs ../shared/data/rigged/godette.vrm and Blender as a Python module (make blender)")
