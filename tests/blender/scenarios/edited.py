@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits of which Blender tells little: of what moves a rig, besides keys, and of live hair itself."""
+"""Edits of which Blender tells little: of what moves a rig, besides keys."""
 
 import math
-import shutil
 from pathlib import Path
 
 import bpy
-import numpy as np
 
-from dcc_addon.scene.nodes import geometry_nodes
-from neuralocks_core.model import shipped
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, points_at, refused
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at, refused
 
 
 def rearranged(_folder: Path) -> None:
@@ -98,143 +94,6 @@ def _moved_in_the_past(rig) -> tuple:
     return strip, curve, constraint
 
 
-def other_strands(folder: Path) -> None:
-    """Live hair that is given other curves, or more or fewer strands, is that hair at once, and the curves that it had get
-    their rest shape back; live goes on when an editing mode is left.
-    """
-    from dcc_addon.operators.bake import bake_steps
-    from dcc_addon.scene import curves
-
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands, other = scenes.hair(rig, 20), scenes.hair(rig, 20, length=0.15, name="Other")
-    short, long = other.data, strands.data
-    bpy.data.objects.remove(other)
-    groomed = curves.points(long)
-    make_live(rig, strands)
-    shown = points_at(strands, 9)
-
-    bpy.context.view_layer.objects.active = strands
-    long.surface = scenes.body(rig)
-    for mode in ("EDIT_CURVES" if bpy.app.version < (3, 5) else "EDIT", "SCULPT_CURVES"):
-        if bpy.app.version < (3, 5) and mode == "EDIT_CURVES":
-            continue  # no such mode yet
-        bpy.ops.object.mode_set(mode=mode)
-        bpy.context.view_layer.update()
-        assert np.array_equal(curves.shown(long), groomed)
-        bpy.ops.object.mode_set(mode="OBJECT")
-        bpy.context.view_layer.update()
-        assert apart(scenes.points(strands), shown) < 1e-6 or len(long.points) != len(groomed), mode
-
-    strands.data = short
-    bpy.context.view_layer.update()
-    assert np.array_equal(curves.shown(long), groomed) and not curves.has_rest(long)
-    if hasattr(short, "add_curves"):
-        points_at(strands, 5)
-        short.add_curves([24])
-        end = np.float32([[0, 0.05, 1.7 - 0.01 * k] for k in range(24)])
-        for name in ("position", curves.REST):
-            values = np.concatenate([curves.points(short)[:-24], end])
-            short.attributes[name].data.foreach_set("vector", values.ravel())
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    view = {frame: points_at(strands, frame) for frame in (4, 9)}
-    for _ in (steps := _Returned(bake_steps(bpy.context, rig, [strands], str(folder / "out.usdc")))):
-        pass
-    for frame, seen in view.items():
-        assert apart(seen, baked_points(*steps.value["Hair"], frame)) < 1e-5, frame
-    assert not messages(), messages()
-
-    bpy.context.scene.collection.objects.unlink(strands)
-    strands.use_fake_user = True
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "left.blend"))
-    assert not curves.has_rest(short), "hair that is in no scene is saved at rest"
-
-
-def replaced_model(folder: Path) -> None:
-    """A model file that is written anew, by another training say, is what live hair is moved by from the next frame on, as
-    a bake would be.
-    """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands, model = scenes.hair(rig, 20), folder / "mine.neuralocks"
-    shutil.copy(MODEL, model)
-    make_live(rig, strands)
-    strands.neuralocks_hair.model = str(model)
-    before = points_at(strands, 9)
-    new = folder / "new.neuralocks"
-    shutil.copy(shipped("strands"), new)
-    new.replace(model)
-    after = points_at(strands, 9)
-    strands.neuralocks_hair.model = ""
-    assert apart(before, after) > 0.005 and apart(after, points_at(strands, 9)) == 0.0
-    strands.neuralocks_hair.model = str(model)
-    model.unlink()
-    points_at(strands, 9)
-    assert "mine.neuralocks" in messages()["Hair"], messages()
-
-
-def applied(_folder: Path) -> None:
-    """What is applied to the points of live hair is applied to its rest shape: as it would be with Live off, and nothing
-    moves meanwhile. What cannot be is told, and Live is off then.
-    """
-
-    def groomed(live: bool, change):
-        """Rest points after `change`, in the world, and by how much live hair moved meanwhile."""
-        scenes.empty()
-        rig = scenes.armature()
-        scenes.dance(rig)
-        strands, scene = scenes.hair(rig, 20), bpy.context.scene
-        strands.rotation_euler, strands.scale = (0.1, 0.3, 0.5), (1.4, 1.4, 1.4)
-        before = points_at(strands, 9)
-        if live:
-            make_live(rig, strands)
-            before = points_at(strands, 9)
-        choose(strands)
-        change(strands)
-        bpy.context.view_layer.update()
-        moved = apart(points_at(strands, 9), before) if len(strands.data.points) * 3 == before.size else None
-        if live:
-            assert strands.neuralocks_hair.live, messages()
-            strands.neuralocks_hair.live = False
-        scene.frame_set(1)
-        return scenes.points(strands), moved
-
-    def more(strands):
-        scenes.hair(strands.parent, 10, name="More", length=0.1).select_set(True)
-        bpy.ops.object.join()
-
-    changes = [
-        lambda _: bpy.ops.object.transform_apply(location=True, rotation=True, scale=True),
-        lambda _: bpy.ops.object.origin_set(type="ORIGIN_GEOMETRY"),
-    ]
-    if bpy.app.version >= (5, 2):
-        changes.append(more)
-    for change in changes:
-        off, _ = groomed(False, change)
-        live, moved = groomed(True, change)
-        assert apart(off, live) < 1e-6
-        assert change is more or moved < 1e-5
-
-    scenes.empty()
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
-    groom = np.array([point.position for point in strands.data.points])
-    tree, source, target = geometry_nodes("Frizz")
-    offset = tree.nodes.new("GeometryNodeSetPosition")
-    offset.inputs["Offset"].default_value = (0, 0.05, 0)
-    tree.links.new(source, offset.inputs[0])
-    tree.links.new(offset.outputs[0], target)
-    strands.modifiers.new("Frizz", "NODES").node_group = tree
-    make_live(rig, strands)
-    points_at(strands, 9)
-    choose(strands)
-    bpy.ops.object.modifier_apply(modifier="Frizz")
-    points_at(strands, 10)
-    assert "'Frizz' was applied" in messages()["Hair"] and not strands.neuralocks_hair.live
-    assert np.array_equal([point.position for point in strands.data.points], groom)
-
-
 def held_otherwise(_folder: Path) -> None:
     """What is not keyed counts in all frames: where it changes in the past alone, a render knows; a body that is put
     elsewhere is noticed in the next frame.
@@ -319,13 +178,3 @@ def hidden_prop(folder: Path) -> None:
         head.keyframe_insert("scale", frame=frame)
     scene.frame_set(3)
     refused(bpy.ops.neuralocks.sample_motion, "bone 'head'", "zero scale in frame 6")
-
-
-class _Returned:
-    """A generator to loop over; `value` is what it returned."""
-
-    def __init__(self, steps):
-        self._steps, self.value = steps, None
-
-    def __iter__(self):
-        self.value = yield from self._steps
