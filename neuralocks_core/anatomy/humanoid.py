@@ -9,11 +9,10 @@ meet.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 import numpy as np
 
-from neuralocks_core.anatomy.joint_names import leaf, sides_and_keys
+from neuralocks_core.anatomy.joint_names import find_joint, leaf, sides_and_keys
 from neuralocks_core.anatomy.limb_chains import WHOLE, below_first
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.errors import NeuralocksError
@@ -126,32 +125,6 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     _find_trunk(joints, put, names, keys, parents)
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
-
-
-def find_joint(names, wanted: str) -> int:
-    """Index of the joint with this path or this unique last part.
-
-    Raises:
-        NeuralocksError: there is none, or several.
-    """
-    hits = [i for i, name in enumerate(names) if name == wanted] or [
-        i for i, name in enumerate(names) if leaf(name) == wanted
-    ]
-    if len(hits) != 1:
-        fact = (
-            "several joints have that name; give its full path"
-            if hits
-            else f"no such joint{_alike(names, wanted)}; neuralocks inspect lists all"
-        )
-        raise NeuralocksError(f"joint '{wanted}': {fact}")
-    return hits[0]
-
-
-def _alike(names, wanted: str) -> str:
-    """The joints that a misspelt name may stand for, as a question."""
-    spelt = {leaf(name).lower(): leaf(name) for name in names}
-    near = get_close_matches(leaf(wanted).lower(), spelt)
-    return f", perhaps {' or '.join(repr(spelt[each]) for each in near)}" if near else ""
 
 
 def _depth(joint: int, parents) -> int:

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What joint names say: which side a joint is on, and which part it is once namespaces and rig prefixes are gone."""
+"""What joint names say: which side a joint is on, which part it is once namespaces and rig prefixes are gone, and which joint
+somebody means.
+"""
 
 import re
 from collections import Counter
 from collections.abc import Sequence
+from difflib import get_close_matches
 from os.path import commonprefix
+
+from neuralocks_core.errors import NeuralocksError
 
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _NOISE = {
@@ -140,3 +145,29 @@ def prefixed_otherwise(names: Sequence[str], there: set[str]) -> tuple[str, ...]
                 ways.add(tuple(prefix + rest for rest in rests))
     ways = [way for way in ways if there.issuperset(way)]
     return ways[0] if len(ways) == 1 else None
+
+
+def find_joint(names, wanted: str) -> int:
+    """Index of the joint with this path or this unique last part.
+
+    Raises:
+        NeuralocksError: there is none, or several.
+    """
+    hits = [i for i, name in enumerate(names) if name == wanted] or [
+        i for i, name in enumerate(names) if leaf(name) == wanted
+    ]
+    if len(hits) != 1:
+        fact = (
+            "several joints have that name; give its full path"
+            if hits
+            else f"no such joint{_alike(names, wanted)}; neuralocks inspect lists all"
+        )
+        raise NeuralocksError(f"joint '{wanted}': {fact}")
+    return hits[0]
+
+
+def _alike(names, wanted: str) -> str:
+    """The joints that a misspelt name may stand for, as a question."""
+    spelt = {leaf(name).lower(): leaf(name) for name in names}
+    near = get_close_matches(leaf(wanted).lower(), spelt)
+    return f", perhaps {' or '.join(repr(spelt[each]) for each in near)}" if near else ""
