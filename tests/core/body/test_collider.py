@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Distances to a mesh are exact, know inside from outside, and cost bounded memory; bad meshes are named."""
+
 import numpy as np
 import pytest
 import trimesh

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Several bodies as one."""
+
 import numpy as np
 
 from neuralocks_core.character import Body

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""The report card as text, as JSON and as a picture."""
+
 import json
 
 import numpy as np
