@@ -2,6 +2,7 @@
 """Small Blender scenes with a moving character and hair, made from nothing."""
 
 import math
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -28,7 +29,7 @@ TAIL = (
 
 def empty() -> None:
     """An empty scene at 24 fps, frames 1 to 24, with the add-on's handlers as they are."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True) if hasattr(bpy.ops.wm, "read_homefile") else None
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps, scene.render.fps_base = 1, 24, 24, 1.0
     scene.frame_set(1)
@@ -167,30 +168,15 @@ def fcurves_of(action) -> list:
 
 
 def rig_model(rig, path):
-    """A model of random weights for the hair bones of a rig."""
+    """A model of random weights for the hair bones of a rig; its graph, for which onnx is needed, is none that anybody reads."""
     from dcc_addon.services.bones import chains_of
     from dcc_addon.session import session
-    from neuralocks_core import model
-    from neuralocks_core.rig import RigModel, rig_spec
-    from neuralocks_core.rig.network import feature_columns, input_limits
+    from neuralocks_core.rig import rig_spec
+    from tests.rig_models import random_rig_model
 
-    spec, rng = rig_spec(True), np.random.default_rng(0)
-    chains = chains_of(session.rigs[rig.name].character)
-    sizes = [len(feature_columns(spec)), 16, 16, 3 * len(chains)]
-    layers = tuple(
-        ((rng.normal(size=(b, a)) * 0.5).astype(np.float32), rng.normal(size=b).astype(np.float32))
-        for a, b in zip(sizes[:-1], sizes[1:], strict=True)
-    )
-    made = RigModel(chains, spec, layers, np.asarray(input_limits(spec), np.float32), 0.8, {}, {}, [])
-    meta = {
-        "kind": "rig",
-        "boundary": spec.to_json(),
-        "chains": chains.to_json(),
-        "max_angle": made.max_angle,
-        "layers": [[w.tolist(), b.tolist()] for w, b in made.layers],
-        "limits": made.limits.tolist(),
-    }
-    return model.write(path, meta, {"rig.onnx": b"unused"})
+    made = random_rig_model(chains_of(session.rigs[rig.name].character), rig_spec(True), gain=3.0)
+    with patch("neuralocks_core.rig.graph.rig_graph", return_value=b"unused"):
+        return made.save(path)
 
 
 def translation(offset):
