@@ -22,8 +22,9 @@ MEASURED = 4
 def main() -> None:
     """Print the table."""
     from neuralocks_core import metrics
-    from neuralocks_core.deformation.resolve import CLAMPED, Resolver
+    from neuralocks_core.deformation.resolve import Resolver
     from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.strands.strand_set import CLAMPED
     from usd.baking.posing import GroomPoser
     from usd.review.demo import shipped_shot
     from usd.shot.stage import read_shot

@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.materials import RANGES, Material, constants
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
-from neuralocks_core.strands.strand_set import K, StrandSet, root_frames
+from neuralocks_core.strands.strand_set import CLAMPED, K, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
@@ -99,9 +99,9 @@ class Locks:
         length = np.sqrt(np.square(edges).sum(-1, keepdims=True))
         wanted = edges + np.diff(way + factor[hairs, None, None] * (moved - way), axis=1)
         size = np.sqrt(np.square(wanted).sum(-1, keepdims=True))
-        change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, 1:]
-        moved[:, :2] = 0
-        np.cumsum(change, axis=1, out=moved[:, 2:])
+        change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, CLAMPED - 1 :]
+        moved[:, :CLAMPED] = 0
+        np.cumsum(change, axis=1, out=moved[:, CLAMPED:])
 
 
 def _tie(rest: np.ndarray, mates: np.ndarray, lock: np.ndarray, means: np.ndarray) -> np.ndarray:

@@ -5,13 +5,12 @@ import numpy as np
 
 from neuralocks_core.body.going_in import depths_along
 from neuralocks_core.body.near_body import PosedBody
+from neuralocks_core.strands.strand_set import CLAMPED
 
 MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
 SLACK = np.float32(1e-5)
 """Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
-CLAMPED = 2
-"""Vertices at the root that never move."""
 TRIES = 2
 """Planes that a vertex is laid on, one after the other: the next is that of where the last has brought it."""
 FLAT = 0.004

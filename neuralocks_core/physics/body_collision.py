@@ -8,6 +8,7 @@ from torch import Tensor
 
 from neuralocks_core.materials import COLLISION, LINEAR, MARGIN
 from neuralocks_core.physics.rods import Rods
+from neuralocks_core.strands.strand_set import CLAMPED
 
 
 def body_collision(
@@ -16,8 +17,8 @@ def body_collision(
     """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`: deep vertices of an untrained
     network must not drown the rest.
 
-    Weighted by vertex mass, which the paper's sum is not. The clamped vertices 0 and 1 count nothing: they lie
-    on the scalp.
+    Weighted by vertex mass, which the paper's sum is not. The clamped vertices count nothing: they lie on the
+    scalp.
 
     Args:
         x: (..., S, K, 3) points [m].
@@ -33,4 +34,4 @@ def body_collision(
     depth = margin - ((planes[..., :3] * x).sum(-1) - planes[..., 3])
     cubic = depth.clamp(0.0, LINEAR)
     energy = cubic**3 + 3.0 * LINEAR**2 * torch.relu(depth - LINEAR)
-    return (stiffness * rods.mass * energy)[..., 2:].sum(-1)
+    return (stiffness * rods.mass * energy)[..., CLAMPED:].sum(-1)

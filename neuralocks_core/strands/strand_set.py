@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 K = 24
 """Vertices of a network strand, root first (72 network outputs are 24 x 3)."""
+CLAMPED = 2
+"""Of these, so many at the root never move against the head."""
 
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""

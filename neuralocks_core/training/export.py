@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from neuralocks_core.onnx_graph import OnnxGraph
-from neuralocks_core.strands.strand_set import K
+from neuralocks_core.strands.strand_set import CLAMPED, K
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet
 
@@ -184,8 +184,8 @@ def _turned_edges(graph: _Graph, count: int) -> None:
 
 
 def _free(net: StrandNet) -> np.ndarray:
-    """One for each output that may move: vertices 0 and 1 are clamped."""
-    return np.repeat(np.arange(net.out.out_features // 3) >= 2, 3).astype(np.float32)
+    """One for each output that may move, zero for those of clamped vertices."""
+    return np.repeat(np.arange(net.out.out_features // 3) >= CLAMPED, 3).astype(np.float32)
 
 
 def _array(layer: nn.Linear) -> np.ndarray:

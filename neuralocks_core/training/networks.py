@@ -6,7 +6,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core.strands.strand_set import K
+from neuralocks_core.strands.strand_set import CLAMPED, K
 
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
@@ -151,7 +151,7 @@ def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None
 
     `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch cannot happen
     and hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest + o`.
-    Vertices 0 and 1 are clamped in both; zero offsets give exactly zero.
+    The first CLAMPED vertices, 0 and 1, stay in both; zero offsets give exactly zero.
 
     Args:
         offsets: (..., S, 24, 3) network output.
@@ -168,15 +168,15 @@ def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None
     if anchored_offsets is not None:
         offsets = offsets - anchored_offsets
     if output == "displacement":
-        clamped = torch.zeros_like(offsets[..., :2, :])
-        return torch.cat([clamped, offsets[..., 2:, :]], dim=-2)
+        clamped = torch.zeros_like(offsets[..., :CLAMPED, :])
+        return torch.cat([clamped, offsets[..., CLAMPED:, :]], dim=-2)
     if output != "direction":
         raise ValueError(f"output: {output!r} is not one of {OUTPUTS}")
     edges = rest[..., 1:, :] - rest[..., :-1, :]
     lengths = edges.square().sum(-1, keepdim=True).sqrt()
-    turned = edges[..., 1:, :] + lengths[..., 1:, :] * offsets[..., 2:, :]
+    turned = edges[..., 1:, :] + lengths[..., 1:, :] * offsets[..., CLAMPED:, :]
     # The tiny number keeps edges of no length, and offsets that cancel an edge, finite in value and gradient.
     norm = turned.square().sum(-1, keepdim=True).clamp_min(1e-18).sqrt()
     change = turned * (lengths[..., 1:, :] / norm) - edges[..., 1:, :]
     moved = torch.cumsum(change, dim=-2)
-    return torch.cat([torch.zeros_like(moved[..., :2, :]), moved], dim=-2)
+    return torch.cat([torch.zeros_like(moved[..., :CLAMPED, :]), moved], dim=-2)

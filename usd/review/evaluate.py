@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core import metrics
-from neuralocks_core.deformation.resolve import CLAMPED, Resolver
+from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation import comparison
@@ -21,7 +21,7 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.locks import whole_locks
-from neuralocks_core.strands.strand_set import K, StrandSet, strands_on
+from neuralocks_core.strands.strand_set import CLAMPED, K, StrandSet, strands_on
 
 from ..border.damage import names_damage
 from ..shot.recorded import recorded, recorded_material, recorded_volume
