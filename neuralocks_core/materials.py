@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from numbers import Real
 
 import numpy as np
@@ -88,9 +88,9 @@ class Material:
         """Make it from `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
 
         Raises:
-            NeuralocksError: an unknown name, no number, or a value outside its range.
+            NeuralocksError: an unknown name, one that is given twice, no number, or a value outside its range.
         """
-        material = cls()
+        given: dict[str, float] = {}
         for setting in settings:
             said, _, text = (part.strip() for part in setting.partition("="))
             name = ALIASES.get(said, said)
@@ -109,8 +109,10 @@ class Material:
                     f"material '{setting}': no number after '='; write for example {said}=1.5x"
                 ) from None
             _check(name, value, said)
-            material = replace(material, **{name: value})
-        return material
+            if name in given:
+                raise NeuralocksError(f"material '{setting}': {name} is given twice; give it once")
+            given[name] = value
+        return cls(**given)
 
 
 def _check(name: str, value, said: str) -> None:

@@ -47,10 +47,12 @@ def grow(
         variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
 
     Raises:
-        NeuralocksError: an unknown style, or a strand count out of range.
+        NeuralocksError: an unknown style, no scalp, or a strand count out of range.
     """
     if style not in STYLES:
         raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
+    if not isinstance(scalp, Scalp):
+        raise NeuralocksError(f"scalp: {scalp!r} is none; give a Scalp, such as hairstyles.from_head marks on a head")
     if not 1 <= count <= MOST_STRANDS:
         raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
     random = np.random.default_rng(seed)

@@ -41,6 +41,12 @@ def test_several_in_one_word_are_told_apart(setting):
         Material.parse([setting])
 
 
+@pytest.mark.parametrize("settings", [["weight=1.5", "weight=2"], ["stiffness=2x", "bend=0.002"]])
+def test_a_constant_is_given_once(settings):
+    with pytest.raises(NeuralocksError, match=f"material '{settings[1]}': (weight|bend) is given twice"):
+        Material.parse(settings)
+
+
 @pytest.mark.parametrize("setting", ["stiffness=0", "stiffness = 100x", "stiffness=soft"])
 def test_words_are_told_as_they_were_said(setting):
     with pytest.raises(NeuralocksError, match="stiffness") as caught:

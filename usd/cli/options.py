@@ -69,13 +69,16 @@ def pairs(words: list[str] | None, option: str) -> dict[str, str]:
         name, equals, value = word.partition("=")
         if not (name.strip() and equals and value.strip()):
             raise NeuralocksError(f"{option} {word}: is not NAME=VALUE; give both sides of '='")
+        if name.strip() in found:
+            raise NeuralocksError(f"{option} {word}: {name.strip()} is given twice; give it once")
         found[name.strip()] = value.strip()
     return found
 
 
 def numbers(words: list[str] | None, option: str) -> dict[str, float]:
     """Like `pairs`, with numbers for values."""
+    found = pairs(words, option)
     try:
-        return {name: float(text) for name, text in pairs(words, option).items()}
+        return {name: float(text) for name, text in found.items()}
     except ValueError:
         raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None

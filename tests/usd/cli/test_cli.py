@@ -117,6 +117,16 @@ def test_an_empty_word_is_refused(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("error: style: is empty")
 
 
+def test_a_name_is_given_a_value_once(capsys):
+    """The last one of two won in silence."""
+    for words, name in (
+        (("bake", "s.usda", "-o", "o.usdc", "--joint", "neck=a", "--joint", "neck=b"), "--joint neck=b: neck"),
+        (("body", "-o", "o.usda", "--phenotype", "age=1", "--phenotype", "age=2"), "--phenotype age=2: age"),
+    ):
+        assert status(*words) == 1
+        assert capsys.readouterr().err == f"error: {name} is given twice; give it once\n"
+
+
 def test_a_seed_is_one_of_numpys(capsys):
     for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
         assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
