@@ -47,6 +47,8 @@ class Skeleton:
             raise NeuralocksError("skeleton: a joint comes before its parent; order the joints root first")
         if self.bind.shape != (count, 4, 4) or not np.isfinite(self.bind).all():
             raise NeuralocksError(f"skeleton: needs {count} finite bind transforms; re-export it with its bind pose")
+        if not np.linalg.det(self.bind[:, :3, :3]).all():
+            raise NeuralocksError("skeleton: the bind transform of a joint has zero scale; repair it")
 
     @cached_property
     def children(self) -> list[list[int]]:

@@ -25,7 +25,7 @@ class Groom:
     Arrays are converted to the stated types and made read-only.
 
     Raises:
-        NeuralocksError: a shape does not fit, a value is not finite, or there is no strand.
+        NeuralocksError: a shape does not fit, a value is not finite, a width is negative, or there is no strand.
     """
 
     name: str
@@ -56,6 +56,8 @@ class Groom:
                 f"widths have shape {widths.shape}", f"give 1, {strands} (one a strand) or {total} (one a point)"
             )
         self._check_values("widths", widths, LARGEST_COORDINATE, "m")
+        if widths.size and widths.min() < 0:
+            raise self._error("some widths are negative", "give diameters")
         self._put("widths", widths)
         if self.root_uv is not None:
             self._put("root_uv", self._shaped("root_uv", self._array("root_uv", self.root_uv, np.float32), 2))

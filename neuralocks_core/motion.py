@@ -61,6 +61,8 @@ class Clip:
             )
         if (np.diff(self.times) <= 0).any():
             raise NeuralocksError("animation: sample times do not ascend; sort them and remove doubles")
+        if self.cuts.ndim != 1 or not np.isfinite(self.cuts).all():
+            raise NeuralocksError(f"animation: cuts at {self.cuts} s; give finite times, one a cut")
         bad = ~np.isfinite(self.joints).all(axis=(1, 2, 3)) | ~np.isfinite(shape).all(axis=1) | ~np.isfinite(self.times)
         if bad.any():
             raise NeuralocksError(

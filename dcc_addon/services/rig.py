@@ -230,7 +230,8 @@ def groom(
     if not np.isfinite(points).all():
         raise NeuralocksError(f"{name}: some points are not finite; delete these strands")
     matrix = to_core(metres) @ place
-    widths = None if radius is None or not len(radius) else 2 * radius * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    widths = None if radius is None or not len(radius) else 2 * np.maximum(radius, 0) * size
     return Groom(name, transformed(points, matrix), counts, widths)
 
 

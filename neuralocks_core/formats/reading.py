@@ -76,7 +76,7 @@ def read_with_look(
     if axis == "Z":
         points = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
 
-    if widths is not None and not (np.isfinite(widths).all() and 0 < widths.max(initial=0.0) <= WIDEST):
+    if widths is not None and not ((widths >= 0).all() and 0 < widths.max(initial=0.0) <= WIDEST):
         notes.append(f"{path}: its thickness is not that of hair; took 0.08 mm")
         widths = None
     root_uv = raw.root_uv

@@ -58,6 +58,7 @@ def test_subset_takes_everything_along():
         ({"counts": [[3, 2]]}, "counts have shape"),
         ({"points": np.zeros((0, 3)), "counts": [0, 0]}, "no points"),
         ({"widths": [1, 2, 3]}, "widths have shape"),
+        ({"widths": [1, -1]}, "widths are negative"),
         ({"widths": [np.nan]}, "widths are not finite"),
         ({"root_uv": np.zeros((5, 2))}, "root_uv has shape"),
         ({"root_uv": np.full((2, 2), np.inf)}, "root_uv are not finite"),

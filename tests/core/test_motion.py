@@ -58,3 +58,9 @@ def test_bad_clips_are_refused(times, change, fact):
         joints[1, 0, 0, 0] = change
     with pytest.raises(NeuralocksError, match=fact):
         Clip(times, joints)
+
+
+@pytest.mark.parametrize("cuts", [0.5, [[0.5]], [np.nan], [0.5, np.inf]])
+def test_cuts_that_are_no_times_are_refused(cuts):
+    with pytest.raises(NeuralocksError, match="animation: cuts at .*; give finite times"):
+        Clip([0.0, 1.0], np.tile(bind(), (2, 1, 1, 1)), cuts=cuts)
