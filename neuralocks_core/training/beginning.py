@@ -16,9 +16,10 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.onnx_graph import OnnxWeights
+from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
-from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.networks import StrandNet, smoothing
 from neuralocks_core.training.work import BEGINNING, CODES
 
 
@@ -113,13 +114,19 @@ class Beginning:
                 for layer, (weight, bias) in others:
                     _fill(layer, weight, bias)
             for name, layer in (("middle", net.middle), ("out", net.out)):
+                back = self._before_smoothing() if name == "out" else np.eye(layer.out_features)
                 if net.motion != "modulated":
-                    _fill(layer, tail[name], tail[f"{name}.bias"])
+                    _fill(layer, tail[name] @ back, tail[f"{name}.bias"] @ back)
                     continue
-                _fill(layer, frame.constants[f"{name}.plain"], tail[f"{name}.bias"])
+                _fill(layer, frame.constants[f"{name}.plain"] @ back, tail[f"{name}.bias"] @ back)
                 change = getattr(net, f"{name}_change")
                 _fill(change.to_terms, frame.constants[f"{name}.to_terms"])
-                _fill(change.back, frame.constants[f"{name}.back"])
+                _fill(change.back, frame.constants[f"{name}.back"] @ back)
+
+    def _before_smoothing(self) -> np.ndarray:
+        """(72, 72), from the right: undoes the smoothing that is folded into a model's last layer."""
+        along = np.linalg.inv(smoothing()) if self._meta["output"] == "direction" else np.eye(K)
+        return np.kron(along.T, np.eye(3))
 
     @contextmanager
     def _fits(self) -> Iterator[None]:

@@ -10,7 +10,7 @@ from torch import nn
 from neuralocks_core.onnx_graph import OnnxGraph
 from neuralocks_core.strands.strand_set import CLAMPED, K
 from neuralocks_core.training.autoencoder import StrandAutoencoder
-from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.networks import StrandNet, smoothing
 
 
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
@@ -32,7 +32,7 @@ def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -
     return {
         "encoder.onnx": _encoder_graph(encoder, into),
         "strand.onnx": _strand_graph(_folded(net.strand, net.strand_mean, net.strand_scale)),
-        "frame.onnx": _frame_graph(net),
+        "frame.onnx": _frame_graph(net, output),
         "tail.onnx": _tail_graph(net, output),
     }
 
@@ -99,7 +99,7 @@ def _strand_graph(layer) -> bytes:
     return graph.finish({"strand": ("S", len(layer[0]))}, {"strand_part": ("S", len(layer[1]))})
 
 
-def _frame_graph(net: StrandNet) -> bytes:
+def _frame_graph(net: StrandNet, output: str) -> bytes:
     """The body's part of the first layer, and the weights that a frame changes."""
     half = net.encoder is not None
     graph, layer = _Graph("frame"), _folded(net.frame, net.frame_mean, net.frame_scale, half)
@@ -122,11 +122,11 @@ def _frame_graph(net: StrandNet) -> bytes:
         for name, (plain, change) in changes.items():
             graph.node("Add", [f"{name}.deep", "one"], f"{name}.factor")
             graph.node("Add", [f"{name}.terms", "one"], f"{name}.weights")
-            free = _free(net) if name == "out" else np.float32(1)
+            read = _read_out(output) if name == "out" else np.eye(plain.out_features, dtype=np.float32)
             graph.half(f"{name}.to_terms", _array(change.to_terms))
-            graph.half(f"{name}.back", _array(change.back) * free)
+            graph.half(f"{name}.back", _array(change.back) @ read)
             terms = graph.node("Mul", [f"{name}.to_terms", f"{name}.weights"], f"{name}.weighed")
-            graph.half(f"{name}.plain", _array(plain) * free)
+            graph.half(f"{name}.plain", _array(plain) @ read)
             whole = graph.node(
                 "Add",
                 [f"{name}.plain", graph.node("MatMul", [terms, f"{name}.back"], f"{name}.change")],
@@ -147,11 +147,11 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
         inputs |= {"middle": (hidden, hidden), "out": (hidden, width)}
     else:
         graph.constant("middle", _array(net.middle))
-        graph.constant("out", _array(net.out) * _free(net))
+        graph.constant("out", _array(net.out) @ _read_out(output))
     value = graph.node("Relu", [graph.node("Add", ["strand_part", "frame_part"], "sum")], "first")
     bias = graph.constant("middle.bias", _weights(net.middle)[1])
     value = graph.node("Relu", [graph.node("Gemm", [value, "middle", bias], "linear")], "second")
-    graph.node("Gemm", [value, "out", graph.constant("out.bias", _weights(net.out)[1] * _free(net))], "offsets")
+    graph.node("Gemm", [value, "out", graph.constant("out.bias", _weights(net.out)[1] @ _read_out(output))], "offsets")
     graph.node("Sub", ["offsets", "anchor"], "change" if output == "direction" else "displacement")
     if output == "direction":
         _turned_edges(graph, width // 3)
@@ -183,9 +183,11 @@ def _turned_edges(graph: _Graph, count: int) -> None:
     graph.node("MatMul", [graph.node("Sub", [turned, "edges"], "turn"), "running"], "displacement")
 
 
-def _free(net: StrandNet) -> np.ndarray:
-    """One for each output that may move, zero for those of clamped vertices."""
-    return np.repeat(np.arange(net.out.out_features // 3) >= CLAMPED, 3).astype(np.float32)
+def _read_out(output: str) -> np.ndarray:
+    """(3 K, 3 K) float32, from the right: what `networks.deform` does to offsets before it uses them."""
+    along = smoothing() if output == "direction" else np.eye(K)
+    along[:CLAMPED] = 0
+    return np.kron(along.T, np.eye(3)).astype(np.float32)
 
 
 def _array(layer: nn.Linear) -> np.ndarray:

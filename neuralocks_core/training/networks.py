@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -20,6 +21,23 @@ RANKS = (64, 32)
 """Ranks of the matrices that a frame adds to the second layer's and to the output layer's."""
 HISTORY_SCALE = 0.25
 """The many history entries are scaled down by it after normalisation, or they drown the pose."""
+
+
+def smoothing() -> np.ndarray:
+    """(K, K) means of each vertex's offset and its neighbours' along the strand, a half and two quarters; clamped ones stay.
+
+    A network that is unsure answers the mean of what may be, which is shorter than any hair. Hair that keeps its length can
+    only be as short by zigzagging from edge to edge, which no such mean does.
+    """
+    matrix = np.eye(K)
+    for i in range(CLAMPED, K):
+        matrix[i, i] = 0.5
+        for j in (max(i - 1, CLAMPED), min(i + 1, K - 1)):
+            matrix[i, j] += 0.25
+    return matrix
+
+
+_SMOOTHING = torch.from_numpy(smoothing()).float()
 
 
 class StrandNet(nn.Module):
@@ -149,8 +167,8 @@ class LowRank(nn.Module):
 def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None, output: str = "direction") -> Tensor:
     """Displacement of the vertices that the network's offsets stand for.
 
-    `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)` and keeps its length, so stretch cannot happen
-    and hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest + o`.
+    `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)`, o smoothed along the strand, and keeps its length, so
+    stretch cannot happen and hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest + o`.
     The first CLAMPED vertices, 0 and 1, stay in both; zero offsets give exactly zero.
 
     Args:
@@ -172,6 +190,7 @@ def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None
         return torch.cat([clamped, offsets[..., CLAMPED:, :]], dim=-2)
     if output != "direction":
         raise ValueError(f"output: {output!r} is not one of {OUTPUTS}")
+    offsets = _SMOOTHING.to(offsets) @ offsets
     edges = rest[..., 1:, :] - rest[..., :-1, :]
     lengths = edges.square().sum(-1, keepdim=True).sqrt()
     turned = edges[..., 1:, :] + lengths[..., 1:, :] * offsets[..., CLAMPED:, :]
