@@ -2,8 +2,8 @@
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
 The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
-capital), parts by their usual names (limbs by `limb_shapes` where none is named like one, and by `limb_chains` where
-only the first joint is), and the trunk by hierarchy: the upper chest is where the ways from the head and from the arms
+capital), parts by their usual names (`limb_names`; by `limb_shapes` where none is named like one, and by `limb_chains`
+where only the first joint is), and the trunk by hierarchy: the upper chest is where the ways from the head and from the arms
 meet.
 """
 
@@ -13,20 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import find_joint, leaf, sides_and_keys
-from neuralocks_core.anatomy.limb_chains import WHOLE, below_first
+from neuralocks_core.anatomy.limb_chains import below_first
+from neuralocks_core.anatomy.limb_names import PARTS, ancestors, depth, named_limbs
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.errors import NeuralocksError
 
-PARTS = {
-    "shoulder": ("clavicle", "collar", "collarbone", "clav", "shoulder", "scapula"),
-    "upper_arm": ("upperarm", "uparm", "arm", "shldr", "humerus", "armupper", "armup"),
-    "lower_arm": ("lowerarm", "forearm", "lowarm", "elbow", "armlower", "loarm", "armlow"),
-    "hand": ("hand", "wrist"),
-    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "legup", "hip", "femur"),
-    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leglow", "leg"),
-    "foot": ("foot", "ankle"),
-    "eye": ("eye", "eyeball"),
-}
 TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 LIMBS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
@@ -114,7 +105,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     parts = {word for words in PARTS.values() for word in words}
     sides, keys = zip(*sides_and_keys([leaf(name) for name in names], parts), strict=True)
     for side in ("left", "right"):
-        for part, joint in _limbs(side, sides, keys, parents).items():
+        for part, joint in named_limbs(side, sides, keys, parents).items():
             put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
     put("head", *_find_head(names, sides, keys, parents, positions))
     if "head" not in joints:
@@ -125,57 +116,6 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     _find_trunk(joints, put, names, keys, parents)
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
-
-
-def _depth(joint: int, parents) -> int:
-    depth = 0
-    while parents[joint] >= 0:
-        joint, depth = parents[joint], depth + 1
-    return depth
-
-
-def _ancestors(joint: int, parents) -> list[int]:
-    way = []
-    while joint >= 0:
-        way.append(int(joint))
-        joint = parents[joint]
-    return way
-
-
-def _limbs(side, sides, keys, parents) -> dict[str, int]:
-    """The side's limb joints: of several with one name (upperarm01, upperarm02) the one nearest the root."""
-
-    def first(options):
-        for option in options:
-            hits = [i for i in range(len(keys)) if sides[i] == side and keys[i] == option]
-            if hits:
-                # `LHipJoint` over `LeftHip` is a mere socket at the pelvis: of several hips, the lowest is the thigh.
-                sign = -1 if option == "hip" else 1
-                return min(hits, key=lambda i: (sign * _depth(i, parents), i))
-        return None
-
-    found = {part: first(options) for part, options in PARTS.items()}
-    collar = first(("clavicle", "collar", "collarbone", "clav", "scapula"))
-    plain = first(("shoulder",))
-    if found["upper_leg"] is None and _numbered(found["lower_leg"], side, sides, keys, parents):
-        found["upper_leg"], found["lower_leg"] = found["lower_leg"], None
-    if found["upper_arm"] is None and plain is not None:
-        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no
-        # arm is named.
-        found["upper_arm"], found["shoulder"] = plain, collar
-    if found["upper_arm"] is None and found["lower_arm"] is not None and parents[found["lower_arm"]] >= 0:
-        found["upper_arm"] = int(parents[found["lower_arm"]])
-    if found["shoulder"] is not None and found["shoulder"] == found["upper_arm"]:
-        found["shoulder"] = None
-    return {part: joint for part, joint in found.items() if joint is not None}
-
-
-def _numbered(joint, side, sides, keys, parents) -> bool:
-    """Whether a joint is the first of a limb whose joints all have the limb's name: `leg_01` over `leg_02`."""
-    return joint is not None and any(
-        i != joint and keys[i] == keys[joint] in WHOLE and sides[i] == side and joint in _ancestors(i, parents)
-        for i in range(len(keys))
-    )
 
 
 def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
@@ -195,7 +135,7 @@ def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions) 
     """Arms where no arm, and legs where no leg was found."""
     lacking = [limb for limb in LIMBS if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))]
     if lacking:
-        found = limbs_by_shape(_ancestors(joints["head"], parents), parents, positions, sides)
+        found = limbs_by_shape(ancestors(joints["head"], parents), parents, positions, sides)
         for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
             lower = name.replace("upper", "lower")
             if lower != name and joints.get(lower) == joint and reasons[lower] != BY_HAND:
@@ -206,7 +146,7 @@ def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions) 
 def _find_head(names, sides, keys, parents, positions):
     def score(i):
         key = keys[i]
-        return (key != "head", not key.endswith("head"), _depth(i, parents), i)
+        return (key != "head", not key.endswith("head"), depth(i, parents), i)
 
     def beside_head(i):
         """Tails of hair hang from necks too: the head is in the middle, and farthest along the neck."""
@@ -224,25 +164,25 @@ def _find_head(names, sides, keys, parents, positions):
         return best, f"by name '{leaf(names[best])}'"
     necks = [i for i in range(len(keys)) if "neck" in keys[i] and not sides[i]]
     if necks:
-        neck = max(necks, key=lambda i: _depth(i, parents))
+        neck = max(necks, key=lambda i: depth(i, parents))
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
             return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
     # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
-        best = max(spine, key=lambda i: _depth(i, parents))
+        best = max(spine, key=lambda i: depth(i, parents))
         return best, f"last joint of the spine '{leaf(names[best])}'"
     return None, ""
 
 
 def _find_trunk(joints, put, names, keys, parents) -> None:
-    head_way = _ancestors(joints["head"], parents)
+    head_way = ancestors(joints["head"], parents)
 
     def meet(*others):
         shared = set(head_way)
         for other in others:
-            shared &= set(_ancestors(other, parents))
+            shared &= set(ancestors(other, parents))
         return next((joint for joint in head_way if joint in shared and joint != joints["head"]), None)
 
     arms = [joints[n] for n in ("left_upper_arm", "right_upper_arm") if n in joints]

@@ -69,8 +69,8 @@ def without_namespace(name: str) -> str:
 
 
 def words(name: str) -> list[str]:
-    """Words of a name in lower case, without numbers."""
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+    """Words of a name in lower case, without numbers; Motive's `LUArm` and `LFArm` have one letter for the side."""
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[LR](?=[UF]Arm)|[A-Z]+(?![a-z])", name)]
 
 
 def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:

@@ -5,7 +5,8 @@ import numpy as np
 
 WHOLE = ("arm", "leg")
 """Names of a whole limb, whose joints are numbered along it. Joints numbered by another name part one bone."""
-_PARTS_OF_A_BONE = ("twist", "roll")
+PARTS_OF_A_BONE = ("twist", "roll")
+"""Words of joints between the two ends of one bone."""
 _APART = 1e-6
 """Joints nearer to each other than this share of the skeleton's size are at one place."""
 
@@ -41,7 +42,7 @@ def _next(joint: int, end: int | None, keys, parents, at: np.ndarray | None, tak
         return float(depth[other] if at is None else np.linalg.norm(at[other] - at[joint]))
 
     def begins_a_bone(other: int) -> bool:
-        part = any(word in keys[other] for word in _PARTS_OF_A_BONE)
+        part = any(word in keys[other] for word in PARTS_OF_A_BONE)
         return not part and other not in taken and reach(other) > least
 
     numbered = [other for other in depth if keys[other] == keys[joint] and begins_a_bone(other)]

@@ -197,6 +197,36 @@ RIGS = {
             "left_eye": "左目",
         },
     ),
+    "Motive": (
+        "Hip\n Ab\n  Chest\n   Neck\n    Head\n   LShoulder\n    LUArm\n     LFArm\n      LHand\n   RShoulder\n    RUArm\n"
+        "     RFArm\n LThigh\n  LShin\n RThigh",
+        {
+            "upper_chest": "Chest",
+            "left_shoulder": "LShoulder",
+            "left_upper_arm": "LUArm",
+            "left_lower_arm": "LFArm",
+            "left_hand": "LHand",
+            "right_upper_arm": "RUArm",
+        },
+    ),
+    "a bicep between shoulder and elbow": (
+        "hips\n chest\n  neck\n   head\n  l_shoulder\n   l_bicep\n    l_bicep_twist\n     l_elbow\n      l_wrist\n  r_shoulder",
+        {
+            "left_shoulder": "l_shoulder",
+            "left_upper_arm": "l_bicep",
+            "left_lower_arm": "l_elbow",
+            "left_hand": "l_wrist",
+        },
+    ),
+    "a shoulder that is the arm, in parts": (
+        "hips\n chest\n  neck\n   head\n  Shoulder_L\n   ShoulderPart1_L\n    Twist_L\n     Elbow_L\n  Shoulder_R\n   Elbow_R",
+        {"left_upper_arm": "Shoulder_L", "left_lower_arm": "Elbow_L", "right_upper_arm": "Shoulder_R"},
+    ),
+    "3ds Max CAT": (
+        "CATRigPelvis\n CATRigSpine1\n  CATRigRibcage\n   CATRigNeck1\n    CATRigHead\n   CATRigLArmCollarbone\n    CATRigLArm1\n"
+        "     CATRigLArm2\n      CATRigLArmPalm\n   CATRigRArmCollarbone\n    CATRigRArm1",
+        {"left_shoulder": "CATRigLArmCollarbone", "left_upper_arm": "CATRigLArm1", "left_lower_arm": "CATRigLArm2"},
+    ),
 }
 
 
