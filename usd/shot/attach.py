@@ -79,16 +79,17 @@ def attach(
     bound = bound_skeleton(prim)
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
-        joint, why, shares = _by_own_binding(prim, rig)
-        notes += _spread(rig, path, joint, shares)
+        to_bind = rig.to_bind @ geom_bind(prim)
+        turned = upside_down(prim, rig, to_bind)
+        joint, why, shares = _by_own_binding(prim, rig, last=bool(turned))
+        notes += turned or _spread(rig, path, joint, shares)
         found = Attachment(
             rig=rig,
             character=_carried_by(rig, joint),
-            to_bind=rig.to_bind @ geom_bind(prim),
+            to_bind=to_bind,
             how=f"{why} (its own skel binding)",
             skinned=True,
         )
-        notes += upside_down(prim, rig, found.to_bind)
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
         if seats:
@@ -143,10 +144,13 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
     # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
     seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
+    turned = upside_down(prim, seat.rig, seat.to_bind)
+    if turned:  # its tips may lie on shoulders
+        seat = find_seat(prim, seat.rig, placement, NEAR, last=True) or seat
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
-    notes += _spread(rig, path, joint, shares) + moved_away(path, rig, seat.roots)
+    notes += (turned or _spread(rig, path, joint, shares)) + moved_away(path, rig, seat.roots)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
     return Attachment(rig, _carried_by(rig, joint), seat.to_bind, how, False, at_default)
@@ -204,13 +208,14 @@ def _trunk(rig: StageRig) -> float:
     return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
 
 
-def _by_own_binding(prim: Usd.Prim, rig: StageRig) -> tuple[int, str, np.ndarray]:
-    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in its roots.
+def _by_own_binding(prim: Usd.Prim, rig: StageRig, last: bool = False) -> tuple[int, str, np.ndarray]:
+    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in its roots, which are
+    the strands' `last` points where these run from tip to root.
 
     What hangs farther down is weighted as a rigger would have it move without simulation, by the chest or an arm.
     """
     indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
-    roots = ends(prim)
+    roots = ends(prim, last=last)
     shares = _shares(rig, indices[roots], weights[roots])
     return *_carrier(rig, shares, exact=True), shares
 

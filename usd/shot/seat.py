@@ -59,12 +59,13 @@ class Seat:
         return self.tree.query(self.roots)[1]
 
 
-def find_seat(prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf) -> Seat | None:
-    """A groom on a rig's nearest skin; None where the rig has no skin, or none `within` so far [m]."""
-    roots, beyond = [some_ends(prim)], beyond_ends(prim)
-    if beyond is not None:
-        roots.append(some_ends(prim, beyond=beyond))
-    seats = [_find_seat(each, moment(prim), rig, placement, within) for each in roots]
+def find_seat(
+    prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf, *, last: bool = False
+) -> Seat | None:
+    """A groom on a rig's nearest skin, by its strands' first or last points; None where the rig has no skin, or none `within`
+    so far [m].
+    """
+    seats = [_find_seat(roots, moment(prim), rig, placement, within) for roots in either_ends(prim, last=last)]
     return min((seat for seat in seats if seat is not None), key=lambda seat: seat.distance, default=None)
 
 
@@ -79,6 +80,12 @@ def off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
     """Distance of points (n, 3) of a prim from the nearest skin of a rig that has some, in the median [m]."""
     far = [tree.query(transformed(points, to_bind))[0] for tree in rig.skins]
     return float(np.median(np.min(far, axis=0)))
+
+
+def either_ends(prim: Usd.Prim, *, last: bool = False) -> list[np.ndarray]:
+    """`some_ends` of all points and, where some lie beyond the drawn ones, of the drawn."""
+    beyond = beyond_ends(prim)
+    return [some_ends(prim, last=last, beyond=each) for each in ([None] if beyond is None else [None, beyond])]
 
 
 def _find_seat(

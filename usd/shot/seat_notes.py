@@ -5,13 +5,20 @@ import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.rotation import transformed
+
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .curve_ends import Beyond
-from .seat import NEAR, find_seat, off_skin, some_ends
+from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends
 
 MOVES = 0.002
 """Skin that blend shapes move by less [m] stays with its roots."""
+TOUCHES = 0.003
+"""Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
+LEVEL = 0.001
+"""Points nearer to skin than this [m] are all alike: skins are only as smooth as their triangles."""
 
 
 def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
@@ -30,13 +37,42 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     """The note on strands whose last points lie on skin while their first ones do not."""
     if not rig.skins:
         return []
-    roots = off_skin(some_ends(prim), rig, to_bind)
-    if roots <= NEAR or off_skin(some_ends(prim, last=True), rig, to_bind) > NEAR:
+    first, last = (off_skin(some_ends(prim, last=last), rig, to_bind) for last in (False, True))
+    if (
+        first <= NEAR
+    ):  # most hair's last points are much farther from the skin's own, and it is not measured more exactly
+        first = _turned_round(prim, rig, to_bind) if last <= CLEARLY * first else 0.0
+    if last > NEAR or not first:
         return []
     return [
         f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "
-        f"their first ones {roots:.2g} m away; reverse the strands"
+        f"their first ones {first:.2g} m away; reverse the strands"
     ]
+
+
+def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
+    """How far above skin the first points of hair near to it lie [m]; 0 unless its last ones are clearly its roots.
+
+    Short hair is near to skin all along, and the tips of long hair lie on shoulders. These do not follow the head, so where
+    only one end of the strands does, that is rather their root.
+    """
+    body, head = rig.character.body, rig.character.humanoid.get("head")
+    surface, vertices = Collider(body.points, body.triangles), cKDTree(body.points)
+    on_head = np.zeros(len(body.points))
+    if head is not None:
+        on_head = (body.joint_weights * rig.character.skeleton.below(head)[body.joint_indices]).sum(axis=1)
+
+    def told(last: bool) -> tuple[float, float]:
+        """Distance [m] and share on the head; roots that begin inside of skin are on it."""
+        ends = [transformed(points, to_bind) for points in either_ends(prim, last=last)]
+        far = [surface.distance(points)[0] for points in ends]
+        middle = min(float(np.median(abs(each) if last else each.clip(0))) for each in far)
+        return middle, float(on_head[vertices.query(ends[-1])[1]].mean())
+
+    (first, first_on_head), (last, last_on_head) = told(last=False), told(last=True)
+    gained = last_on_head - first_on_head
+    least = CLEARLY * (max(last, LEVEL) if gained > 0.5 else TOUCHES)
+    return first if last <= TOUCHES and first > least and gained > -0.2 else 0.0
 
 
 def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool, beyond: Beyond | None) -> list[str]:

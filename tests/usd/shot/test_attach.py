@@ -230,19 +230,6 @@ def test_a_groom_of_another_unit_than_the_stage_is_told_so(tmp_path):
         read_shot(path)
 
 
-@pytest.mark.parametrize("bound", ["own", "mesh"])
-def test_strands_from_tip_to_root_are_told(tmp_path, bound):
-    path = write_shot(tmp_path, Recipe(bound=bound))
-    assert not any("from tip to root" in note for note in read_shot(path).notes)
-    stage = Usd.Stage.Open(str(path))
-    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
-    strands = np.array(points.Get()).reshape(40, -1, 3)
-    points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands[:, ::-1].reshape(-1, 3))))
-    stage.Save()
-    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
-        assert sum("from tip to root" in note for note in notes) == 1
-
-
 def test_blend_shapes_under_and_on_a_groom_are_told(tmp_path):
     """Skin that a face moves away below the roots, and shapes of the groom's own, which a bake leaves out."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Strands that run from tip to root are told, and no others."""
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, Vt
+
+from usd.review.inspect import inspect
+from usd.shot.stage import read_shot
+
+from ..shots import CENTRE, RADIUS, Recipe, write_shot
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_strands_from_tip_to_root_are_told(tmp_path, bound):
+    path = write_shot(tmp_path, Recipe(bound=bound))
+    assert not any("from tip to root" in note for note in read_shot(path).notes)
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    strands = np.array(points.Get()).reshape(40, -1, 3)
+    points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands[:, ::-1].reshape(-1, 3))))
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        assert sum("from tip to root" in note for note in notes) == 1
+
+
+def _from_to(path, roots: tuple, tips: tuple, *, turned: bool) -> list[str]:
+    """The notes on straight strands between two balls, each given as a centre and a radius [m], whichever end comes first."""
+    side = np.random.default_rng(3).normal(size=(40, 3))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    begin, end = (np.array(centre) + radius * side for centre, radius in (roots, tips))
+    strands = begin[:, None] + np.linspace(0, 1, 12)[:, None] * (end - begin)[:, None]
+    stage = Usd.Stage.Open(str(path))
+    points = np.ascontiguousarray((strands[:, ::-1] if turned else strands).reshape(-1, 3), np.float32)
+    UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points))
+    stage.Save()
+    shot = read_shot(path)
+    assert set(shot.notes) == set(inspect(path)["spoils"])
+    assert shot.grooms[0].joint.endswith("head")
+    return [note for note in shot.notes if note.startswith("/Hero/Hair")]
+
+
+def test_short_strands_and_those_with_tips_on_the_chest_are_told_too(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    scalp, chest = (CENTRE, RADIUS), ((0, 1.3, 0), 0.16)
+    for tips in ((CENTRE, RADIUS + 0.02), chest):
+        notes = _from_to(path, scalp, tips, turned=True)
+        assert len(notes) == 1 and "from tip to root" in notes[0], notes
+        assert not _from_to(path, scalp, tips, turned=False)
+
+
+def test_hair_that_touches_skin_with_its_tips_is_not_taken_for_turned_round(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    above, pressed, on_chest = (CENTRE, RADIUS + 0.008), (CENTRE + [0, 0.005, 0], RADIUS), ((0, 1.3, 0), 0.15)
+    for roots, tips in (((CENTRE, RADIUS), pressed), ((CENTRE, RADIUS - 0.01), pressed), (above, on_chest)):
+        assert not _from_to(path, roots, tips, turned=False)
