@@ -15,7 +15,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 
 LABELS = {
-    "stretch_percent": ("length error, mean", "%", "of a strand's rest length"),
+    "stretch_percent": ("length error, mean", "%", "of a strand's rest length, in head space"),
     "stretch_percent_max": ("length error, largest", "%", ""),
     "stretch_cm": ("stretch violation", "cm", "mean over strands"),
     "penetration_percent": ("vertices in the body", "%", "deeper than at rest"),

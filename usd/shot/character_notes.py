@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a character as it was bound: whether it stands, has a body, and one of a size that a network knows."""
+"""Notes on a character: whether it stands as it was bound, has a body, and one of a size that a network knows; and whether it
+is scaled evenly.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.anatomy.standing import lies
 from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
 from neuralocks_core.rotation import transformed
@@ -22,6 +25,9 @@ SOME = 20
 FARTHER = 0.5
 """A measure that lies farther outside what was trained, in spans of that, is told: rigs put the joint of one and the same head a
 little higher or lower, and in hair that hardly shows."""
+
+UNEVEN = 1.02
+"""Hair that is stretched so many times more along one axis than along another is told: its strands change their lengths."""
 
 
 def lies_down(rig: StageRig) -> list[str]:
@@ -51,6 +57,31 @@ def untrained(rig: StageRig) -> list[str]:
         f"{rig.path}: {', '.join(each)}; a network draws its hair as if that were the nearest trained; if it shows, train a "
         "model on this character; if a hat or the like is one piece with its skin, part them"
     ]
+
+
+def unevenly_scaled(rig: StageRig) -> list[str]:
+    """The note on what carries hair and stretches it more along one axis than along another in any frame.
+
+    What scales the whole character is in its bind pose, too, so that hair is stretched as far as its head turns in it.
+    """
+    ratio = _unevenness(rig.character.carrying(rig.clip.joints))
+    frame = int(ratio.round(4).argmax())  # the first of those that are alike
+    if ratio[frame] < UNEVEN:
+        return []
+    code = rig.time_codes[frame]
+    placed = _unevenness(rig.source.placement.at(code)) >= UNEVEN
+    what = "it or a prim above it" if placed else f"joint '{leaf(rig.source.names[rig.character.carrying_joint])}'"
+    return [
+        f"{rig.path}: {what} is scaled unevenly and stretches its hair, at time code {code:g} by {ratio[frame] - 1:.0%} more along "
+        "one axis than along another: strands keep their lengths before that, not in the world; scale it evenly if that shows"
+    ]
+
+
+def _unevenness(transforms: np.ndarray) -> np.ndarray:
+    """The largest scale of transforms (..., 4, 4) over the smallest; 1 where that is zero, which is told elsewhere."""
+    sizes = np.linalg.svd(transforms[..., :3, :3], compute_uv=False)
+    largest, smallest = sizes[..., 0], sizes[..., 2]
+    return np.divide(largest, smallest, out=np.ones_like(largest), where=smallest > 1e-9)
 
 
 def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[str]:

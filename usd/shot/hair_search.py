@@ -9,7 +9,7 @@ from pxr import Usd
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .attach import Attachment, attach, of_another
-from .character_notes import untrained
+from .character_notes import unevenly_scaled, untrained
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
 from .other_curves import other_hair
@@ -78,9 +78,8 @@ class HairSearch:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
-        self._notes += (
-            moved_as_open(prim) + left_as_they_are(prim) + untrained(replace(found.rig, character=found.character))
-        )
+        carrying = replace(found.rig, character=found.character)
+        self._notes += moved_as_open(prim) + left_as_they_are(prim) + untrained(carrying) + unevenly_scaled(carrying)
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

@@ -5,7 +5,7 @@ nor unit.
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.review.inspect import inspect
 from usd.rig.stage import rigged_notes
@@ -153,3 +153,22 @@ def test_a_joint_of_two_meanings_is_told(tmp_path):
         for notes in (read_shot(path, joints=joints).notes, inspect(path, joints=joints)["spoils"]):
             said = [note for note in notes if "at once" in note]
             assert said == [f"/Hero/Rig: joint 'head' is {each} at once; check --joint and --head" for each in told]
+
+
+@pytest.mark.parametrize("uneven", [None, "character", "head", "arm_L"])
+def test_hair_that_is_scaled_unevenly_is_told(tmp_path, uneven):
+    """For its strands then change their lengths in the world; an even scale is as it should be."""
+    scale = np.diag([1.05, 0.95, 1.05, 1] if uneven == "character" else [0.6, 0.6, 0.6, 1])
+    path = write_shot(tmp_path, Recipe(place=scale))
+    if uneven in ("head", "arm_L"):
+        stage = Usd.Stage.Open(str(path))
+        animation = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+        names = [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()]
+        animation.GetScalesAttr().Set([Gf.Vec3h(1.2, 0.75, 1.2) if name == uneven else Gf.Vec3h(1) for name in names])
+        stage.Save()
+    words = {
+        "character": "it or a prim above it is scaled unevenly and stretches its hair, at time code 9 by 6% more",
+        "head": "joint 'head' is scaled unevenly and stretches its hair, at time code 1 by 60% more",
+    }.get(uneven)
+    said = _said(path, "along one axis")
+    assert len(said) == (words is not None) and all(words in note for note in said)
