@@ -6,6 +6,7 @@ from pxr import Usd
 from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
@@ -57,7 +58,11 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     only one end of the strands does, that is rather their root.
     """
     body, head = rig.character.body, rig.character.humanoid.get("head")
-    surface, vertices = Collider(body.points, body.triangles), cKDTree(body.points)
+    try:
+        surface = Collider(body.points, body.triangles)
+    except NeuralocksError:  # a mesh of points alone: no more can be said than how far these are
+        return 0.0
+    vertices = cKDTree(body.points)
     on_head = np.zeros(len(body.points))
     if head is not None:
         on_head = (body.joint_weights * rig.character.skeleton.below(head)[body.joint_indices]).sum(axis=1)

@@ -54,3 +54,13 @@ def test_hair_that_touches_skin_with_its_tips_is_not_taken_for_turned_round(tmp_
     above, pressed, on_chest = (CENTRE, RADIUS + 0.008), (CENTRE + [0, 0.005, 0], RADIUS), ((0, 1.3, 0), 0.15)
     for roots, tips in (((CENTRE, RADIUS), pressed), ((CENTRE, RADIUS - 0.01), pressed), (above, on_chest)):
         assert not _from_to(path, roots, tips, turned=False)
+
+
+def test_skin_without_faces_tells_nothing_of_short_strands(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh.Get(stage, "/Hero/Skin")
+    mesh.GetFaceVertexCountsAttr().Set([])
+    mesh.GetFaceVertexIndicesAttr().Set([])
+    stage.Save()
+    assert not _from_to(path, (CENTRE, RADIUS), (CENTRE, RADIUS + 0.01), turned=True)
