@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
-from neuralocks_core.rig.network import RigSampler
+from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rotation import rotation_part, to_quaternion
 
 from .hidden import FLAT
@@ -73,11 +73,10 @@ class LiveBones:
     def follow(self, character: Character, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
         if getattr(self, "_clip", None) is not clip:
-            self._clip, self._sampler = clip, RigSampler(self.model.spec, character, clip)
+            self._clip, self._carried = clip, CarriedHair(self.model, self.joints, character, clip)
 
     def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
         """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are
         the poses drawn.
         """
-        turns = self.model.evaluate(self._sampler.features(times, strength, joints))
-        return self.model.chains.turns_on(self.chains, turns)
+        return self.model.chains.turns_on(self.chains, self._carried.turns(times, strength, joints))

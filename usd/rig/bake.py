@@ -13,9 +13,10 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
+from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import NoHairChains
-from neuralocks_core.rig.network import RigModel, RigSampler
+from neuralocks_core.rig.network import RigModel
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
@@ -102,15 +103,15 @@ def bake_rig(
     wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
     codes = _with_samples(hair, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
-    sampler = RigSampler(model.spec, hair.source.character, clip)
-    turns = _turns(hair, model, clip, sampler, codes, strength, progress)
+    carried = CarriedHair(model, moved, hair.source.character, clip)
+    turns = _turns(hair, carried, clip, codes, strength, progress)
     notes = [
         *_renamed(trained, model.chains),
         *_resized(source.path, size),
         *rigged_notes(hair.source, model.spec.pose_joints),
         *_name_notes(source),
         *mirrored_notes(hair.source, hair.rig.chains),
-        *_held(hair, turns),
+        *_held(hair, carried.carriers, turns),
     ]
     if strength != 1 and not model.dynamic:
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
@@ -156,19 +157,19 @@ def _named_otherwise(shot, chains: HairChains, given: dict) -> HairChains | None
     return None if named is chains else named
 
 
-def _held(hair: RiggedHair, turns: np.ndarray) -> list[str]:
-    """The note on a head that is held still.
+def _held(hair: RiggedHair, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
+    """The note on a head that is held still, with all else that carries hair.
 
     Raises:
         NeuralocksError: it is held as it was bound, so that no hair would move; or USD ignores its animation.
     """
     source, character, joints = hair.source.source, hair.source.character, hair.source.clip.joints
-    if np.ptp(joints[:, character.head], axis=0).max() >= 1e-7:
+    if np.ptp(joints[:, carriers], axis=0).max() >= 1e-7:
         return []
     if source.ignored:
         raise NeuralocksError(source.ignored)
     name = leaf(character.skeleton.names[character.head])
-    turned = np.abs(character.carrying(joints[0])[:3, :3] - np.eye(3)).max()
+    turned = np.abs((joints[0, carriers] @ character.inverse_bind[carriers])[:, :3, :3] - np.eye(3)).max()
     if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
         raise NeuralocksError(
             f"{hair.source.path}: its head joint '{name}' is not animated, so the hair would not move; "
@@ -207,18 +208,19 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
     return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
 
 
-def _turns(hair, model, clip, sampler, codes, strength, progress) -> np.ndarray:
+def _turns(hair, carried, clip, codes, strength, progress) -> np.ndarray:
     """Turns of the hair joints (T, N, 4) wxyz in their own bind axes, those of the shot's rig."""
-    turns = np.empty((len(codes), len(model.chains), 4))
+    chains = carried.model.chains
+    turns = np.empty((len(codes), len(chains), 4))
     for row, code in enumerate(codes):
         # One at a time: a matrix product may round otherwise for other batches.
         second = hair.border.seconds([code])
         wrapped = clip.loop and not clip.start <= second[0] <= clip.end
         shown = clip.at(second) if wrapped else hair.source.joints_at(code)[None]
-        turns[row] = model.evaluate(sampler.features(second, strength, shown)[0])
+        turns[row] = carried.turns(second, strength, shown)[0]
         if progress:
             progress(row + 1, len(codes), "hair joints")
-    return model.chains.turns_on(hair.rig.chains, turns)
+    return chains.turns_on(hair.rig.chains, turns)
 
 
 def _name_notes(source) -> list[str]:

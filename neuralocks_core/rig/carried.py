@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How hair joints turn in a clip, each chain as what carries it moves: the head, or a bone of a hat between the two."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig.network import RigModel, RigSampler
+from neuralocks_core.rotation import angle_between, rotation_part, volumes
+
+TURNED = np.radians(0.5)
+"""A carrier that is turned against the head by no more [rad] all the while is one with it, and so is one that is shifted by no
+more than `SHIFTED`: files round."""
+SHIFTED = 0.002
+"""[m]."""
+
+
+class CarriedHair:
+    """The turns of a model's joints on one character in one clip.
+
+    A chain below a bone that moves against the head hangs as if that bone were the head: gravity, motion and neck are read as
+    they are seen from it.
+
+    Args:
+        model: the network.
+        joints: where its joints are in the skeleton, (N,).
+        character: skeleton and head.
+        clip: its motion.
+
+    Attributes:
+        carriers: the joints as whose motion chains move, ascending.
+    """
+
+    def __init__(self, model: RigModel, joints: np.ndarray, character: Character, clip: Clip):
+        chains, above = model.chains, character.skeleton.parents[joints]
+        apart = {int(joint) for joint in above[chains.roots] if _moves_apart(character, clip, int(joint))}
+        carrier = np.array([above[root] if above[root] in apart else character.head for root in chains.roots])
+        self.model, self.carriers = model, np.unique(carrier)
+        self._parts = [
+            (carrier[chains.chain] == one, RigSampler(model.spec, _carried_by(character, one), clip))
+            for one in self.carriers
+        ]
+
+    def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+        """Turns (n, N, 4) wxyz float32 in the model's bind axes; the arguments are those of `RigSampler.features`."""
+        result = np.empty((np.size(times), len(self.model.chains), 4), np.float32)
+        for rows, sampler in self._parts:
+            result[:, rows] = self.model.evaluate(sampler.features(times, strength, joints))[:, rows]
+        return result
+
+
+def _carried_by(character: Character, joint: int) -> Character:
+    return character if joint == character.head else replace(character, carrier=int(joint))
+
+
+def _moves_apart(character: Character, clip: Clip, joint: int) -> bool:
+    """Whether a joint ever lies otherwise on the head than in the bind pose. One that a scale of zero hides, or that is
+    mirrored, has no turn to read; the head's serves.
+    """
+    linear = clip.joints[:, joint, :3, :3]
+    if joint == character.head or np.linalg.norm(linear, axis=-2).min() < 1e-9 or (volumes(linear) <= 0).any():
+        return False
+    head, own = character.carrying(clip.joints), _carried_by(character, joint).carrying(clip.joints)
+    shift = clip.joints[:, joint, :3, 3] - (head @ character.skeleton.bind[joint, :, 3])[:, :3]
+    turn = angle_between(rotation_part(head, "animation"), rotation_part(own, "animation"))
+    return bool(turn.max() > TURNED or np.linalg.norm(shift, axis=1).max() > SHIFTED)

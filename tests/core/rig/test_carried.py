@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair below a bone that moves on the head, as a hat's does, hangs as that bone moves."""
+
+import numpy as np
+import pytest
+
+from neuralocks_core.character import Skeleton
+from neuralocks_core.motion import Clip
+from neuralocks_core.rig import RigModel, RigSampler, find_chains, rig_spec
+from neuralocks_core.rig.carried import CarriedHair
+from neuralocks_core.rig.network import feature_columns, input_limits
+from neuralocks_core.rotation import from_vector
+from tests.core.rig.builders import character, tail
+
+TIMES = np.linspace(0, 2, 61)
+NODDING = np.outer(0.6 * np.sin(4 * TIMES), [1.0, 0.3, 0.0])
+
+
+def rig(dynamic=True):
+    """A head with a hat, a tail on each, and a network of random weights; the joints of head, hat and hair."""
+    hat = [("hat", "head", (0, 1.7, 0))]
+    who = character(hat + tail("own_hair") + tail("hat_hair", parent="hat", at=(0, 1.65, -0.15)))
+    chains, spec, rng = find_chains(who, patterns=["*_hair_1"]), rig_spec(dynamic), np.random.default_rng(0)
+    size, layers = len(feature_columns(spec)), []
+    for out in (16, 3 * len(chains)):
+        layers.append((rng.normal(0, 0.5 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
+        size = out
+    return who, RigModel(chains, spec, tuple(layers), input_limits(spec))
+
+
+def clip(skeleton: Skeleton, joint: str, vectors: np.ndarray, pivot: str) -> Clip:
+    """What hangs from a joint turns by rotation vectors (61, 3) about where another joint is."""
+    names = [name.rsplit("/", 1)[-1] for name in skeleton.names]
+    place = skeleton.bind[names.index(pivot), :3, 3]
+    move = np.tile(np.eye(4), (len(TIMES), 1, 1))
+    move[:, :3, :3] = from_vector(vectors)
+    move[:, :3, 3] = place - move[:, :3, :3] @ place
+    joints = np.tile(skeleton.bind, (len(TIMES), 1, 1, 1))
+    below = skeleton.below(names.index(joint))
+    joints[:, below] = move[:, None] @ joints[:, below]
+    return Clip(TIMES, joints)
+
+
+@pytest.mark.parametrize("dynamic", [True, False])
+def test_a_hat_carries_its_hair_as_a_head_would(dynamic):
+    """The head's own tail stays as it is on a still head."""
+    who, model = rig(dynamic)
+    hats = np.array(["hat" in name for name in model.chains.names])
+    nods, tips, still = (
+        CarriedHair(model, model.chains.joints, who, clip(who.skeleton, joint, vectors, "head")).turns(TIMES)
+        for joint, vectors in (("head", NODDING), ("hat", NODDING), ("hat", 0 * NODDING))
+    )
+    assert np.abs(tips[:, hats] - nods[:, hats]).max() < 1e-6 < 0.01 < np.ptp(nods[:, hats], axis=0).max()
+    assert (tips[:, ~hats] == still[:, ~hats]).all()
+
+
+@pytest.mark.parametrize("degrees", [0, 0.2])
+def test_a_hat_that_stays_on_the_head_changes_no_bit(degrees):
+    """Up to what files round; the head itself nods."""
+    who, model = rig()
+    nods, slips = (
+        clip(who.skeleton, "head", NODDING, "head"),
+        clip(who.skeleton, "hat", NODDING * np.radians(degrees), "hat"),
+    )
+    motion = Clip(TIMES, nods.joints @ np.linalg.inv(who.skeleton.bind) @ slips.joints)
+    plain = model.evaluate(RigSampler(model.spec, who, motion).features(TIMES))
+    carried = CarriedHair(model, model.chains.joints, who, motion)
+    assert (carried.turns(TIMES) == plain).all() and carried.carriers.tolist() == [who.head]
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0])
+def test_a_hat_without_a_turn_leaves_its_hair_to_the_head(scale):
+    """It is hidden by a scale of zero, or mirrored."""
+    who, model = rig()
+    motion = clip(who.skeleton, "hat", NODDING, "hat")
+    hat = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("hat")
+    motion.joints[20:, hat, :3, :3] *= scale
+    assert CarriedHair(model, model.chains.joints, who, motion).carriers.tolist() == [who.head]
