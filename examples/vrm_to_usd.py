@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bring a VRM or glTF avatar to USD with Blender's own importer and exporter.
+"""Bring a VRM or glTF avatar to USD with Blender's own importer and exporter, with the first of its animations if it has any.
 
     python examples/vrm_to_usd.py avatar.vrm -o avatar.usdc     (in a Python that has bpy: pip install bpy)
 
@@ -9,9 +9,9 @@ of Blender's files are the pose at the first frame; bind transforms are right, a
 
 import argparse
 import json
-import re
-import shutil
+import math
 import struct
+import sys
 import tempfile
 from pathlib import Path
 
@@ -21,29 +21,78 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("avatar", type=Path)
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--fps", type=int, default=30, help="frames a second of the animation; 30")
     options = parser.parse_args()
+    scene, rest = read(options.avatar)
+    name_apart(scene)
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = options.fps  # glTF has seconds, of which the importer makes frames
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "avatar.glb"  # the importer goes by the extension
-        shutil.copyfile(options.avatar, copy)
+        copy.write_bytes(packed(scene, rest))
         bpy.ops.import_scene.gltf(filepath=str(copy))
-    for shape in [o for o in bpy.data.objects if o.type == "MESH" and not o.modifiers]:
+    drawn = {bone.custom_shape for thing in bpy.data.objects if thing.pose for bone in thing.pose.bones} - {None}
+    for shape in drawn:
         bpy.data.objects.remove(shape)  # the importer's own drawing of bones
-    bpy.ops.wm.usd_export(filepath=str(options.out), export_armatures=True, only_deform_bones=False, allow_unicode=True)
-    print(" ".join(f"--chains {name}" for name in spring_bone_names(options.avatar)))
+    animated = set_range(bpy, bpy.context.scene)
+    if left := [each.get("name", "one without a name") for each in scene.get("animations", ())[1:]]:
+        print(f"{options.avatar}: animations left out: {', '.join(left)}", file=sys.stderr)
+    bpy.ops.wm.usd_export(
+        filepath=str(options.out),
+        export_armatures=True,
+        only_deform_bones=False,
+        allow_unicode=True,
+        export_animation=animated,
+    )
+    print(" ".join(f"--chains {name}" for name in spring_bone_names(scene)))
 
 
-def spring_bone_names(path: Path) -> list[str]:
-    """Names, as Blender writes them to USD, of the joints that a VRM 0.x or 1.0 file's spring bones below the head start
-    from; none for plain glTF.
+def set_range(bpy, scene) -> bool:
+    """Give the scene the frames of what is animated in it; False where nothing is."""
+    moved = [thing.animation_data for thing in (*bpy.data.objects, *bpy.data.shape_keys)]
+    ranges = [each.action.frame_range for each in moved if each and each.action]
+    if ranges:
+        scene.frame_start = math.floor(min(first for first, _ in ranges) + 1e-3)
+        scene.frame_end = math.ceil(max(last for _, last in ranges) - 1e-3)
+    return bool(ranges)
+
+
+def read(path: Path) -> tuple[dict, bytes]:
+    """A binary glTF file's JSON, and all that comes after it."""
+    data = path.read_bytes()
+    magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data.ljust(20))
+    if magic != b"glTF" or kind != b"JSON" or 20 + length > len(data):
+        sys.exit(f"{path}: is no binary glTF file (.glb, .vrm); export it as such")
+    return json.loads(data[20 : 20 + length]), data[20 + length :]
+
+
+def packed(scene: dict, rest: bytes) -> bytes:
+    """A binary glTF file of what `read` gave."""
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+
+
+def name_apart(scene: dict) -> None:
+    """Give all nodes names that USD takes as they are, no two the same: glTF allows equal ones, and Blender numbers those
+    itself.
     """
-    with open(path, "rb") as file:
-        magic, _, _, length, kind = struct.unpack("<4sIII4s", file.read(20))
-        if magic != b"glTF" or kind != b"JSON" or length > path.stat().st_size:
-            return []
-        scene = json.loads(file.read(length))
+    taken = set()
+    for node in scene.get("nodes", ()):
+        safe = "".join(letter if f"_{letter}".isidentifier() else "_" for letter in node.get("name") or "node")
+        name = safe = safe if safe.isidentifier() else f"_{safe}"
+        number = 1
+        while name in taken:
+            number += 1
+            name = f"{safe}_{number}"
+        taken.add(name)
+        node["name"] = name
+
+
+def spring_bone_names(scene: dict) -> list[str]:
+    """Names of the joints that a VRM 0.x or 1.0 file's spring bones below the head start from; none for plain glTF."""
     nodes, extensions = scene.get("nodes", []), scene.get("extensions", {})
     old, new = extensions.get("VRM", {}), extensions.get("VRMC_vrm", {})
     heads = [bone["node"] for bone in old.get("humanoid", {}).get("humanBones", ()) if bone["bone"] == "head"]
@@ -58,7 +107,7 @@ def spring_bone_names(path: Path) -> list[str]:
             starts.append(node)
         else:
             todo += nodes[node].get("children", ())
-    return [re.sub(r"\W", "_", nodes[node]["name"]) for node in sorted(starts)]
+    return [nodes[node]["name"] for node in sorted(starts)]
 
 
 if __name__ == "__main__":

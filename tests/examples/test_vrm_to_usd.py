@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a VRM file's own spring bones say is hair, in both versions of the format."""
+"""An avatar in USD: what its own spring bones say is hair, in both versions of VRM, and all that it came with."""
 
-import json
 import runpy
-import struct
+import subprocess
 from pathlib import Path
+
+import pytest
+from pxr import Usd, UsdGeom, UsdSkel
+
+from usd.rig.stage import read_rigged_hair
+
+from ..blenders import installed
+from .avatars import avatar
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "vrm_to_usd.py"
 NODES = [
@@ -18,15 +25,14 @@ NODES = [
 ]
 
 
-def names(folder, extensions) -> list[str]:
+def names(extensions, nodes=NODES) -> list[str]:
     """What the script prints for a file with these extensions."""
-    text = json.dumps({"nodes": NODES, "extensions": extensions}).encode()
-    path = folder / "avatar.vrm"
-    path.write_bytes(struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text), b"JSON") + text)
-    return runpy.run_path(str(SCRIPT))["spring_bone_names"](path)
+    script, scene = runpy.run_path(str(SCRIPT)), {"nodes": [dict(node) for node in nodes], "extensions": extensions}
+    script["name_apart"](scene)
+    return script["spring_bone_names"](scene)
 
 
-def test_chains_are_named_by_both_versions(tmp_path):
+def test_chains_are_named_by_both_versions():
     """Only those below the head, by the first joint of each, with or without a holder, in the letters that USD has."""
     old = {
         "humanoid": {"humanBones": [{"bone": "head", "node": 0}]},
@@ -37,5 +43,43 @@ def test_chains_are_named_by_both_versions(tmp_path):
         "VRMC_vrm": {"humanoid": {"humanBones": {"head": {"node": 0}}}},
         "VRMC_springBone": {"springs": springs},
     }
-    assert names(tmp_path, {"VRM": old}) == names(tmp_path, new) == ["hair_L", "前髪"]
-    assert names(tmp_path, {}) == []
+    assert names({"VRM": old}) == names(new) == ["hair_L", "前髪"]
+    assert names({}) == []
+
+
+def test_equal_names_and_none_are_told_apart():
+    """In names that USD takes as they are."""
+    nodes = [{"children": [1, 2, 3, 4]}, {"name": "a b"}, {"name": "a b"}, {"name": "a_b"}, {"name": "1"}]
+    springs = [{"joints": [{"node": node}]} for node in range(1, 5)]
+    head = {"humanoid": {"humanBones": {"head": {"node": 0}}}}
+    found = names({"VRMC_vrm": head, "VRMC_springBone": {"springs": springs}}, nodes)
+    assert found == ["a_b", "a_b_2", "a_b_3", "_1"]
+
+
+def test_what_is_no_binary_gltf_is_refused(tmp_path):
+    (path := tmp_path / "avatar.vrm").write_text("{}")
+    with pytest.raises(SystemExit, match="no binary glTF file"):
+        runpy.run_path(str(SCRIPT))["read"](path)
+
+
+@pytest.mark.parametrize("fps", [30, 24])
+def test_an_avatar_comes_with_its_motion_and_what_it_wears(tmp_path, fps):
+    """Chains of equal names are found as they are printed; what Blender draws bones with stays away."""
+    blender = next(iter(installed()), None)
+    if blender is None:
+        pytest.skip("needs Blender as a Python module (make blender)")
+    out, vrm = tmp_path / "out.usdc", avatar(tmp_path / "avatar.vrm", seconds=0.5)
+    command = [str(blender), str(SCRIPT), str(vrm), "-o", str(out), "--fps", str(fps)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and "animations left out: Nod more" in done.stderr, done.stderr
+    stage = Usd.Stage.Open(str(out))
+    assert stage.GetTimeCodesPerSecond() == fps and stage.GetEndTimeCode() - stage.GetStartTimeCode() == fps / 2
+    assert sorted(prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)) == ["Glasses", "Skin"]
+    named = done.stdout.strip().splitlines()[-1].replace("--chains", "").split()
+    hair = read_rigged_hair(out, chains=named)
+    assert sorted(hair.rig.chains.tops) == sorted(named) == ["Hair_1", "Hair_1_2"]
+    animation = UsdSkel.Animation(hair.source.source.animation)
+    head = [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()].index("Head")
+    turns = animation.GetRotationsAttr()
+    first, last = (turns.Get(code)[head] for code in (turns.GetTimeSamples()[0], turns.GetTimeSamples()[-1]))
+    assert abs((first.GetInverse() * last).GetReal() - 0.9659) < 1e-3, "it turns by 30 degrees"
