@@ -174,6 +174,15 @@ def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: flo
     return 100 * float(tips[later].mean() / peak) if later.any() and peak > STILL else float("nan")
 
 
+def turning(points: np.ndarray) -> float:
+    """Mean angle [degrees] between successive edges of strands (..., K, 3): what makes hair look smooth, curly or crinkled."""
+    edges = np.diff(np.asarray(points, float), axis=-2)
+    before, after = edges[..., :-1, :], edges[..., 1:, :]
+    across = np.linalg.norm(np.cross(before, after), axis=-1)
+    along = np.einsum("...i,...i->...", before, after)
+    return _mean(np.degrees(np.arctan2(across, along)))
+
+
 def jitter(points: np.ndarray) -> float:
     """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 where nothing moves."""
     return 1000 * float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max(initial=0.0))

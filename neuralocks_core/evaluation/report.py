@@ -28,6 +28,8 @@ LABELS = {
     "swing_percent": ("swing of the tips", "%", "of strand length, rms about the mean"),
     "settling_s": ("settling after a stop", "s", "until 10 % of the tip speed"),
     "jitter_mm": ("jitter in a held pose", "mm", "largest step of a vertex, 2 s after the stop"),
+    "turn_degrees": ("turn from edge to edge", "degrees", "mean over 24 vertices; more than at rest is crinkled"),
+    "turn_at_rest_degrees": ("the same at rest", "degrees", ""),
     "energy_gravity": ("gravity energy", "J/kg", "against the rigid groom; below 0 it hangs lower"),
     "energy_bend": ("bend energy", "J/kg", ""),
     "energy_stretch": ("stretch energy", "J/kg", ""),

@@ -182,3 +182,12 @@ def test_energies_of_known_shapes():
     assert longer["gravity"][0] == pytest.approx(9.81 * 0.012)
     bent = energies(arc(0.1)[None, None], rest, down, Material(bend=2e-3))
     assert bent["bend"][0] == pytest.approx(0.5 * 2e-3 * 10**2, rel=0.06)
+
+
+def test_turning_of_a_circle_and_of_a_zigzag():
+    angle = np.linspace(0, 2 * np.pi, 25)
+    circle = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    assert metrics.turning(circle[None]) == pytest.approx(15)
+    zigzag = np.stack([np.arange(24.0), np.arange(24) % 2, np.zeros(24)], axis=1)
+    assert metrics.turning(zigzag) == pytest.approx(90)
+    assert metrics.turning(np.zeros((2, 24, 3))) == 0

@@ -166,6 +166,8 @@ class _Subject:
             result["speed_cm_s"] = 100 * float(metrics.speed(self.moved, times).mean())
             result["swing_percent"] = 100 * float(swing.mean())
             result |= self._stops(joints)
+        result["turn_degrees"] = metrics.turning(strands.rest + self.moved[:: max(1, len(times) // COLLISION_FRAMES)])
+        result["turn_at_rest_degrees"] = metrics.turning(strands.rest)
         sums = energies(strands.rest + self.moved, strands.rest, down, material)
         result |= {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
         return result | {"energy_stretch": self.stretch_energy}
