@@ -9,6 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 from usd.assets.groom import import_groom
 from usd.baking.bake import bake
+from usd.baking.join import join
 from usd.baking.spool import Spool
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
@@ -230,6 +231,24 @@ def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
                 with pytest.raises(NeuralocksError, match=f"{place}.usdc: .*damaged"):
                     read_shot(joints={}, path=broken)
     assert True in found
+
+
+def test_bytes_that_are_no_text_are_said_so(tmp_path, model):
+    """USD quotes them in its errors, and gives them for names that lie in a crate file."""
+    text, crate = write_shot(tmp_path), tmp_path / "latin.usdc"
+    Sdf.Layer.FindOrOpen(str(text)).Export(str(crate))
+    latin, above = tmp_path / "latin.usda", tmp_path / "above.usda"
+    latin.write_bytes(text.read_bytes().replace(b"#usda 1.0", b"#usda 1.0\n# caf\xe9", 1))
+    crate.write_bytes(crate.read_bytes().replace(b"hips", b"h\xe9ps"))
+    above.write_text(f"#usda 1.0\n(\n    subLayers = [@{latin.name}@, @{text.name}@]\n)\n")
+    fact = r"holds bytes that are not UTF-8\)"
+    for read in (read_shot, inspect, lambda path: join(path, tmp_path / "out.usdc")):
+        with pytest.raises(NeuralocksError, match=rf"latin\.usda: .*{fact}; "):
+            read(latin)
+    with pytest.raises(NeuralocksError, match=rf"latin\.usdc: .*damaged \({fact}; export it again"):
+        read_shot(crate)
+    result = bake(above, tmp_path / "elsewhere" / "out.usdc", model, frames="1:2")
+    assert any(note.startswith("above.usda: ") and "latin.usda" in note for note in result.notes)
 
 
 def test_a_primvar_that_cannot_be_unpacked_is_said_of_the_file_that_is_imported(tmp_path):

@@ -24,7 +24,7 @@ def names_damage(function):
     def run(*args, **kwargs):
         try:
             return function(*args, **kwargs)
-        except Tf.ErrorException as error:
+        except (Tf.ErrorException, UnicodeDecodeError) as error:  # the latter of names in a damaged crate file
             source = next(iter(arguments.bind(*args, **kwargs).arguments.values()))
             source = getattr(source, "shot", source)
             path = getattr(source, "path", source)
@@ -48,6 +48,20 @@ def named(out: Path) -> Iterator[None]:
 
 def first_line(error: Exception) -> str:
     """The message of a USD error without USD's own source positions."""
-    found = re.search(r" : '(.*?)'\s*$", str(error), re.MULTILINE | re.DOTALL)
-    lines = (found.group(1) if found else str(error)).strip().splitlines() or ["unknown error"]
+    if isinstance(error, UnicodeDecodeError):
+        return "holds bytes that are not UTF-8"
+    try:
+        text = str(error)
+    except UnicodeDecodeError as no_text:  # USD quotes what it cannot read
+        return first_line(no_text)
+    found = re.search(r" : '(.*?)'\s*$", text, re.MULTILINE | re.DOTALL)
+    lines = (found.group(1) if found else text).strip().splitlines() or ["unknown error"]
     return lines[0].strip().rstrip(".")[:200]
+
+
+def text_of(error) -> str:
+    """The whole message of a USD error, with the numbers of bytes that are not UTF-8."""
+    try:
+        return str(error)
+    except UnicodeDecodeError as no_text:
+        return no_text.object.decode("utf-8", "backslashreplace")

@@ -15,6 +15,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.strands.arclength import count_pointlike
 
+from ..border.damage import text_of
 from ..border.units import Border
 from ..skel.source import StageRig
 from .attach import Attachment, rig_joint
@@ -28,7 +29,7 @@ FEW = 3
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose: missing layers, for example."""
-    return [f"{path.name}: {' '.join(str(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+    return [f"{path.name}: {' '.join(text_of(error).split())[:200]}" for error in stage.GetCompositionErrors()]
 
 
 def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -64,8 +65,9 @@ def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
     """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
     if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
         return []
-    found = {str(error) for error in stage.GetCompositionErrors()}
-    lost = [str(error) for error in Usd.Stage.Open(str(out)).GetCompositionErrors() if str(error) not in found]
+    found = {text_of(error) for error in stage.GetCompositionErrors()}
+    told = [text_of(error) for error in Usd.Stage.Open(str(out)).GetCompositionErrors()]
+    lost = [text for text in told if text not in found]
     return [
         f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "
         "have USD search that folder (PXR_AR_DEFAULT_SEARCH_PATH)"
