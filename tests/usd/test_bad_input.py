@@ -78,6 +78,20 @@ def assign(index, value):
     return change
 
 
+def retyped(path, name, kind):
+    """An edit that declares an attribute with another type, as whoever misreads a schema may."""
+
+    def edit(stage):
+        layer, target = stage.GetRootLayer(), Sdf.ValueTypeNames.Find(kind)
+        spec = layer.GetAttributeAtPath(f"{path}.{name}")
+        owner, variability = spec.owner, spec.variability
+        owner.RemoveProperty(spec)
+        value = [target.scalarType.defaultValue] * 8 if target.isArray else target.defaultValue
+        Sdf.AttributeSpec(owner, name, target, variability).default = type(target.defaultValue)(value)
+
+    return edit
+
+
 NAN = float("nan")
 BROKEN = {
     "nan points": (changed(HAIR, "points", assign(7, Gf.Vec3f(NAN, 0, 0))), HAIR, "not finite"),
@@ -102,7 +116,22 @@ BROKEN = {
     "nan bind": (changed(RIG, "bindTransforms", assign(3, Gf.Matrix4d(NAN))), RIG, "NaN"),
     "no joints": (attribute(RIG, "joints", []), RIG, "no joints"),
     "double joint": (attribute(RIG, "joints", ["a"] * 8), RIG, "twice"),
+    "joint animated twice": (attribute(MOTION, "joints", ["hips", *["a"] * 7]), MOTION, "'a' is listed twice"),
     "child first": (attribute(RIG, "joints", ["a/b", "a", *"cdefgh"]), RIG, "before its parent"),
+    "offsets as joints": (retyped(RIG, "joints", "float3[]"), RIG, "its joints are float3[], not token[]"),
+    "number as binds": (retyped(RIG, "bindTransforms", "float"), RIG, "are float, not matrix4d[]"),
+    "offsets as binds": (retyped(RIG, "bindTransforms", "float3[]"), RIG, "are float3[], not matrix4d[]"),
+    "words as faces": (retyped(SKIN, "faceVertexCounts", "token[]"), SKIN, "are token[], not int[]"),
+    "words as corners": (retyped(SKIN, "faceVertexIndices", "token[]"), SKIN, "are token[], not int[]"),
+    "number as skin": (retyped(SKIN, "points", "float"), SKIN, "are float, not point3f[]"),
+    "words as indices": (retyped(SKIN, "primvars:skel:jointIndices", "token[]"), SKIN, "are token[], not int[]"),
+    "number as weights": (retyped(SKIN, "primvars:skel:jointWeights", "double"), SKIN, "are double, not float[]"),
+    "number as bind": (retyped(SKIN, "primvars:skel:geomBindTransform", "float"), SKIN, "are float, not matrix4d;"),
+    "offsets as counts": (retyped(HAIR, "curveVertexCounts", "float3[]"), HAIR, "are float3[], not int[]"),
+    "number as hair": (retyped(HAIR, "points", "float"), HAIR, "are float, not point3f[]"),
+    "counts as hair": (retyped(HAIR, "points", "int[]"), HAIR, "are int[], not point3f[]"),
+    "turns as hair": (retyped(HAIR, "points", "quath[]"), HAIR, "are quath[], not point3f[]"),
+    "matrix as hair": (retyped(HAIR, "points", "matrix4d"), HAIR, "are matrix4d, not point3f[]"),
     "mirrored root": (scaled_root(-1, 1, 1), RIG, "mirrored"),
     "flat root": (scaled_root(1, 0, 1), "/Hero", "zero scale"),
     "nan root": (scaled_root(1, NAN, 1), "/Hero", "NaN"),

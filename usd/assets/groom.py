@@ -184,7 +184,7 @@ def _read_primvars(prim: Usd.Prim, groom: Groom) -> tuple["Primvar", ...]:
             continue
         value = rest_primvar(primvar)
         many = {"uniform": groom.strand_count, "vertex": len(groom.points)}.get(scope)
-        if value is not None and (scope == "constant" or many and len(value) == many * each):
+        if value is not None and (scope == "constant" or many and np.shape(value)[:1] == (many * each,)):
             found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
     return tuple(found)
 

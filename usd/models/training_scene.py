@@ -20,6 +20,7 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import open_stage
 from ..border.units import Border
+from ..border.values import as_names
 from ..shot.attach import attach
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
@@ -129,7 +130,8 @@ def read_clip(path: str, character: Character) -> Clip:
     prims = find_skeletons(stage)
     if not prims:
         raise nothing_found(stage, Path(path), "UsdSkel skeleton", "give motion of the character's joints, or BVH")
-    alike = [prim for prim in prims if tuple(UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()) == names]
+    listed = [UsdSkel.Skeleton(prim).GetJointsAttr() for prim in prims]
+    alike = [prim for prim, joints in zip(prims, listed) if as_names(joints, joints.Get()) == names]
     if not alike:
         raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
     rigs, errors = read_each_rig(stage, alike, Border.of(stage), names[character.head], all_shapes=True)

@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
+from ..border.values import as_numbers
 from ..shot.recorded import recorded_cuts, recorded_joint
 from ..shot.stage import Shot, StageGroom, read_shot
 
@@ -41,8 +42,8 @@ class Baked:
         Raises:
             NeuralocksError: they are missing, not as many as at rest, or not finite.
         """
-        points = UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(code)
-        points = np.zeros((0, 3)) if points is None else np.asarray(points, float)
+        attribute = UsdGeom.BasisCurves(item.prim).GetPointsAttr()
+        points = as_numbers(attribute, "point3f[]", attribute.Get(code))
         if len(points) != item.point_count:
             raise NeuralocksError(
                 f"{item.path}: {len(points)} points at time code {code:g}, {item.point_count} at rest; bake again"

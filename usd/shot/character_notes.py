@@ -4,16 +4,19 @@ is scaled evenly.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.anatomy.standing import lies
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
 from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
+from ..border.values import as_numbers
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, drawn
 from .notes import partial_body, unlikely_head
@@ -128,8 +131,10 @@ def _meant(hidden: list[Usd.Prim], loose: list[Usd.Prim], rig: StageRig) -> str:
     for prim in loose:
         box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
         if not box.IsEmpty() and box.GetDistanceSquared(Gf.Vec3d(*head)) < near**2:
-            points = np.asarray(UsdGeom.Mesh(prim).GetPointsAttr().Get(when) or [], float).reshape(-1, 3)
-            with np.errstate(invalid="ignore", over="ignore"):  # a mesh that nothing else reads may be broken
+            attribute = UsdGeom.Mesh(prim).GetPointsAttr()
+            # A mesh that nothing else reads may be broken.
+            with suppress(NeuralocksError), np.errstate(invalid="ignore", over="ignore"):
+                points = as_numbers(attribute, "point3f[]", attribute.Get(when))
                 world = transformed(points, column_matrix(places.GetLocalToWorldTransform(prim)))
                 if np.sum(np.linalg.norm(world - head, axis=1) < near) >= SOME:
                     around.append(prim)

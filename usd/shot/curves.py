@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """BasisCurves as a groom: rest points, counts, widths and root attributes."""
 
+from contextlib import suppress
+
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
@@ -10,6 +12,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.rotation import transformed
 
 from ..border.prim_paths import prim_paths
+from ..border.values import as_numbers
 from ..skel.surface import rest_primvar, rest_value
 
 
@@ -42,7 +45,7 @@ def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
     empty = []
     for prim in prims:
         points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
-        if points is None or not len(points):
+        if points is None or hasattr(points, "__len__") and not len(points):
             empty.append(prim)
     return empty if len(empty) < len(prims) else []
 
@@ -51,20 +54,22 @@ def rest_points(prim: Usd.Prim) -> np.ndarray:
     """(P, 3) float32 points at rest in the prim's own space and units: those that Blender's live view kept, where there are.
 
     Raises:
-        NeuralocksError: there are none.
+        NeuralocksError: there are none, or not in three coordinates.
     """
-    points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
-    if points is None or not len(points):
+    attribute = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    points = as_numbers(attribute, "point3f[]", rest_value(attribute), np.float32)
+    if not len(points):
         raise NeuralocksError(
             f"{prim.GetPath()}: the groom has no points; give it its rest shape as default-time points"
         )
     kept = _kept(prim)
-    return np.asarray(points, np.float32) if kept is None else kept
+    return points if kept is None else kept
 
 
 def rest_counts(prim: Usd.Prim) -> np.ndarray:
     """Points of each strand at rest (S,)."""
-    return np.asarray(rest_value(UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()) or [], np.int64)
+    attribute = UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr()
+    return as_numbers(attribute, "int[]", rest_value(attribute), np.int64)
 
 
 def moment(prim: Usd.Prim) -> float | None:
@@ -139,7 +144,12 @@ def _kept(prim: Usd.Prim) -> np.ndarray | None:
     if copy is None:
         return None
     kept, points = np.asarray(rest_primvar(copy)), rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
-    if kept.dtype != np.float32 or kept.shape != np.shape(points) or rest_copy.never_written(kept).any():
+    if (
+        kept.dtype != np.float32
+        or kept.ndim != 2
+        or kept.shape != np.shape(points)
+        or rest_copy.never_written(kept).any()
+    ):
         return None
     return kept
 
@@ -166,8 +176,9 @@ def widest_sample(prim: Usd.Prim) -> float:
     """The largest of a groom's widths that change over time, in the prim's own units; 0 where none do."""
     attribute, widest = _widths_attribute(UsdGeom.BasisCurves(prim)), 0.0
     for time in attribute.GetTimeSamples():
-        values = np.asarray(attribute.Get(time) or [], np.float32)
-        widest = max(widest, float(values[np.isfinite(values)].max(initial=0)))
+        with suppress(NeuralocksError):  # there is a note on widths of another type
+            values = as_numbers(attribute, "float[]", attribute.Get(time), np.float32)
+            widest = max(widest, float(values[np.isfinite(values)].max(initial=0)))
     return widest
 
 
@@ -181,10 +192,16 @@ def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes
     """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that can be meant."""
     attribute = _widths_attribute(curves)
     primvar = UsdGeom.Primvar(attribute)
-    values = rest_primvar(primvar) if primvar else rest_value(attribute)
-    if values is None or not len(values):
+    try:
+        values = as_numbers(
+            attribute, "float[]", rest_primvar(primvar) if primvar else rest_value(attribute), np.float32
+        )
+    except NeuralocksError as error:
+        notes.append(f"{error}; they are left as they are")
         return None
-    values = np.asarray(values, np.float32) * np.float32(scale)
+    if not len(values):
+        return None
+    values = values * np.float32(scale)
     strands = len(counts)
     if np.isfinite(values).all() and (values >= 0).all():
         if len(values) in (1, strands, counts.sum()):

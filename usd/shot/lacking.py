@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors about a stage that lacks what a bake needs, with the likely cause: what it has in its place."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from pxr import Usd, UsdGeom, UsdSkel
@@ -8,6 +9,7 @@ from pxr import Usd, UsdGeom, UsdSkel
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.hair_names import says_hair
 
+from ..border.values import as_names
 from ..skel.source import find_skeletons
 from .notes import composition_notes
 
@@ -35,7 +37,10 @@ def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> Neura
 
 def has_hair_joints(prim: Usd.Prim) -> bool:
     """Whether joints of a Skeleton are named like hair."""
-    return any(map(says_hair, UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()))
+    joints = UsdSkel.Skeleton(prim).GetJointsAttr()
+    with suppress(NeuralocksError):  # what is wrong with them is told where the skeleton is read
+        return any(map(says_hair, as_names(joints, joints.Get())))
+    return False
 
 
 def _on_joints(stage: Usd.Stage) -> str:

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
+from ..border.values import as_numbers
 from ..skel.source import StageRig
 from ..skel.surface import rest_value
 from .attach import REACH
@@ -56,8 +58,14 @@ def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
 def _roots(prim: Usd.Prim) -> np.ndarray:
     """First points (n, 3) of some curves, without those that come back to it, as a rig's controls do; none where points are odd."""
     curves = UsdGeom.Curves(prim)
-    points = np.asarray(rest_value(curves.GetPointsAttr()) or np.zeros((0, 3)), float)
-    counts = np.asarray(rest_value(curves.GetCurveVertexCountsAttr()) or [], np.int64)
+    attributes = curves.GetPointsAttr(), curves.GetCurveVertexCountsAttr()
+    try:
+        points, counts = (
+            as_numbers(attribute, wanted, rest_value(attribute), kind)
+            for attribute, wanted, kind in zip(attributes, ("point3f[]", "int[]"), (float, np.int64))
+        )
+    except NeuralocksError:
+        return np.zeros((0, 3))
     if counts.sum() != len(points) or counts.min(initial=1) < 1 or not np.isfinite(points).all():
         return np.zeros((0, 3))
     some = slice(None, None, max(1, len(counts) // SOME_ROOTS))

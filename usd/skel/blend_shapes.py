@@ -10,6 +10,8 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..border.values import as_names, as_numbers
+
 Knots = dict[float, np.ndarray]
 """Weight -> offsets (V, 3) there, ascending; 1 is among them, 0 is rest."""
 
@@ -26,7 +28,7 @@ def read_blend_shapes(prim: Usd.Prim, count: int, notes: list[str]) -> dict[str,
         NeuralocksError: offsets do not fit the points or are not finite.
     """
     binding = UsdSkel.BindingAPI(prim)
-    names = [str(name) for name in binding.GetBlendShapesAttr().Get() or ()]
+    names = as_names(binding.GetBlendShapesAttr(), binding.GetBlendShapesAttr().Get())
     targets = binding.GetBlendShapeTargetsRel().GetTargets() if names else []
     if len(names) != len(targets):
         notes.append(
@@ -40,13 +42,15 @@ def read_blend_shapes(prim: Usd.Prim, count: int, notes: list[str]) -> dict[str,
         if not offsets:
             notes.append(f"{prim.GetPath()}: blend shape '{name}' ({target}) is missing or empty; left out")
             continue
-        chosen = np.asarray(shape.GetPointIndicesAttr().Get() or [], np.int64)
+        offsets = as_numbers(shape.GetOffsetsAttr(), "vector3f[]", offsets)
+        chosen = as_numbers(shape.GetPointIndicesAttr(), "int[]", shape.GetPointIndicesAttr().Get(), np.int64)
         knots = {1.0: _dense(offsets, chosen, count, target)}
         for between in shape.GetInbetweens():
             weight, offsets = between.GetWeight(), between.GetOffsets()
             if weight is None or not np.isfinite(weight) or weight in (0, 1) or not offsets:
                 notes.append(f"{between.GetAttr().GetPath()}: has no weight of its own or no offsets; left out")
                 continue
+            offsets = as_numbers(between.GetAttr(), "vector3f[]", offsets)
             knots[float(weight)] = _dense(offsets, chosen, count, between.GetAttr().GetPath())
         shapes[name] = dict(sorted(knots.items()))
     return shapes
@@ -77,9 +81,8 @@ def at_knot(shape: Knots, knot: float) -> np.ndarray:
     return np.einsum("k,kvc->vc", shares(np.array([knot]), list(shape))[0], np.stack(list(shape.values())))
 
 
-def _dense(offsets, chosen: np.ndarray, count: int, path) -> np.ndarray:
+def _dense(offsets: np.ndarray, chosen: np.ndarray, count: int, path) -> np.ndarray:
     """Offsets of all points (count, 3), out of those of the chosen ones if any are."""
-    offsets = np.asarray(offsets, float).reshape(-1, 3)
     if not np.isfinite(offsets).all():
         raise NeuralocksError(f"{path}: blend shape offsets hold NaN or infinity; repair it")
     if not len(chosen):

@@ -14,6 +14,7 @@ from neuralocks_core.rotation import from_quaternion, relative_to_parents
 
 from ..border.arrays import wxyz
 from ..border.placement import Placement
+from ..border.values import as_names, as_numbers
 
 STRETCH = 0.003
 """A quaternion's length may be off by so much before a user is told: single and half precision are nearer."""
@@ -43,7 +44,7 @@ class JointSource:
         self.notes: list[str] = []
         self.ignored: str | None = None
         skeleton = UsdSkel.Skeleton(prim)
-        self.names = tuple(str(name) for name in skeleton.GetJointsAttr().Get() or ())
+        self.names = _names(skeleton.GetJointsAttr())
         if not self.names:
             raise NeuralocksError(f"{self.path}: the skeleton has no joints; export it with its joints")
         self.parents = self._parents()
@@ -88,13 +89,13 @@ class JointSource:
     def shape(self, names, time_codes) -> np.ndarray:
         """Blend shape weights (T, B) of the named shapes at time codes (T,); 0 where the animation has none."""
         result = np.zeros((len(time_codes), len(names)))
-        order = [] if self._animation is None else [str(n) for n in self._animation.GetBlendShapesAttr().Get() or ()]
+        order = () if self._animation is None else _names(self._animation.GetBlendShapesAttr())
         wanted = [(column, order.index(name)) for column, name in enumerate(names) if name in order]
         if not wanted:
             return result
         weights = self._animation.GetBlendShapeWeightsAttr()
         for row, time in enumerate(time_codes):
-            values = np.asarray(weights.Get(time) if weights.HasValue() else [], float)
+            values = as_numbers(weights, "float[]", weights.Get(time) if weights.HasValue() else None)
             if len(values) != len(order):
                 raise NeuralocksError(
                     f"{self.animation.GetPath()}: {len(values)} blendShapeWeights for {len(order)} blendShapes; "
@@ -150,14 +151,14 @@ class JointSource:
         return bind, rest
 
     def _matrices(self, attribute: Usd.Attribute) -> np.ndarray | None:
-        values = attribute.Get()
-        if values is None or not len(values):
+        values = as_numbers(attribute, "matrix4d[]", attribute.Get())
+        if not len(values):
             return None
         if len(values) != len(self.names):
             raise NeuralocksError(
                 f"{self.path}: {len(values)} {attribute.GetName()} for {len(self.names)} joints; author one each"
             )
-        matrices = np.array(values, float).reshape(-1, 4, 4).swapaxes(-1, -2)
+        matrices = values.copy().swapaxes(-1, -2)
         bad = ~np.isfinite(matrices).all(axis=(1, 2))
         flat = ~bad & (np.abs(np.linalg.det(np.where(bad[:, None, None], np.eye(4), matrices)[:, :3, :3])) < 1e-18)
         if (bad | flat).any():
@@ -176,7 +177,8 @@ class JointSource:
         """(joint, column of the animation) pairs; None where UsdSkel would show the rest pose instead."""
         if self._animation is None:
             return None
-        order = {str(name): i for i, name in enumerate(self._animation.GetJointsAttr().Get() or ())}
+        listed = _names(self._animation.GetJointsAttr())
+        order = {name: i for i, name in enumerate(listed)}
         pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
         why = self._unusable_channel()
         if not why and not pairs:
@@ -184,7 +186,9 @@ class JointSource:
         if why:
             self._ignore(why)
             return None
-        self._width = len(order)
+        if double := next((name for i, name in enumerate(listed) if order[name] != i), None):
+            raise NeuralocksError(f"{self.animation.GetPath()}: joint '{double}' is listed twice; list each once")
+        self._width = len(listed)
         return pairs
 
     def _ignore(self, why: str) -> None:
@@ -235,7 +239,7 @@ class JointSource:
         if good.all():
             return
         row, column = np.argwhere(~good)[0]
-        name = (self._animation.GetJointsAttr().Get() or ())[int(column)]
+        name = _names(self._animation.GetJointsAttr())[int(column)]
         raise NeuralocksError(
             f"{self.animation.GetPath()}: joint '{name}' holds NaN, infinity or a null rotation at time code {time_codes[row]:g}; "
             "repair the animation"
@@ -251,3 +255,7 @@ class JointSource:
             f"{self.animation.GetPath()}: the rotation of joint '{self.names[joints[column]]}' at time code "
             f"{time_codes[row]:g} is not of unit length, which UsdSkel shows as a stretch; normalise the rotations"
         )
+
+
+def _names(attribute: Usd.Attribute) -> tuple[str, ...]:
+    return as_names(attribute, attribute.Get())

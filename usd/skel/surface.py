@@ -13,6 +13,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
 from ..border.placement import Placement
+from ..border.values import as_names, as_numbers
 from .blend_shapes import Knots, at_knot, knot_weights, read_blend_shapes
 from .joints import JointSource
 
@@ -110,14 +111,16 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
     path = prim.GetPath()
     primvars = influences(prim)
     size = max(int(primvars[0].GetElementSize()), 1)
-    indices, weights = (np.asarray(rest_primvar(p), kind) for p, kind in zip(primvars, (int, float)))
+    indices = as_numbers(primvars[0].GetAttr(), "int[]", rest_primvar(primvars[0]), int)
+    weights = as_numbers(primvars[1].GetAttr(), "float[]", rest_primvar(primvars[1]))
     rows = 1 if primvars[0].GetInterpolation() == "constant" else count
     if len(indices) != rows * size or len(weights) != rows * size:
         raise NeuralocksError(
             f"{path}: {len(indices)} joint indices and {len(weights)} weights for {rows} points of {size}; "
             "export the skin again"
         )
-    order = [str(name) for name in _in_effect(prim, "skel:joints") or ()] or list(source.names)
+    listed = _in_effect(prim, "skel:joints")
+    order = (as_names(listed, rest_value(listed)) if listed else ()) or source.names
     unknown = [name for name in order if name not in source.names]
     if unknown:
         raise NeuralocksError(
@@ -137,24 +140,23 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
 
 def geom_bind(prim: Usd.Prim) -> np.ndarray:
     """Transform (4, 4) from the prim's points to authored bind space."""
-    value = _in_effect(prim, "primvars:skel:geomBindTransform")
-    matrix = np.eye(4) if value is None else column_matrix(value)
+    authored = _in_effect(prim, "primvars:skel:geomBindTransform")
+    matrix = np.eye(4)
+    if authored:
+        matrix = column_matrix(as_numbers(authored, "matrix4d", rest_value(authored)))
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
         raise NeuralocksError(f"{prim.GetPath()}: its geomBindTransform is not finite or flat; bind it again")
     return matrix
 
 
-def _in_effect(prim: Usd.Prim, name: str):
-    """The value at rest of a binding property: the prim's own, else that of the nearest prim above with a binding, as
-    UsdSkel has it. None if there is none.
-    """
+def _in_effect(prim: Usd.Prim, name: str) -> Usd.Attribute | None:
+    """A binding property with a value: the prim's own, else that of the nearest prim above with a binding, as UsdSkel has it."""
     above = prim
     while above and not above.IsPseudoRoot():
         attribute = above.GetAttribute(name)
         if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
-            value = rest_value(attribute)
-            if value is not None:
-                return value
+            if rest_value(attribute) is not None:
+                return attribute
         above = above.GetParent()
     return None
 
@@ -198,11 +200,10 @@ def _ever_visible(prim: Usd.Prim) -> bool:
 
 def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | None:
     mesh, path = UsdGeom.Mesh(prim), prim.GetPath()
-    points = rest_value(mesh.GetPointsAttr())
-    if points is None or not len(points):
+    points = as_numbers(mesh.GetPointsAttr(), "point3f[]", rest_value(mesh.GetPointsAttr()))
+    if not len(points):
         notes.append(f"{path}: the mesh has no points; left out of the body")
         return None
-    points = np.asarray(points, float)
     if not np.isfinite(points).all():
         raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     triangles = _triangles(mesh, path, len(points))
@@ -236,8 +237,10 @@ def rest_primvar(primvar: UsdGeom.Primvar):
 
 
 def _triangles(mesh: UsdGeom.Mesh, path, count: int) -> np.ndarray:
-    faces = np.asarray(rest_value(mesh.GetFaceVertexCountsAttr()) or [], np.int64)
-    corners = np.asarray(rest_value(mesh.GetFaceVertexIndicesAttr()) or [], np.int64)
+    faces, corners = (
+        as_numbers(attribute, "int[]", rest_value(attribute), np.int64)
+        for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+    )
     if faces.size and faces.min() < 0 or faces.sum() != len(corners):
         raise NeuralocksError(f"{path}: face counts sum to {faces.sum()} for {len(corners)} corners; repair the mesh")
     if corners.size and not 0 <= corners.min() <= corners.max() < count:
