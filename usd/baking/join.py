@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd
+import numpy as np
+from pxr import Sdf, Tf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
@@ -125,8 +126,8 @@ class _Part:
         """Time codes of a groom's samples, ascending."""
         return list(self.layer.ListTimeSamplesForPath(groom.AppendProperty("points")))
 
-    def value(self, groom: Sdf.Path, code: float, name: str):
-        """The array of an attribute's sample.
+    def value(self, groom: Sdf.Path, code: float, name: str, count: int | None = None) -> Vt.Vec3fArray:
+        """The array of an attribute's sample; of `count` vectors, where that is known.
 
         Raises:
             NeuralocksError: it is missing, or damaged.
@@ -136,6 +137,15 @@ class _Part:
             found = self.layer.QueryTimeSample(path, code)
         if found is None:
             raise NeuralocksError(f"{self.path}: {path} has no sample at {code:g}; bake that part again")
+        fact = ""
+        if not isinstance(found, Vt.Vec3fArray):
+            fact = "is no array of vectors"
+        elif count is not None and len(found) != count:
+            fact = f"has {len(found)} values for {count}"
+        elif not np.isfinite(found).all():
+            fact = "holds NaN or infinity"
+        if fact:
+            raise NeuralocksError(f"{self.path}: {path} {fact} at {code:g}; bake that part again")
         return found
 
     def samples_of(self, groom: Sdf.Path, name: str) -> bool:
@@ -206,9 +216,14 @@ def _copy_info(source: Sdf.Spec, target: Sdf.Spec, without=()) -> None:
 def _copy_samples(groom: Sdf.Path, sources: dict[float, _Part], file: SampleLayer, order: Lagging) -> Iterator[float]:
     """Samples of a groom, which yield their time codes as they are copied."""
 
+    code, part = next(iter(sources.items()))
+    count = len(part.value(groom, code, "points"))
+    counts = {"extent": 2, "points": count, "velocities": count}
+
     def put(code: float, *names: str) -> None:
         part = sources[code]
-        file.put(groom, code, {name: part.value(groom, code, name) for name in names if part.samples_of(groom, name)})
+        there = [name for name in names if part.samples_of(groom, name)]
+        file.put(groom, code, {name: part.value(groom, code, name, counts[name]) for name in there})
 
     for code in sources:
         put(code, "extent", "points")

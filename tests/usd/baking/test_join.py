@@ -5,7 +5,7 @@ import json
 import os
 
 import pytest
-from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdUtils, Vt
 from typer.testing import CliRunner
 
 from neuralocks_core.errors import NeuralocksError
@@ -191,6 +191,25 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
     with pytest.raises(NeuralocksError, match="is part of the shot itself"):
         join([part], shot)
     assert not (tmp_path / "hair.usdc").exists() and not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("name", "break_it", "fact"),
+    [
+        ("points", lambda points: points[:-1], "has 479 values for 480"),
+        ("velocities", lambda velocities: velocities[:3], "has 3 values for 480"),
+        ("extent", lambda extent: Vt.Vec3fArray(1, extent[0]), "has 1 values for 2"),
+        ("points", lambda points: Vt.Vec3fArray(len(points), Gf.Vec3f(float("nan"))), "holds NaN or infinity"),
+    ],
+)
+def test_a_damaged_frame_within_a_part_is_named(shot, tmp_path, model, name, break_it, fact):
+    first, second = parts_of(shot, tmp_path, model, ("1:2", "3:5"))
+    layer, path = Sdf.Layer.FindOrOpen(str(second)), f"/Hero/Hair.{name}"
+    layer.SetTimeSample(path, 4, break_it(layer.QueryTimeSample(path, 4)))
+    layer.Save()
+    with pytest.raises(NeuralocksError, match=rf"part1\.usdc: {path} {fact} at 4; bake that part again"):
+        join([first, second], tmp_path / "hair.usdc")
+    assert not (tmp_path / "hair.usdc").exists()
 
 
 def test_a_lone_part_needs_no_list(shot, tmp_path, model):
