@@ -27,6 +27,7 @@ from ..border.damage import names_damage
 from ..shot.recorded import recorded, recorded_material, recorded_volume
 from ..shot.stage import StageGroom
 from .baked import Baked, read_baked
+from .own_bends import OwnBends
 
 STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
@@ -106,6 +107,7 @@ class _Subject:
         self.moved = np.zeros((total, count, K, 3), np.float32)
         self.own_rest = rest[self._own]
         self.own = np.zeros((total, len(self._own), 3), np.float32)
+        self.bends = OwnBends(groom, self.chosen, arc_lengths(groom)[0], rest, total)
         sums, taut = [], []
         edges_at_rest = self._edge_lengths(rest)
         for frame, code in enumerate(baked.codes):
@@ -115,6 +117,7 @@ class _Subject:
             offset = points - rest
             self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
             self.own[frame] = points[self._own]
+            self.bends.read(frame, offset)
             say(frame + 1, total, f"reading {item.path}")
         self.stretch = {
             key: float(max(s[key] for s in sums) if key.endswith("max") else np.mean([s[key] for s in sums]))
@@ -170,6 +173,8 @@ class _Subject:
         result["turn_at_rest_degrees"] = metrics.turning(strands.rest)
         sums = energies(strands.rest + self.moved, strands.rest, down, material)
         result |= {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
+        if not self.bends.fine.all():
+            result["energy_bend"] = self.bends.energy(self.moved, strands.rest, material)
         return result | {"energy_stretch": self.stretch_energy}
 
     def _penetration(self) -> dict:
