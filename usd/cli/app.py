@@ -41,12 +41,17 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    words = sys.argv[1:] if arguments is None else arguments
+    words = [_kept(word) for word in (sys.argv[1:] if arguments is None else arguments)]
     try:
         app(one_by_one(words) if words[:1] == ["train"] else words)
     except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
         one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
         raise SystemExit(1) from None
+
+
+def _kept(word: str) -> str:
+    """A word, a blank for an empty one: a path of no letters is the current folder to whoever is given it."""
+    return f"{word} " if not word or word.startswith("--") and word.endswith("=") else word
 
 
 def _version(wanted: bool) -> None:

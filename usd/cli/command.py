@@ -62,7 +62,7 @@ def _check_words(function, given: dict) -> None:
     """
     for name, value in given.items():
         for word in value if isinstance(value, list) else [value]:
-            if isinstance(word, str) and not word.strip():
+            if isinstance(word, str | Path) and not str(word).strip():
                 raise NeuralocksError(f"{_as_typed(function, name)}: is empty; give a value, or leave it out")
             try:
                 str(word if isinstance(word, Path) else "").encode()

@@ -127,6 +127,21 @@ def test_a_name_is_given_a_value_once(capsys):
         assert capsys.readouterr().err == f"error: {name} is given twice; give it once\n"
 
 
+def test_an_empty_path_is_not_the_current_folder(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, name in (
+        (("demo", "-o", ""), "--out"),
+        (("demo", "--out="), "--out"),
+        (("import", "a.hair", "-o", ""), "--out"),
+        (("bake", "", "-o", "o.usdc"), "shot"),
+        (("join", "a.usdc", "", "-o", "o.usdc"), "parts"),
+        (("evaluate", "a.usdc", "--plot", ""), "--plot"),
+    ):
+        assert status(*words) == 1
+        assert capsys.readouterr().err == f"error: {name}: is empty; give a value, or leave it out\n"
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_seed_is_one_of_numpys(capsys):
     for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
         assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
