@@ -21,9 +21,12 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     the way to `path` are made. Enter it before long work, to learn in time that a folder cannot be written.
 
     Raises:
-        NeuralocksError: for every OSError in the block; nothing is left of it, and what was under `path` stays.
+        NeuralocksError: it is a folder's name, or for every OSError in the block; nothing is left of it, and what was under
+            `path` stays.
     """
     path = Path(path)
+    if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it leads to
+        raise NeuralocksError(f"{path}: is a folder; move it, or choose another name")
     try:
         made = make_way(path)
         try:

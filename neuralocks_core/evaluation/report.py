@@ -181,11 +181,13 @@ def check_plot(path: str | os.PathLike) -> Path:
     """The path, if `Card.plot` can draw such a file: asked before a long measurement, not after it.
 
     Raises:
-        NeuralocksError: its ending is unknown, or matplotlib is missing.
+        NeuralocksError: its ending is unknown, it is a folder's name, or matplotlib is missing.
     """
     path = Path(path)
     if path.suffix.lower() not in PLOTS:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(PLOTS)}")
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; give a file name")
     if find_spec("matplotlib") is None:
         raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[compare]'")
     return path

@@ -142,6 +142,16 @@ def test_an_empty_path_is_not_the_current_folder(tmp_path, capsys, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys):
+    (tmp_path / "tips.png").mkdir()
+    assert status("evaluate", tmp_path / "none.usdc", "--plot", tmp_path / "tips.png") == 1
+    assert capsys.readouterr().err == f"error: {tmp_path / 'tips.png'}: is a folder; give a file name\n"
+    (tmp_path / "model" / "rig.onnx").mkdir(parents=True)
+    assert status("export", model_file.shipped("rig"), "-o", tmp_path / "model") == 1
+    assert "rig.onnx: is a folder; move it" in capsys.readouterr().err
+    assert os.listdir(tmp_path / "model") == ["rig.onnx"]
+
+
 def test_a_seed_is_one_of_numpys(capsys):
     for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
         assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
