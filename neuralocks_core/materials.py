@@ -9,6 +9,7 @@ from numbers import Real
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.plain_numbers import plain_number
 
 RANGES = {
     "bend": (2e-4, 5e-3),
@@ -103,7 +104,7 @@ class Material:
                 )
             try:
                 factor = getattr(cls(), name) if text.endswith("x") else 1.0
-                value = float(text.removesuffix("x")) * factor
+                value = plain_number(text.removesuffix("x")) * factor
             except ValueError:
                 raise NeuralocksError(
                     f"material '{setting}': no number after '='; write for example {said}=1.5x"

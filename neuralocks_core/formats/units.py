@@ -4,6 +4,7 @@
 import math
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.plain_numbers import plain_number
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 """Name -> metres."""
@@ -16,7 +17,7 @@ def metres_per_unit(unit: str | float) -> float:
         NeuralocksError: it is neither.
     """
     try:
-        value = UNITS.get(str(unit).strip().lower()) or float(unit)
+        value = UNITS.get(str(unit).strip().lower()) or plain_number(unit)
     except (TypeError, ValueError, OverflowError):
         value = math.nan
     if not 1e-6 <= value <= 1e6:

@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.plain_numbers import plain_number
 
 from .amounts import check_number
 
@@ -23,7 +24,7 @@ def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
         NeuralocksError: it is something else.
     """
     try:
-        parts = [float(part) for part in text.split(":")]
+        parts = [plain_number(part) for part in text.split(":")]
     except ValueError:
         parts = []
     if not 1 <= len(parts) <= 3 or not all(math.isfinite(p) for p in parts):

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.plain_numbers import plain_number
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine to read.")]
@@ -57,7 +58,7 @@ def cut_codes(given: list[str] | None) -> list[float] | None:
     if text.strip().lower() == "none":
         return []
     try:
-        return [float(code) for code in text.split(",")]
+        return [plain_number(code) for code in text.split(",")]
     except ValueError:
         raise NeuralocksError(f"--cuts {text}: is no list of frames; write for example 25,49, or none") from None
 
@@ -79,6 +80,6 @@ def numbers(words: list[str] | None, option: str) -> dict[str, float]:
     """Like `pairs`, with numbers for values."""
     found = pairs(words, option)
     try:
-        return {name: float(text) for name, text in found.items()}
+        return {name: plain_number(text) for name, text in found.items()}
     except ValueError:
         raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None

@@ -15,6 +15,7 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.plain_numbers import plain_number
 from neuralocks_core.progress import Progress
 
 from ..border.extras import check_training
@@ -179,11 +180,11 @@ def _value(name: str, word: str, default):
         if isinstance(default, enum.Enum):
             return {member.name.lower(): member for member in type(default)}[word.lower()]
         if isinstance(default, tuple):
-            return tuple(float(part) for part in word.split(","))
+            return tuple(plain_number(part) for part in word.split(","))
         if default is None or isinstance(default, int):
-            return int(word)
+            return plain_number(word, int)
         if isinstance(default, float):
-            number = float(word)
+            number = plain_number(word)
             if not math.isfinite(number):
                 raise ValueError
             return number

@@ -14,7 +14,7 @@ def test_names_and_numbers_are_metres(unit, metres):
     assert metres_per_unit(unit) == metres
 
 
-@pytest.mark.parametrize("unit", ["", "yard", "0", "-1", "nan", "inf", "1e9", None, [], 10**400])
+@pytest.mark.parametrize("unit", ["", "yard", "0", "-1", "nan", "inf", "1e9", "1_0", "\uff11\uff10", None, [], 10**400])
 def test_what_is_no_unit_is_said_with_those_that_are(unit):
     with pytest.raises(NeuralocksError, match="give mm, cm, m, in, or metres"):
         metres_per_unit(unit)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from neuralocks_core import model as model_file
 from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
@@ -140,6 +141,17 @@ def test_an_empty_path_is_not_the_current_folder(tmp_path, capsys, monkeypatch):
         assert status(*words) == 1
         assert capsys.readouterr().err == f"error: {name}: is empty; give a value, or leave it out\n"
     assert not list(tmp_path.iterdir())
+
+
+def test_numbers_are_written_plainly(tmp_path, model, capsys):
+    shot = write_shot(tmp_path)
+    for words, fact in (
+        (("--frames", "1:1_0"), "--frames 1:1_0: is not FIRST:LAST"),
+        (("--cuts", "1_0"), "--cuts 1_0: is no list of frames"),
+        (("--material", "weight=\u0662"), "material 'weight=\u0662': no number"),
+    ):
+        assert status("bake", shot, "-o", tmp_path / "o.usdc", "--model", model, *words) == 1
+        assert fact in capsys.readouterr().err
 
 
 def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys):
