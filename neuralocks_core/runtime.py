@@ -21,6 +21,8 @@ from neuralocks_core.motion import Clip
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
 do not depend on the machine."""
+LARGEST = 1e7
+"""Answers whose root mean square is larger are of no hair, in whatever units it was made."""
 
 
 class StrandModel:
@@ -62,17 +64,31 @@ class StrandModel:
     def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
         """One output of one graph, float32, of arrays by the names of its inputs: graphs, names and shapes are those of
         docs/architecture.md, The model file.
+
+        Raises:
+            NeuralocksError: it is not finite, or too large for hair.
         """
-        return self._sessions[graph].run([output], inputs)[0]
+        values = self._sessions[graph].run([output], inputs)[0]
+        return self._sane(graph, values)
 
     def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
         """What all strands share in a frame, of a boundary vector (spec.size,), by the names under which the tail reads it:
         `frame_part` (1, 256) float32, and where the frame changes the weights behind it more (docs/architecture.md, The
         model file).
+
+        Raises:
+            NeuralocksError: it is not finite, or too large for hair.
         """
         session = self._sessions["frame.onnx"]
         values = session.run(None, {"frame": np.asarray(vector, np.float32).reshape(1, -1)})
-        return {output.name: value for output, value in zip(session.get_outputs(), values)}
+        return {output.name: self._sane("frame.onnx", value) for output, value in zip(session.get_outputs(), values)}
+
+    def _sane(self, graph: str, values: np.ndarray) -> np.ndarray:
+        """The answer of a graph, if it can be of hair: NaN and infinity would go on into every file."""
+        # A product with itself, while it lies in the cache, costs a thousandth of what made it; NaN is below nothing.
+        if not np.vdot(values, values) <= LARGEST**2 * values.size:
+            raise NeuralocksError(f"{self.file.path}: {graph} gives no finite hair; get an undamaged copy of the model")
+        return values
 
     def by_chunk(self, function: Callable[[slice], None], count: int) -> None:
         """Call `function` with the slice of every chunk of `count` strands."""

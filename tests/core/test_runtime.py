@@ -173,6 +173,28 @@ def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+@pytest.mark.parametrize("name", model.KINDS["strands"])
+def test_a_model_that_gives_no_finite_hair_is_refused(path, strands, tmp_path, name, value):
+    """Such weights would fill a bake with NaN, and nothing else tells."""
+    onnx = pytest.importorskip("onnx")
+    file = model.read(path)
+    graph = onnx.load_model_from_string(file.graphs[name])
+    largest = max(graph.graph.initializer, key=lambda tensor: len(tensor.raw_data))
+    array = onnx.numpy_helper.to_array(largest)
+    with np.errstate(over="ignore"):  # some are stored in half precision
+        largest.CopyFrom(onnx.numpy_helper.from_array(np.full_like(array, value), largest.name))
+    graphs = {**file.graphs, name: graph.SerializeToString()}
+    damaged = model.write(tmp_path / "damaged.neuralocks", file.meta, graphs)
+    vector = np.ones(SPEC.size, np.float32)
+    vector[CLUMPING] = 0
+    with pytest.raises(NeuralocksError, match=r"damaged.neuralocks: \w+.onnx gives no finite hair; ") as caught:
+        session = StrandSession(StrandModel.load(damaged), strands)
+        session.anchor(np.zeros_like(vector))
+        session.displacement(vector)
+    assert "\n" not in str(caught.value)
+
+
 def test_what_a_model_does_not_say_of_itself_is_empty(path, tmp_path):
     file = model.read(path)
     quiet = model.write(tmp_path / "quiet.neuralocks", {**file.meta, "training": None, "credits": None}, file.graphs)
