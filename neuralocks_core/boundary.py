@@ -66,12 +66,23 @@ class BoundarySpec:
             )
 
     @classmethod
-    def from_json(cls, values: dict) -> "BoundarySpec":
+    def from_json(cls, values: dict, path=None) -> "BoundarySpec":
         """Make it from what `to_json` gave.
+
+        Args:
+            values: plain, of a file perhaps.
+            path: of that file, for messages.
 
         Raises:
             NeuralocksError: it holds what cannot be, or what a later version knows.
         """
+        try:
+            return cls._parsed(values)
+        except NeuralocksError as error:
+            raise NeuralocksError(f"{path}: {error}" if path else str(error)) from None
+
+    @classmethod
+    def _parsed(cls, values) -> "BoundarySpec":
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
             raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")
@@ -81,8 +92,10 @@ class BoundarySpec:
             return cls(**values)
         except NeuralocksError:
             raise
-        except (TypeError, ValueError, OverflowError) as error:
-            raise NeuralocksError(f"model: unreadable boundary history ({error}); get an undamaged copy") from None
+        except (TypeError, ValueError, OverflowError):  # whose own words tell a user nothing
+            raise NeuralocksError(
+                "model: its boundary history has values of a wrong kind; get an undamaged copy"
+            ) from None
 
     def to_json(self) -> dict:
         """Plain values for the model file."""

@@ -21,6 +21,21 @@ from neuralocks_core.motion import Clip
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
 do not depend on the machine."""
+IN = {
+    "encoder.onnx": {"shape": 72},
+    "strand.onnx": {"strand": 70},
+    "tail.onnx": {"strand_part": 256, "anchor": 72, "edges": 72},
+}
+"""What the graphs read, and how many numbers in a row. `frame.onnx` reads the boundary vector, and the tail all that it gives,
+too."""
+OUT = {
+    "encoder.onnx": {"code": 32},
+    "strand.onnx": {"strand_part": 256},
+    "frame.onnx": {"frame_part": 256},
+    "tail.onnx": {"offsets": 72, "displacement": 72},
+}
+CHANGED = {"middle": 256, "out": 72}
+"""What the frame gives besides, where it changes the weights behind it."""
 LARGEST = 1e7
 """Answers whose root mean square is larger are of no hair, in whatever units it was made."""
 
@@ -31,22 +46,22 @@ class StrandModel:
     Args:
         file: a model read by `model.read`.
         threads: chunks of strands worked on at a time; the result does not depend on it.
+
+    Raises:
+        NeuralocksError: its description or its graphs are none of a strand model.
     """
 
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
         self.file = file
         self.meta = file.meta
-        self.spec = BoundarySpec.from_json(file.meta.get("boundary"))
-        self.anchored = bool(file.meta.get("anchored", False))
+        self.spec = BoundarySpec.from_json(file.meta.get("boundary"), file.path)
+        self.anchored = file.meta.get("anchored", False)
+        if not isinstance(self.anchored, bool):
+            raise NeuralocksError(f"{file.path}: its 'anchored' is neither true nor false; get an undamaged copy")
         self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")
         self._sessions = {name: graph_session(file, name) for name in model_file.KINDS["strands"]}
-        read = [values.shape[-1] if values.shape else 1 for values in self._sessions["frame.onnx"].get_inputs()]
-        if read != [self.spec.size]:
-            raise NeuralocksError(
-                f"{file.path}: its network reads {read[0] if len(read) == 1 else read} values, its description gives {self.spec.size}; "
-                "get another copy"
-            )
+        self._check_graphs()
 
     @classmethod
     def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
@@ -66,10 +81,10 @@ class StrandModel:
         docs/architecture.md, The model file.
 
         Raises:
-            NeuralocksError: it is not finite, or too large for hair.
+            NeuralocksError: it cannot be computed, is not finite, or too large for hair.
         """
-        values = self._sessions[graph].run([output], inputs)[0]
-        return self._sane(graph, values)
+        shape = len(next(iter(inputs.values()))), OUT[graph][output]
+        return self._sane(graph, self._computed(graph, [output], inputs)[0], shape)
 
     def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
         """What all strands share in a frame, of a boundary vector (spec.size,), by the names under which the tail reads it:
@@ -77,15 +92,51 @@ class StrandModel:
         model file).
 
         Raises:
-            NeuralocksError: it is not finite, or too large for hair.
+            NeuralocksError: it cannot be computed, is not finite, or too large for hair.
         """
-        session = self._sessions["frame.onnx"]
-        values = session.run(None, {"frame": np.asarray(vector, np.float32).reshape(1, -1)})
-        return {output.name: self._sane("frame.onnx", value) for output, value in zip(session.get_outputs(), values)}
+        row = np.asarray(vector, np.float32).reshape(1, -1)
+        values = self._computed("frame.onnx", list(self._shared), {"frame": row})
+        return {
+            name: self._sane("frame.onnx", value, (1 if name == "frame_part" else 256, self._shared[name]))
+            for name, value in zip(self._shared, values)
+        }
 
-    def _sane(self, graph: str, values: np.ndarray) -> np.ndarray:
+    def _check_graphs(self) -> None:
+        """Refuse graphs that are not those of docs/architecture.md, before any of them is asked.
+
+        Raises:
+            NeuralocksError: one reads or gives something else.
+        """
+        given = {value.name for value in self._sessions["frame.onnx"].get_outputs()}
+        self._shared = OUT["frame.onnx"] | (CHANGED if given & set(CHANGED) else {})
+        gives = OUT | {"frame.onnx": self._shared}
+        reads = IN | {"frame.onnx": {"frame": self.spec.size}, "tail.onnx": IN["tail.onnx"] | self._shared}
+        for name, session in self._sessions.items():
+            for does, wanted, values in (
+                ("reads", reads[name], session.get_inputs()),
+                ("gives", gives[name], session.get_outputs()),
+            ):
+                found = {value.name: value.shape[-1] if value.shape else 1 for value in values}
+                if found != wanted or any(value.type != "tensor(float)" for value in values):
+                    raise NeuralocksError(
+                        f"{self.file.path}: {name} {does} {_named(found)}, not {_named(wanted)}; get an undamaged copy"
+                    )
+
+    def _computed(self, graph: str, outputs: list[str], inputs: dict[str, np.ndarray]) -> list[np.ndarray]:
+        try:
+            return self._sessions[graph].run(outputs, inputs)
+        except Exception as error:  # onnxruntime raises its own bare types for whatever goes wrong in a graph
+            raise NeuralocksError(
+                f"{self.file.path}: {graph} cannot be computed ({_fact(error)}); get an undamaged copy of the model"
+            ) from None
+
+    def _sane(self, graph: str, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
         """The answer of a graph, if it can be of hair: NaN and infinity would go on into every file."""
-        # A product with itself, while it lies in the cache, costs a thousandth of what made it; NaN is below nothing.
+        if values.shape != shape:
+            raise NeuralocksError(
+                f"{self.file.path}: {graph} gives {values.shape} numbers where {shape} belong; get an undamaged copy"
+            )
+        # A product with itself, while it lies in the cache, costs a hundredth of what made it; NaN is below nothing.
         if not np.vdot(values, values) <= LARGEST**2 * values.size:
             raise NeuralocksError(f"{self.file.path}: {graph} gives no finite hair; get an undamaged copy of the model")
         return values
@@ -144,5 +195,12 @@ def graph_session(file: model_file.ModelFile, name: str):
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
-        fact = str(error).splitlines()[0][:120]
-        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({fact}); get an undamaged copy") from None
+        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({_fact(error)}); get an undamaged copy") from None
+
+
+def _fact(error: Exception) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0][:120]
+
+
+def _named(values: dict[str, int]) -> str:
+    return ", ".join(f"{name} ({count})" for name, count in values.items())

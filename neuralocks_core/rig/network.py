@@ -176,8 +176,10 @@ class RigModel:
             )
         except NeuralocksError as error:
             raise NeuralocksError(f"{path}: {error}") from None
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise NeuralocksError(f"{path}: unreadable rig model ({error}); get an undamaged copy") from None
+        except KeyError as error:
+            raise NeuralocksError(f"{path}: its description lacks {error}; get an undamaged copy") from None
+        except (TypeError, ValueError, AttributeError, OverflowError):  # whose own words tell a user nothing
+            raise NeuralocksError(f"{path}: its description is unreadable; get an undamaged copy") from None
 
 
 class RigSampler:

@@ -71,7 +71,7 @@ class Beginning:
         """
         deep = self._graphs["frame.onnx"].layers
         has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
-        read = BoundarySpec.from_json(self._meta.get("boundary"))
+        read = BoundarySpec.from_json(self._meta.get("boundary"), self.path)
         has["boundary"] = spec if _reads_all_of(read, spec) else read
         has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
         wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}

@@ -156,12 +156,27 @@ def rewritten(path, target, **changes):
         ({"model_json": b"{"}, "damaged"),
         ({"model_json": json.dumps({"format": 99, "kind": "strands"})}, "update neuralocks"),
         ({"model_json": json.dumps({"format": 1, "kind": "cloth"})}, "unknown here"),
-        ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [1]}})}, "reads 278 values"),
+        (
+            {"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [1]}})},
+            r"frame \(278\), not frame",
+        ),
         ({"model_json": b'{"format": 1, "kind": []}'}, "unknown here"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "training": [1]})}, "'training' is no table"),
         ({"model_json": b'{"format": ' + b"1" * 5000 + b"}"}, "damaged"),
         ({"model_json": b"\xff"}, "damaged"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": 5})}, "boundary history"),
+        (
+            {"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"bins": [-1]}})},
+            "impossible time step",
+        ),
+        (
+            {"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {"pose_joints": [["neck"]]}})},
+            r"history has values of a wrong kind; get an undamaged copy$",
+        ),
+        (
+            {"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": {}, "anchored": "no"})},
+            "'anchored' is neither true nor false",
+        ),
         ({"model_json": json.dumps({"format": 1, "kind": "strands"})}, "boundary history"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "credits": "me"})}, "'credits' is no list"),
         ({"tail_onnx": b"nonsense"}, "cannot be loaded"),
@@ -170,6 +185,27 @@ def rewritten(path, target, **changes):
 def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
     with pytest.raises(NeuralocksError, match=fact) as caught:
         StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
+    assert "\n" not in str(caught.value) and str(caught.value).startswith(f"{tmp_path / 'm.neuralocks'}: ")
+
+
+def test_graphs_in_each_others_place_are_refused(path, tmp_path):
+    graphs = model.read(path).graphs
+    changes = {"encoder_onnx": graphs["strand.onnx"], "strand_onnx": graphs["encoder.onnx"]}
+    with pytest.raises(NeuralocksError, match=r"encoder.onnx reads strand \(70\), not shape \(72\); get"):
+        StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
+
+
+def test_a_graph_that_fails_while_it_is_computed_is_one_line(path, strands, tmp_path):
+    onnx = pytest.importorskip("onnx")
+    described = onnx.helper.make_tensor_value_info
+    read, given = (described(n, onnx.TensorProto.FLOAT, ["S", k]) for n, k in (("shape", 72), ("code", 32)))
+    beyond = onnx.helper.make_tensor("columns", onnx.TensorProto.INT64, [32], [72] * 32)
+    nodes = [onnx.helper.make_node("Gather", ["shape", "columns"], ["code"], axis=1)]
+    graph = onnx.helper.make_graph(nodes, "g", [read], [given], [beyond])
+    made = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8)
+    broken = rewritten(path, tmp_path / "m.neuralocks", encoder_onnx=made.SerializeToString())
+    with pytest.raises(NeuralocksError, match="encoder.onnx cannot be computed ") as caught:
+        StrandSession(StrandModel.load(broken), strands)
     assert "\n" not in str(caught.value)
 
 

@@ -91,7 +91,7 @@ SLIDERS = {
 
 def described(file: model_file.ModelFile) -> dict:
     """The content of `description.json`, but for a shot's grooms."""
-    spec = BoundarySpec.from_json(file.meta.get("boundary"))
+    spec = BoundarySpec.from_json(file.meta.get("boundary"), file.path)
     training = {name: value for name, value in file.meta["training"].items() if name != "curve"}
     result = {"units": UNITS, "graphs": _graphs(file)}
     if file.kind == "strands":

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.graph import rig_graph
@@ -38,6 +39,13 @@ def test_model_file_round_trip(tmp_path):
     again = RigModel.load(path)
     features = random_features(model, 20)
     assert (again.evaluate(features) == model.evaluate(features)).all()
+    file = model_file.read(path)
+    for meta, fact in (
+        ({"boundary": {"pose_joints": [[]]}}, "wrong kind"),
+        ({"layers": 5}, "description is unreadable"),
+    ):
+        with pytest.raises(NeuralocksError, match=f"odd.neuralocks: .*{fact}; get"):
+            RigModel.load(model_file.write(tmp_path / "odd.neuralocks", {**file.meta, **meta}, file.graphs))
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(NeuralocksError, match="m.neuralocks"):
         RigModel.load(path)
