@@ -3,6 +3,7 @@
 
 import json
 import os
+import stat
 import zipfile
 import zlib
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ CARD = (("training", dict, "table of values"), ("report", dict, "table of values
 """What every model says of itself, empty where its file does not."""
 _LARGEST = 64 << 20
 """Bytes of one unpacked entry; a model has about one million, so a bomb is told from a model."""
+_LARGEST_FILE = 5 * _LARGEST
+"""Bytes of a file: nothing else is looked through for the zip in it."""
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,18 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
         graphs: the ONNX files that `KINDS[kind]` lists.
 
     Raises:
-        NeuralocksError: it has another name, or cannot be written.
-        ValueError: the graphs are not those of its kind, or `meta` holds NaN.
+        NeuralocksError: it has another name, cannot be written, or `meta` holds NaN or infinity.
+        ValueError: the graphs are not those of its kind.
     """
     path = named(path)
     if set(graphs) != set(KINDS[meta["kind"]]):
         raise ValueError(f"a {meta['kind']} model holds {KINDS[meta['kind']]}, not {tuple(graphs)}")
-    text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
+    try:
+        text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
+    except ValueError:
+        raise NeuralocksError(
+            f"{path}: its description would hold NaN or infinity, as of a training that ran away; train with smaller steps"
+        ) from None
     with atomic_write(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in {"model.json": text.encode(), **graphs}.items():
             # A fixed date: the same training gives the same bytes.
@@ -97,6 +105,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
     """
     path = as_path(path, "model")
     try:
+        _check_file(path)
         with zipfile.ZipFile(path) as archive:
             entries = {info.filename: info for info in archive.infolist()}
             if "model.json" not in entries:
@@ -109,14 +118,15 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
             if missing:
                 raise NeuralocksError(f"{path}: it lacks {missing[0]}; get an undamaged copy of the model")
             graphs = {name: _entry(archive, entries[name], path) for name in KINDS[meta["kind"]]}
+    except NeuralocksError:
+        raise
     except FileNotFoundError:
         raise NeuralocksError(
             f"{path}: no such model file; check the path, or leave it out for the shipped one"
         ) from None
-    except IsADirectoryError:
-        raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it") from None
     except (
         OSError,
+        ValueError,
         zipfile.BadZipFile,
         EOFError,
         NotImplementedError,
@@ -125,6 +135,16 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
     ) as error:
         raise NeuralocksError(f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy") from None
     return ModelFile(path, meta, graphs)
+
+
+def _check_file(path: Path) -> None:
+    found = os.stat(path)
+    if stat.S_ISDIR(found.st_mode):
+        raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it")
+    if not stat.S_ISREG(found.st_mode):  # a device has no end, and a pipe may never begin
+        raise NeuralocksError(f"{path}: is no file; choose a .neuralocks file")
+    if found.st_size > _LARGEST_FILE:
+        raise NeuralocksError(f"{path}: has {found.st_size} bytes, more than a model has; choose a .neuralocks file")
 
 
 def _parsed(text: bytes):

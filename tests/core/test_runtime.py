@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -245,12 +246,20 @@ def test_truncated_missing_and_foreign_files_are_refused(path, tmp_path):
             StrandModel.load(file)
     with pytest.raises(NeuralocksError, match="strand hair, not for rigged"):
         model.read(path, "rig")
+    with pytest.raises(NeuralocksError, match=f"^{re.escape(os.devnull)}: (is no file|no such)"):
+        model.read(os.devnull)
+    with open(cut, "ab") as file:
+        file.truncate(1 << 30)
+    with pytest.raises(NeuralocksError, match="more than a model has"):
+        model.read(cut)
 
 
 def test_writing_twice_gives_the_same_bytes(path, tmp_path):
     file = model.read(path)
     copies = [model.write(tmp_path / f"{i}.neuralocks", file.meta, file.graphs).read_bytes() for i in (1, 2)]
     assert copies[0] == copies[1]
+    with pytest.raises(NeuralocksError, match="3.neuralocks: .* NaN"):
+        model.write(tmp_path / "3.neuralocks", {**file.meta, "report": {"loss": float("nan")}}, file.graphs)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["1.neuralocks", "2.neuralocks"]
 
 
