@@ -70,7 +70,7 @@ def train_autoencoder(
         return {"shape": ((model(target) - target).square().mean(1) * weight[pick]).mean()}
 
     schedule = Schedule(seconds / 60, steps, rate, floor=0.01, warm_up=1, clip=float("inf"))
-    for state in descend([optimiser], losses, schedule):
+    for state in descend([optimiser], losses, schedule, remedy="look for strands of absurd length"):
         if progress:
             error = 1e3 * state.losses["shape"] ** 0.5
             progress(int(1000 * state.done), 1000, f"strand codes: error {error:.1f} mm")

@@ -14,6 +14,17 @@ import torch
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import replace_npz
 
+KEPT = {
+    "Adam": {"step", "exp_avg", "exp_avg_sq"},
+    "AdamW": {"step", "exp_avg", "exp_avg_sq"},
+    "Muon": {"momentum_buffer"},
+}
+"""What each kind of optimiser keeps of a parameter: `step` is one number, all others are as many as the parameter has."""
+
+
+class _Unfit(ValueError):
+    """Why a checkpoint does not fit, in words for a user."""
+
 
 def save(
     path: Path, meta: dict, modules: dict[str, torch.nn.Module], optimisers: Sequence[torch.optim.Optimizer] = ()
@@ -24,12 +35,15 @@ def save(
         path: ends in `.npz`.
         meta: plain JSON values.
         modules: by name; all their parameters and buffers are kept.
-        optimisers: whose state is tensors and numbers, as that of all in torch.
+        optimisers: of the kinds in KEPT.
 
     Raises:
-        NeuralocksError: the file system refuses.
+        NeuralocksError: the file system refuses, or a number is not finite: what was there before stays.
     """
-    arrays = {"meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)}
+    try:
+        arrays = {"meta": np.frombuffer(json.dumps(meta, allow_nan=False).encode(), np.uint8)}
+    except ValueError:
+        raise _ran_away(path, "its measures") from None
     for name, module in modules.items():
         for key, value in module.state_dict().items():
             arrays[f"module/{name}/{key}"] = value.detach().cpu().numpy()
@@ -37,6 +51,8 @@ def save(
         for index, values in optimiser.state_dict()["state"].items():
             for key, value in values.items():
                 arrays[f"optimiser/{place}/{index}/{key}"] = torch.as_tensor(value).detach().cpu().numpy()
+    if odd := _not_finite(arrays):
+        raise _ran_away(path, odd)
     replace_npz(path, arrays)
 
 
@@ -59,24 +75,55 @@ def load(
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         meta = json.loads(arrays["meta"].tobytes())
-        had = meta.get("settings", {})
+        had = meta.get("settings", {}) if isinstance(meta, dict) else None
+        if not isinstance(had, dict):
+            raise _Unfit("damaged")
         if other := [name for name, value in (settings or {}).items() if had.get(name) != value]:
-            raise ValueError(f"it has other settings in {', '.join(other)}")
+            raise _Unfit(f"it has other settings in {', '.join(other)}")
+        if odd := _not_finite(arrays):
+            raise _Unfit(f"NaN or infinity in {odd}")
+        tensors = {name: torch.from_numpy(value) for name, value in arrays.items() if name != "meta"}
         for name, module in modules.items():
             prefix = f"module/{name}/"
-            values = {k.removeprefix(prefix): torch.from_numpy(v) for k, v in arrays.items() if k.startswith(prefix)}
-            module.load_state_dict(values)
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        fact = "damaged" if "allow_pickle" in str(error) else str(error).splitlines()[0]
+            module.load_state_dict({k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)})
+        for place, optimiser in enumerate(optimisers):
+            _fill(optimiser, {k: v for k, v in tensors.items() if k.startswith(f"optimiser/{place}/")})
+    except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+        # What numpy, json and torch say of damage is told to programmers.
+        fact = error if isinstance(error, _Unfit) else "another network" if type(error) is RuntimeError else "damaged"
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None
-    for place, optimiser in enumerate(optimisers):
-        state: dict[int, dict] = {}
-        for name, value in arrays.items():
-            if name.startswith(f"optimiser/{place}/"):
-                index, key = name.split("/")[2:]
-                state.setdefault(int(index), {})[key] = torch.from_numpy(value)
-        if state:
-            optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
     return meta
+
+
+def _fill(optimiser: torch.optim.Optimizer, tensors: dict[str, torch.Tensor]) -> None:
+    """The state of an optimiser, which has none before its first step.
+
+    Raises:
+        ValueError: it is of other parameters, or of another optimiser.
+    """
+    state: dict[int, dict] = {}
+    for name, value in tensors.items():
+        index, key = name.split("/")[2:]
+        state.setdefault(int(index), {})[key] = value
+    if not state:
+        return
+    parameters = [p for group in optimiser.param_groups for p in group["params"]]
+    for index, values in state.items():
+        if not 0 <= index < len(parameters) or values.keys() != KEPT[type(optimiser).__name__]:
+            raise _Unfit("another optimiser")
+        for key, value in values.items():
+            shape = () if key == "step" else parameters[index].shape
+            if value.shape != shape or not value.is_floating_point():
+                raise _Unfit(f"its optimiser has {tuple(value.shape)} numbers where {tuple(shape)} belong")
+    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+
+
+def _not_finite(arrays: dict[str, np.ndarray]) -> str:
+    """The first array with NaN or infinity, by its name; empty if there is none."""
+    return next((k for k, v in arrays.items() if v.dtype.kind == "f" and not np.isfinite(v).all()), "")
+
+
+def _ran_away(path: Path, where: str) -> NeuralocksError:
+    return NeuralocksError(f"{path}: NaN or infinity in {where}; train with a smaller --set rate")

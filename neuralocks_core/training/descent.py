@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from neuralocks_core.errors import NeuralocksError
+
 Losses = Callable[[float], dict[str, torch.Tensor]]
 """Share of the budget that is used (0..1) -> named, weighted losses of one batch; their sum is minimised."""
 
@@ -67,6 +69,7 @@ def descend(
     *,
     step: int = 0,
     done: float = 0.0,
+    remedy: str = "",
 ) -> Iterator[Descended]:
     """Minimise the sum of `losses` over what the optimisers hold; stop it by leaving the loop.
 
@@ -75,9 +78,13 @@ def descend(
         losses: called once a step; whatever else should happen now and then may happen in it.
         schedule: budget and step sizes.
         step, done: where an earlier run with the same budget stopped.
+        remedy: what a user can do against losses that grow beyond numbers; a smaller `--set rate` if left out.
 
     Yields:
         about once a second, and after the last step.
+
+    Raises:
+        NeuralocksError: a loss or a weight is not finite when the next state is to be yielded.
     """
     groups = [group for optimiser in optimisers for group in optimiser.param_groups]
     parameters = [p for group in groups for p in group["params"]]
@@ -101,4 +108,7 @@ def descend(
             running[name] = running.get(name, value) + (value - running.get(name, value)) / schedule.smoothing
         if now - shown > 1.0 or done >= 1.0:
             shown = now
+            if not (np.isfinite(list(running.values())).all() and all(bool(p.isfinite().all()) for p in parameters)):
+                remedy = remedy or f"train with a smaller --set rate than {schedule.rate:g}"
+                raise NeuralocksError(f"training: it ran away, its loss is not finite after {step} steps; {remedy}")
             yield Descended(step, min(done, 1.0), dict(running))

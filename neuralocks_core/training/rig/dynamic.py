@@ -20,7 +20,7 @@ from neuralocks_core.training.descent import Schedule, descend, muon
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
-from neuralocks_core.training.rig.network import TinyNet
+from neuralocks_core.training.rig.network import REMEDY, TinyNet
 from neuralocks_core.training.rig.report import static_report
 
 _VELOCITY = 20.0
@@ -107,7 +107,7 @@ def train_dynamic(
 
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
-    for state in descend(muon(net, _RATE, 0.1), losses, schedule):
+    for state in descend(muon(net, _RATE, 0.1), losses, schedule, remedy=REMEDY):
         far = simulated + int((learned - simulated) * state.done)
         say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {

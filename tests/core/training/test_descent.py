@@ -6,6 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from neuralocks_core.errors import NeuralocksError  # noqa: E402
 from neuralocks_core.training.descent import Schedule, descend  # noqa: E402
 
 
@@ -58,3 +59,19 @@ def test_time_ends_it():
     place = torch.nn.Parameter(torch.ones(1))
     *_, last = descend([torch.optim.Adam([place])], lambda done: {"x": place.sum() ** 2}, Schedule(minutes=1e-6))
     assert last.step >= 1 and last.done == 1.0
+
+
+@pytest.mark.parametrize("wrong", ["loss", "weight"])
+def test_what_runs_away_is_told_before_anything_is_saved(wrong):
+    place = torch.nn.Parameter(torch.ones(2))
+
+    def losses(done):
+        if wrong == "loss":
+            return {"x": (place * 1e30).square().sum()}
+        return {"x": (0 * place).sqrt().sum()}  # whose slope is beyond numbers
+
+    schedule = Schedule(steps=3, rate=1000.0)
+    with pytest.raises(NeuralocksError, match="not finite after 3 steps; train with a smaller --set rate than 1000$"):
+        list(descend([torch.optim.Adam([place])], losses, schedule))
+    with pytest.raises(NeuralocksError, match="; mind the rig$"):
+        list(descend([torch.optim.Adam([place])], losses, schedule, remedy="mind the rig"))

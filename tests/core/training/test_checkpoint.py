@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checkpoints: NaN is never kept, and whatever a damaged one holds is one line."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from neuralocks_core.errors import NeuralocksError  # noqa: E402
+from neuralocks_core.training import checkpoint  # noqa: E402
+from neuralocks_core.training.descent import muon  # noqa: E402
+
+NAN = np.float32(np.nan)
+
+
+def learning():
+    """A network and its optimisers after one step."""
+    torch.manual_seed(0)
+    net = torch.nn.Linear(3, 2)
+    optimisers = muon(net, 1e-3, 0.0)
+    step(net, optimisers)
+    return net, optimisers
+
+
+def step(net, optimisers):
+    net(torch.ones(1, 3)).square().sum().backward()
+    for optimiser in optimisers:
+        optimiser.step()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"meta": np.frombuffer(b"[]", np.uint8)},
+        {"meta": np.frombuffer(b'{"settings": []}', np.uint8)},
+        {"meta": np.zeros(0, np.uint8)},
+        {"module/net/weight": np.full((2, 3), NAN)},
+        {"module/net/weight": np.array(["x"])},
+        {"module/net/weight": np.zeros((3, 3), np.float32)},
+        {"optimiser/0/x/momentum_buffer": np.zeros((2, 3), np.float32)},
+        {"optimiser/0/0": np.zeros(2, np.float32)},
+        {"optimiser/0/7/momentum_buffer": np.zeros((2, 3), np.float32)},
+        {"optimiser/0/0/momentum_buffer": np.zeros(7, np.float32)},
+        {"optimiser/0/0/momentum_buffer": np.full((2, 3), NAN)},
+        {"optimiser/1/0/exp_avg": np.array(["x", "y"])},
+        {"optimiser/1/0/exp_avg": np.zeros(2, np.int64)},
+        {"optimiser/1/0/exp_avg": None},
+        {"optimiser/1/0/step": np.ones(2, np.float32)},
+    ],
+)
+def test_a_damaged_checkpoint_is_one_line(tmp_path, changes):
+    net, optimisers = learning()
+    path = tmp_path / "c.npz"
+    checkpoint.save(path, {"settings": {"a": 1}, "step": 1}, {"net": net}, optimisers)
+    assert checkpoint.load(path, {"net": net}, optimisers, {"a": 1})["step"] == 1
+    step(net, optimisers)
+    with np.load(path) as archive:
+        arrays = {**archive, **changes}
+    np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
+    with pytest.raises(NeuralocksError, match=r"c.npz: this checkpoint does not fit \(") as caught:
+        checkpoint.load(path, {"net": net}, optimisers, {"a": 1})
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_not_finite_does_not_take_the_place_of_what_is(tmp_path):
+    net, optimisers = learning()
+    path = tmp_path / "c.npz"
+    checkpoint.save(path, {"step": 1}, {"net": net}, optimisers)
+    before = path.read_bytes()
+    with pytest.raises(
+        NeuralocksError, match="c.npz: NaN or infinity in its measures; train with a smaller --set rate"
+    ):
+        checkpoint.save(path, {"curve": [float("inf")]}, {"net": net}, optimisers)
+    with torch.no_grad():
+        net.weight[0, 0] = float("nan")
+    with pytest.raises(NeuralocksError, match="c.npz: NaN or infinity in module/net/weight"):
+        checkpoint.save(path, {"step": 2}, {"net": net}, optimisers)
+    assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
