@@ -31,7 +31,13 @@ class OnnxGraph:
         self.name, self.nodes, self.constants = name, [], []
 
     def constant(self, name: str, array: np.ndarray) -> str:
-        """An array under this name, which is returned."""
+        """An array under this name, which is returned.
+
+        Raises:
+            NeuralocksError: it holds NaN or infinity, as of a training that ran away.
+        """
+        if not np.isfinite(array).all():
+            raise NeuralocksError(f"{self.name}: NaN or infinity in {name}; train with a smaller --set rate")
         self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
         return name
 

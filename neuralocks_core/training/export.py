@@ -79,7 +79,8 @@ class _Graph(OnnxGraph):
 
     def half(self, name: str, array: np.ndarray) -> str:
         """A constant that is stored in float16 and read as float32."""
-        stored = self.constant(f"{name}.half", array.astype(np.float16))
+        with np.errstate(over="ignore"):  # `constant` refuses infinity
+            stored = self.constant(f"{name}.half", array.astype(np.float16))
         self.nodes.append(self.helper.make_node("Cast", [stored], [name], to=1))
         return name
 

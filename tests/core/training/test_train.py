@@ -139,6 +139,18 @@ def test_what_cannot_be_resumed_says_why(scene, tmp_path):
         checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
 
 
+def test_a_training_that_runs_away_is_one_line(scene, tmp_path, monkeypatch):
+    """Steps far too large end in NaN, or in weights that no model file holds: never in a model, nor in a checkpoint."""
+    monkeypatch.setattr(methods, "FIRST", 2)
+    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
+    out, options = tmp_path / "hair.neuralocks", RegressionOptions(steps=30, rate=1e12, clips=2, strands=2)
+    with pytest.raises(NeuralocksError, match="--set rate") as caught:
+        train_strands(scene, out, options, rollouts=2)
+    assert "\n" not in str(caught.value) and not out.exists()
+    with pytest.raises(NeuralocksError, match="--set rate"):
+        train_strands(scene, out, options, rollouts=2, resume=True)
+
+
 def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     """Weights of another output or method fit in shape: hair would be answered wrongly, or the optimiser would break.
     Simulations tell of the strands and the motion that they were made of; two trainings in one folder would mix theirs.
