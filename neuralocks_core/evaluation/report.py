@@ -13,6 +13,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
+from neuralocks_core.plain import plain
 
 LABELS = {
     "stretch_percent": ("length error, mean", "%", "of a strand's rest length, in head space"),
@@ -73,7 +74,7 @@ class Card:
     def to_json(self) -> str:
         """The numbers, for machines; what could not be measured is null."""
         body = {"title": self.title, "grooms": self.grooms, "compared": self.compared, "notes": list(self.notes)}
-        return json.dumps(_plain(body), indent=2, sort_keys=False)
+        return json.dumps(plain(body, digits=6), indent=2, sort_keys=False)
 
     def text(self, encoding: str | None = "utf-8") -> str:
         """For people, in characters of `encoding`: what has none, a frame's corner or a letter of a name, is replaced."""
@@ -205,15 +206,3 @@ def _number(value) -> str:
     if isinstance(value, (int, np.integer)) or value == 0:
         return str(int(value))
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
-
-
-def _plain(value):
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (np.integer, np.floating)):
-        value = value.item()
-    if isinstance(value, float):
-        return round(value, 6) if math.isfinite(value) else None
-    return value

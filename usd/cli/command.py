@@ -12,6 +12,7 @@ from pathlib import Path
 import typer
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.plain import plain
 
 from ..border.stopping import deferred, stoppable
 
@@ -106,5 +107,5 @@ def counted(number: int, thing: str) -> str:
 
 
 def print_json(value) -> None:
-    """Print a plain value for a machine to read."""
-    typer.echo(json.dumps(value, indent=1, default=str))
+    """Print a plain value for a machine to read; what is no number is null."""
+    typer.echo(json.dumps(plain(value), indent=1, default=str))

@@ -8,6 +8,7 @@ from pathlib import Path
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.plain import plain
 
 from ..border.stopping import check
 from .description import described
@@ -51,7 +52,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
             tables = export_grooms(shot, model, put, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
             description["grooms"] = {"arrays": ARRAYS, "files": tables}
-        files = dict(file.graphs) | {DESCRIPTION: json.dumps(description, indent=1).encode()}
+        files = dict(file.graphs) | {DESCRIPTION: json.dumps(plain(description), indent=1).encode()}
         for name, data in files.items():
             put(name).write_bytes(data)
         check()

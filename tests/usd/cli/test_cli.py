@@ -5,12 +5,15 @@ import json
 import os
 import subprocess
 import sys
+import zipfile
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from neuralocks_core import model as model_file
+from neuralocks_core.plain import plain
 from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
@@ -45,6 +48,24 @@ def test_errors_are_one_line_and_status_one(tmp_path, model, capsys):
         captured = capsys.readouterr()
         assert captured.out == "" and captured.err.count("\n") == 1 and captured.err.startswith("error: "), captured
         assert "nope" in captured.err
+
+
+def test_what_is_no_number_is_null_for_machines(tmp_path, model, capsys):
+    """A model of somebody else may hold NaN, which Python writes and no other program reads."""
+    odd = tmp_path / "odd.neuralocks"
+    with zipfile.ZipFile(model) as old, zipfile.ZipFile(odd, "w") as new:
+        for name in old.namelist():
+            told = old.read(name)
+            if name == "model.json":
+                told = json.dumps(json.loads(told) | {"report": {"loss": float("nan"), "error": [float("inf"), 2.0]}})
+            new.writestr(name, told)
+    assert status("inspect", odd, "--json") == 0
+    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert told["model"]["report"] == {"loss": None, "error": [None, 2.0]}
+    assert status("export", odd, "-o", tmp_path) == 0
+    json.loads((tmp_path / "description.json").read_text(), parse_constant=pytest.fail)
+    assert plain({1: (np.float32(0.5), np.int64(3), np.nan)}) == {"1": [0.5, 3, None]}
+    assert plain([1.23456789], digits=6) == [1.234568]
 
 
 def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys):

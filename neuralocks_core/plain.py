@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values as every reader of JSON takes them: NaN and infinity, which JSON does not know, are null."""
+
+import math
+
+
+def plain(value, digits: int | None = None):
+    """A copy of nested dicts, lists and numbers, numpy's too, for `json.dumps`; other values stay as they are.
+
+    Args:
+        value: what to copy.
+        digits: behind the point, to which numbers are rounded; all of them if left out.
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item, digits) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, digits) for item in value]
+    if getattr(value, "ndim", None) == 0:  # of numpy, which this does without: commands that need none start sooner
+        value = value.item()
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return None
+        return value if digits is None else round(value, digits)
+    return value
