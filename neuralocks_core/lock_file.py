@@ -21,7 +21,7 @@ class FolderLock:
         busy: what to say of that where another process is at work in the folder.
 
     Raises:
-        NeuralocksError: it is held by another process, or it cannot be made.
+        NeuralocksError: it is held by another process, is a link to somewhere else, or cannot be made.
     """
 
     def __init__(self, folder: Path, subject: Path, busy: str):
@@ -29,6 +29,8 @@ class FolderLock:
         try:
             for _ in range(TRIES):
                 folder.mkdir(parents=True, exist_ok=True)
+                if folder.is_symlink():
+                    raise NeuralocksError(f"{folder}: is a link, and files behind it would be removed; remove the link")
                 self._lock = _taken(folder / "lock")
                 if self._lock is not None:
                     return

@@ -202,7 +202,7 @@ def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bo
     for number, items in enumerate(batched):
         points = sum(item.point_count for item in items)
         frame = 12 * points
-        left += frame * sum(spool.holds(number, code, points) for code in codes)
+        left += frame * sum(spool.seems_to_hold(number, code, points) for code in codes)
         # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
         size += 1.03 * frame * (2 + velocities) * len(codes)
     if size - left > (free := shutil.disk_usage(spool.folder).free):

@@ -4,6 +4,9 @@
 import hashlib
 import json
 import os
+import re
+import shutil
+import stat
 import uuid
 from pathlib import Path
 
@@ -12,6 +15,11 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write, make_way, remove_empty
 from neuralocks_core.lock_file import FolderLock
+
+from .frame_file import has_size, is_whole, read_rows, write_frame
+
+_FRAME = r"\d+_-?0x[01](\.[0-9a-f]+)?p[+-]\d+\.frame"
+_PART = rf"{_FRAME[: -len('frame')]}part|[0-9a-f]{{32}}\.part.*"
 
 
 class Spool:
@@ -30,6 +38,7 @@ class Spool:
 
     def __init__(self, out: Path, fingerprint: str):
         self.out = out
+        self._sure: set[Path] = set()  # frames written or looked through by this process
         self.folder = out.parent / f".{out.name}.baking"
         try:
             self._made = make_way(out)
@@ -48,43 +57,50 @@ class Spool:
 
     def _forget_others(self, fingerprint: bytes) -> None:
         mark = self.folder / "inputs"
-        if not mark.is_file() or mark.read_bytes() != fingerprint:
-            for old in self.folder.glob("*.frame"):
-                old.unlink()
+        if not _is_file(mark) or mark.read_bytes() != fingerprint:
+            for old in self._named(_FRAME):
+                _remove(old)
+            _remove(mark)
             mark.write_bytes(fingerprint)
-        for stray in self.folder.glob("*.part*"):
-            stray.unlink()
+        # A folder or a link under a frame's name cannot be replaced by one, or leads elsewhere.
+        for stray in [*self._named(_PART), *(frame for frame in self._named(_FRAME) if not _is_file(frame))]:
+            _remove(stray)
+
+    def _named(self, pattern: str) -> list[Path]:
+        """What is in the folder under names of ours: whatever else a user put there stays."""
+        return [path for path in self.folder.iterdir() if re.fullmatch(pattern, path.name)]
+
+    def seems_to_hold(self, groom: int, time_code: float, points: int) -> bool:
+        """Whether there is a frame of as many points; `holds` reads it to be sure."""
+        return has_size(self._path(groom, time_code), points)
 
     def holds(self, groom: int, time_code: float, points: int) -> bool:
-        """Whether the points (points, 3) of a frame are there, all of them."""
-        try:
-            return self._path(groom, time_code).stat().st_size == points * 12
-        except OSError:
-            return False
+        """Whether the points (points, 3) of a frame are there, all of them, as they were written."""
+        path = self._path(groom, time_code)
+        if path not in self._sure and has_size(path, points) and is_whole(path):
+            self._sure.add(path)
+        return path in self._sure
 
     def read(self, groom: int, time_code: float, rows: slice) -> np.ndarray:
-        """Rows (n, 3) float32 of the points of a frame that is there.
+        """Rows (n, 3) float32, from a first to before a last, of the points of a frame that is there.
 
         Raises:
             NeuralocksError: they cannot be read.
         """
-        path, first = self._path(groom, time_code), rows.start or 0
-        count = -1 if rows.stop is None else 3 * (rows.stop - first)
+        path = self._path(groom, time_code)
         try:
-            return np.fromfile(path, np.float32, count, offset=12 * first).reshape(-1, 3)
+            return read_rows(path, rows)
         except (OSError, ValueError) as error:
             raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
 
     def write(self, groom: int, time_code: float, array: np.ndarray) -> None:
         """Keep the points (P, 3) of a finished frame."""
         path = self._path(groom, time_code)
-        part = path.with_suffix(".part")
         try:
-            with open(part, "wb") as file:
-                file.write(np.ascontiguousarray(array, np.float32).data)
-            os.replace(part, path)
+            write_frame(path, array)
         except OSError as error:
             raise cannot_write(self.out, error) from None
+        self._sure.add(path)
 
     def finish(self) -> None:
         """Put the assembled layer under its final name and remove the rest."""
@@ -108,6 +124,21 @@ class Spool:
 
     def _path(self, groom: int, time_code: float) -> Path:
         return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+
+
+def _is_file(path: Path) -> bool:
+    """Whether it is a file, and no link to one."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:
+        return False
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def fingerprint(files, values: dict) -> str:

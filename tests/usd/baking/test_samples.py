@@ -135,11 +135,11 @@ def test_a_bake_that_goes_on_asks_for_the_space_that_it_still_needs(tmp_path, mo
     with pytest.raises(KeyboardInterrupt):
         bake(shot, out, model, velocities=False, progress=stop)
     left = len(list(spool.glob("*.frame")))
-    (spool / "stray.part.usdc").write_bytes(bytes(5 * frame))
+    (spool / f"{0:032x}.part.usdc").write_bytes(bytes(5 * frame))
     disk = 19 * frame
     with pytest.raises(NeuralocksError, match="needs 1 MB while"):
         bake(shot, out, model, velocities=False)
     assert len(list(spool.glob("*.frame"))) == left >= 7
-    (spool / "stray.part.usdc").write_bytes(bytes(5 * frame))
+    (spool / f"{0:032x}.part.usdc").write_bytes(bytes(5 * frame))
     disk = 21 * frame
     assert bake(shot, out, model, velocities=False).resumed == 2 * left

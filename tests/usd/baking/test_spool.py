@@ -22,10 +22,66 @@ def test_a_damaged_mark_means_a_fresh_start(tmp_path):
     spool.close()
 
 
-def test_a_folder_that_cannot_be_cleared_is_one_line(tmp_path):
-    (tmp_path / ".bake.usdc.baking" / "0_0x1p+0.frame").mkdir(parents=True)
+def test_a_folder_that_cannot_be_cleared_is_one_line(tmp_path, monkeypatch):
+    (tmp_path / ".bake.usdc.baking").mkdir()
+    (tmp_path / ".bake.usdc.baking" / "0_0x1p+0.frame").touch()
+    monkeypatch.setattr(Path, "unlink", lambda *_, **__: (_ for _ in ()).throw(PermissionError(errno.EPERM, "no")))
     with pytest.raises(NeuralocksError, match="cannot be written"):
         Spool(tmp_path / "bake.usdc", "a")
+
+
+@pytest.mark.parametrize("points", [1, 2, 50001])
+def test_frames_that_were_left_damaged_are_not_taken_over(tmp_path, points):
+    """A power cut leaves zeros, or half of a frame, under a name and with a size that are right."""
+    array = np.random.default_rng(0).normal(size=(points, 3)).astype(np.float32)
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    for code in (1.0, 2.0, -3.5):
+        spool.write(0, code, array)
+        assert spool.holds(0, code, points)
+    spool.close()
+    *_, second, third = files = sorted((tmp_path / ".bake.usdc.baking").glob("*.frame"))
+    assert len(files) == 3
+    third.write_bytes(bytes(third.stat().st_size))
+    changed = bytearray(second.read_bytes())
+    changed[5] ^= 64
+    second.write_bytes(changed)
+    again = Spool(tmp_path / "bake.usdc", "a")
+    whole = [code for code in (1.0, 2.0, -3.5) if again.holds(0, code, points)]
+    assert [again._path(0, code) for code in whole] == files[:1]
+    assert np.array_equal(again.read(0, whole[0], slice(points // 2, points)), array[points // 2 :])
+    again.discard()
+
+
+def test_folders_and_links_in_the_place_of_frames_make_way(tmp_path):
+    folder = tmp_path / ".bake.usdc.baking"
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    spool.write(0, 3.0, np.ones((2, 3)))
+    spool.close()
+    (tmp_path / "mine").write_text("mine")
+    (folder / "0_0x1.0000000000000p+0.frame" / "deep").mkdir(parents=True)
+    (folder / "0_0x1.0000000000000p+1.frame").symlink_to(tmp_path / "mine")
+    (folder / "notes.frame").touch()
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    for code in (1.0, 2.0):
+        spool.write(0, code, np.zeros((2, 3)))
+    assert all(spool.holds(0, code, 2) for code in (1.0, 2.0, 3.0)) and (folder / "notes.frame").exists()
+    spool.close()
+    (folder / "inputs").unlink()
+    (folder / "inputs").mkdir()
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    assert not spool.holds(0, 3.0, 2) and (tmp_path / "mine").read_text() == "mine"
+    spool.discard()
+
+
+def test_a_link_in_the_place_of_the_folder_is_refused(tmp_path):
+    """Files of ours behind it may be somebody's."""
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "0_0x1p+0.frame").write_text("precious")
+    (tmp_path / ".bake.usdc.baking").symlink_to(theirs)
+    with pytest.raises(NeuralocksError, match=r"\.bake\.usdc\.baking: is a link, .*; remove the link$"):
+        Spool(tmp_path / "bake.usdc", "a")
+    assert [path.name for path in theirs.iterdir()] == ["0_0x1p+0.frame"]
 
 
 def test_a_disk_without_room_for_a_mark_is_left_as_it_was(tmp_path, monkeypatch):
