@@ -191,7 +191,7 @@ def graph_session(file: model_file.ModelFile, name: str):
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
     options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves a hundredth of the time at most
-    options.log_severity_level = 3
+    options.log_severity_level = 4  # what goes wrong is raised, too
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
@@ -199,7 +199,7 @@ def graph_session(file: model_file.ModelFile, name: str):
 
 
 def _fact(error: Exception) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0][:120]
+    return (str(error) or type(error).__name__).splitlines()[0].rsplit("Status Message: ", 1)[-1][:120]
 
 
 def _named(values: dict[str, int]) -> str:
