@@ -9,6 +9,8 @@ from . import curves
 from .nodes import geometry_nodes
 
 NAME = "Neuralocks Motion Blur"
+TREE = f".{NAME}"
+"""The dot keeps it out of menus: it stays in the session, and is in no file, which holds what has users only."""
 
 
 def begin(hair, scene) -> None:
@@ -19,20 +21,19 @@ def begin(hair, scene) -> None:
 
 
 def end() -> None:
-    """Take these modifiers off again."""
+    """Take these modifiers off again. Their node group stays: where a scene is rendered into the strip of another, the
+    outer render goes on, and Blender 5.2 crashes when data that it holds is removed.
+    """
     for thing in bpy.data.objects:
         modifier = thing.modifiers.get(NAME) if thing.type == "CURVES" and thing.library is None else None
         if modifier is not None:
             thing.modifiers.remove(modifier)
-    tree = bpy.data.node_groups.get(NAME)
-    if tree is not None and not tree.users:
-        bpy.data.node_groups.remove(tree)
 
 
 def _nothing():
     """Geometry nodes that hand over what they get."""
-    tree = bpy.data.node_groups.get(NAME)
+    tree = bpy.data.node_groups.get(TREE)
     if tree is None:
-        tree, source, target = geometry_nodes(NAME)
+        tree, source, target = geometry_nodes(TREE)
         tree.links.new(source, target)
     return tree

@@ -173,7 +173,7 @@ def motion_blur(folder: Path) -> None:
     assert deformed == [True, False]
     for frame, points in shown.items():
         assert apart(got[frame], points) < 1e-6, frame
-    assert not strands.modifiers and not bpy.data.node_groups and not messages(), messages()
+    assert not strands.modifiers and not any(tree.users for tree in bpy.data.node_groups) and not messages(), messages()
     with bpy.data.libraries.load(str(folder / "meanwhile.blend")) as (saved, _):
         assert not saved.node_groups
 
@@ -222,6 +222,43 @@ def by_parts(folder: Path) -> None:
         else:
             assert "Neuralocks: " in said.getvalue() and "missing.neuralocks" in said.getvalue(), said.getvalue()
     bpy.utils.unregister_class(Witness)
+
+
+def through_strip(folder: Path) -> None:
+    """An animation is rendered through the sequencer, with the strip of a scene that has live hair: the hair is as shown,
+    and nothing is left on it.
+    """
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = {frame: points_at(strands, frame) for frame in (5, 6, 7)}
+    got = {}
+
+    class Witness(bpy.types.RenderEngine):
+        bl_idname, bl_label = "WITNESS", "Witness"
+
+        def render(self, graph):
+            if graph.scene.name == scene.name:
+                got[graph.scene.frame_current] = scenes.points(strands, graph)
+
+    bpy.utils.register_class(Witness)
+    cut = bpy.data.scenes.new("Cut")
+    editor = cut.sequence_editor_create()
+    (editor.strips if hasattr(editor, "strips") else editor.sequences).new_scene("Shot", scene, 1, 1)
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.neuralocks.use_scene_range, scene.neuralocks.frame_end = False, 24
+    scene.render.engine = "WITNESS"
+    for each in (scene, cut):
+        each.render.resolution_x = each.render.resolution_y = 8
+    cut.frame_start, cut.frame_end, cut.render.filepath = 5, 7, str(folder / "r_")
+    bpy.context.window.scene = cut
+    bpy.ops.render.render(animation=True)
+    bpy.utils.unregister_class(Witness)
+    assert sorted(got) == sorted(shown) and not strands.modifiers and not messages(), (sorted(got), messages())
+    for frame, points in shown.items():
+        assert apart(got[frame], points) < 1e-6, frame
 
 
 def _compose(scene, other) -> None:
