@@ -8,9 +8,11 @@ import time
 import bpy
 
 from .live import carriers, needs_sampling, refresh
+from .scene.layers import working_in
 from .scene.redraw import redraw
 from .scene.sampling import in_slices
 from .scene.up_to_date import notice
+from .scene.windows import layer_shown, scenes_shown
 from .session import session
 
 SLICE = 0.05
@@ -52,31 +54,46 @@ def cancel() -> None:
 
 def look() -> float | None:
     """Blender's timer: sample for SLICE; seconds until the next look, None when nothing is out of date."""
-    context = bpy.context
-    scene = context.scene
-    if _busy(context):
+    if _busy(bpy.context):
         return PAUSE
     if (wait := _wanted["at"] - time.perf_counter()) > 0:
         return wait
-    if _work and _work[0][0] != scene.name_full:  # another one is shown since
+    scenes = scenes_shown()
+    if _work and _work[0][0] not in {scene.name_full for scene in scenes}:  # others are shown since
         _work.clear()
     if not _work:
         if _wanted["closely"]:
             _wanted["closely"] = False
-            for armature in carriers(scene):
-                notice(armature, scene)
-        todo = [a for a in needs_sampling(scene) if a.name_full not in session.failed]
-        if not todo:
+            for scene in scenes:
+                for armature in carriers(scene):
+                    notice(armature, scene)
+        todo = _todo(scenes)
+        if todo is None:
             session.sampling = None
             redraw()
             return None
-        _work.append((scene.name_full, todo[0].name_full, in_slices(context, todo[0], SLICE)))
-    _go_on()
+        scene, armature = todo
+        _work.append((scene.name_full, armature.name_full, in_slices(bpy.context, armature, SLICE)))
+    scene = next(scene for scene in scenes if scene.name_full == _work[0][0])
+    with working_in(scene, layer_shown(scene)):
+        _go_on()
     if not _work:
         session.sampling = None
         refresh(scene)
     redraw()
     return 0.01
+
+
+def _todo(scenes: list) -> tuple | None:
+    """The next (scene, armature) to sample; an armature that is in several scenes moves as in the first of them."""
+    seen = set()
+    for scene in scenes:
+        own = set(carriers(scene)) - seen
+        for armature in needs_sampling(scene):
+            if armature in own and armature.name_full not in session.failed:
+                return scene, armature
+        seen |= own
+    return None
 
 
 def _go_on() -> None:

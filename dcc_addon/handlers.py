@@ -18,6 +18,7 @@ from .scene.layers import working_in
 from .scene.save_as import Remade
 from .scene.together import drawn_with
 from .scene.up_to_date import ensure
+from .scene.windows import layer_shown
 from .session import session
 
 
@@ -120,7 +121,7 @@ def before_render(scene, *_):
     console, which is all that a render farm keeps, which hair will not move.
     """
     for drawn in drawn_with(scene):
-        with working_in(drawn, _layer_of(drawn)):
+        with working_in(drawn, layer_shown(drawn)):
             _make_ready(drawn)
         for thing in [*live_hairs(drawn), *live.carriers(drawn)]:
             if thing.name_full in session.messages:
@@ -153,11 +154,6 @@ def _unseen(change):
         return change()
     finally:
         session.paused -= 1
-
-
-def _layer_of(scene):
-    """The view layer to work in; which of them hair moves in is seen to where it is read."""
-    return bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
 
 
 def _mark_stale() -> None:

@@ -21,6 +21,7 @@ from .scene.muting import mute_deformers, unmute_deformers
 from .scene.placing import world
 from .scene.sampling import shown_frame
 from .scene.watched import evaluated_for_itself
+from .scene.windows import layer_shown
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
@@ -208,12 +209,15 @@ def _recipe(hair, sampled, wanted: tuple):
 
 
 def _arrived(name: str) -> None:
-    """Show hair that has just been prepared."""
-    hair, scene = find(name), bpy.context.scene
-    if hair is not None and hair.neuralocks_hair.live and not session.paused:
-        armature = hair.neuralocks_hair.armature
+    """Show hair that has just been prepared, in all scenes that it is in and that have been shown; last in the one in view."""
+    hair = find(name)
+    if hair is None or not hair.neuralocks_hair.live or session.paused:
+        return
+    armature = hair.neuralocks_hair.armature
+    shown = [scene for scene in hair.users_scene if any(layer.depsgraph for layer in scene.view_layers)]
+    for scene in sorted(shown, key=lambda scene: scene == bpy.context.scene):
         layer = layer_of(armature, scene) if armature is not None else None
-        update(hair, scene, graph_of(scene, layer or bpy.context.view_layer), False, False)
+        update(hair, scene, graph_of(scene, layer or layer_shown(scene)), False, False)
 
 
 def material(settings) -> np.ndarray:
