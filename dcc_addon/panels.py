@@ -113,7 +113,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         row.prop(own, "live", toggle=True, icon="PAUSE" if own.live else "PLAY")
         if hair.name_full in session.preparing:
             done = session.preparing[hair.name_full][0].done
-            progress(layout, done, f"Preparing the hair {100 * done:.0f} %, Live cancels")
+            progress(layout, done, f"Preparing {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
         if off := off_meanwhile(hair):
             words(layout, f"Off meanwhile, or the hair would move twice: {', '.join(off)}", "INFO")

@@ -239,7 +239,7 @@ class SceneSettings(bpy.types.PropertyGroup):
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
         name="Samples",
-        description="Samples per frame: more than one for motion blur, as --subframes on the command line; a shutter that is open before the "
+        description="Samples per frame: more than one for motion blur; a shutter that is open before the "
         "first frame, or after the last, needs a bake that is a frame longer there",
         default=1,
         min=1,

@@ -38,7 +38,7 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
     def work(self, context):
         armature = shown_armature(context)
         sampled = ensure(context, armature)
-        chains = chains_of(sampled.character, armature.neuralocks_character.chains)
+        chains = chains_of(sampled.character, armature.neuralocks_character.chains, armature.name_full)
         lines = [
             f"{chains.chain_name(i)}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
             for i in range(len(chains.roots))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.carried import CarriedHair
@@ -16,15 +17,22 @@ from .motion import Motion
 from .rig import RigArrays
 
 
-def chains_of(character: Character, patterns: str = "") -> HairChains:
+def chains_of(character: Character, patterns: str = "", name: str = "skeleton") -> HairChains:
     """The hair chains of a character.
 
     Args:
         character: with its body, if that is known.
         patterns: names of first joints, separated by commas; found by themselves where empty.
+        name: what errors call it.
+
+    Raises:
+        NeuralocksError: there are none, or one of them cannot be measured.
     """
     wanted = [word.strip() for word in patterns.split(",") if word.strip()]
-    return find_chains(character, _meshes(character), wanted or None)
+    try:
+        return find_chains(character, _meshes(character), wanted or None)
+    except NeuralocksError as error:
+        raise type(error)(str(error).replace("skeleton:", f"{name}:", 1)) from None
 
 
 def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -66,7 +74,7 @@ class LiveBones:
         below = character.skeleton.below(character.head)
         model = replace(model, chains=model.chains.named_as(rig.paths, below))
         joints = model.chains.match(rig.paths, below)
-        chains = chains_of(character, patterns)
+        chains = chains_of(character, patterns, rig.name)
         model.chains.check_same(chains)
         return cls(model, tuple(rig.bones[j] for j in joints), joints, chains)
 

@@ -302,8 +302,8 @@ def test_errors_name_what_the_panel_has(tmp_path):
     character = Character(skeleton, None, rig.RigArrays("Rig", BONES, PARENTS, _rest()).humanoid())
     for patterns in ("", "curl*", "spine", "head"):
         with pytest.raises(NeuralocksError) as error:
-            bones.chains_of(character, patterns)
-        assert "--" in str(error.value)
+            bones.chains_of(character, patterns, "Rig")
+        assert "--" in str(error.value) and "skeleton:" not in str(error.value)
         assert "--" not in (said := panel_errors.for_the_panel(str(error.value))) and "neuralocks " not in said, said
     with pytest.raises(NeuralocksError) as error:
         model.read(tmp_path / "nowhere.neuralocks", "strands")

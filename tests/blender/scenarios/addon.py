@@ -129,5 +129,6 @@ def words(_folder: Path) -> None:
         for prop in cls.bl_rna.properties:
             if prop.identifier in cls.__annotations__:
                 assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
+                assert "--" not in prop.description, prop.identifier
                 if prop.type == "ENUM":
                     assert all(item.description for item in prop.enum_items), prop.identifier
