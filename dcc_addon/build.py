@@ -108,12 +108,16 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
 
 
 def legacy(output: Path, wheels: list[Path]) -> Path:
-    """The zip for Blender before 4.2: a folder, with the packages unpacked in it."""
+    """The zip for Blender before 4.2: a folder, with the packages unpacked in it; the first wheel, our own, is there as it
+    is, too.
+    """
     manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     out = output / f"neuralocks-{version(manifest)}-legacy-{LEGACY[0]}.zip"
     with Written(out) as archive:
         for path in sources():
             archive.write(path, f"neuralocks/{path.relative_to(HERE).as_posix()}")
+        own = wheels[0]  # for the Python that trains
+        archive.write(own, f"neuralocks/wheels/{own.name}", compress_type=zipfile.ZIP_STORED)
         for wheel in sorted(wheels):
             with zipfile.ZipFile(wheel) as packed:
                 for name in packed.namelist():

@@ -9,7 +9,7 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
-from .operators.training import job
+from .operators.training import job, known_problem
 from .scene.actions import has_keys
 from .scene.attach import MODIFIER
 from .scene.muting import off_meanwhile
@@ -138,6 +138,8 @@ def _training(layout, settings, kind: str) -> None:
         column = layout.column(align=True)
         column.operator("neuralocks.train", icon="MODIFIER").kind = kind
         column.prop(settings, "train_minutes")
+        if problem := known_problem():
+            words(layout, problem, "INFO")
         if session.trained is not None:
             text, well = session.trained
             words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")

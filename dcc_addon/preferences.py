@@ -14,7 +14,7 @@ class Preferences(bpy.types.AddonPreferences):
 
     python: StringProperty(
         name="Python for training",
-        description="A Python with torch, in which Neuralocks trains (python3 -m pip install 'neuralocks[train]')",
+        description="A Python with torch, in which Neuralocks trains",
         subtype="FILE_PATH",
     )
 

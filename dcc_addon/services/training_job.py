@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 CHILD = Path(__file__).with_name("training_child.py")
+ADDON = Path(__file__).resolve().parent.parent
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
 """For a child's input and output. In a code page of Windows, a letter that it lacks would end the reader."""
 
@@ -22,7 +23,7 @@ def problem(python: str) -> str:
     Args:
         python: path of an interpreter; empty means none is set.
     """
-    remedy = "install one with: python3 -m pip install 'neuralocks[train]', and name it in the add-on's preferences"
+    remedy = f"in a Python of your own run: {installing()}; then name that Python in the add-on's preferences"
     if not python:
         return f"Training needs a Python with torch, which is too large to come with the add-on; {remedy}"
     if not os.path.isfile(python):
@@ -42,6 +43,14 @@ def problem(python: str) -> str:
         lines = [line for line in done.stderr.strip().splitlines() if line]
         return f"{python}: {lines[-1] if lines else 'does not run'}; {remedy}"
     return ""
+
+
+def installing() -> str:
+    """The command that gives a Python what training needs: with the wheel that lies beside the add-on, or, in a source
+    checkout, with that. No package index has the project.
+    """
+    wheel = next((ADDON / "wheels").glob("neuralocks-*.whl"), None)
+    return f'python3 -m pip install "{wheel or ADDON.parent}[train]"'
 
 
 def environment() -> dict[str, str]:

@@ -42,6 +42,7 @@ def test_zips_hold_what_blender_expects(tmp_path):
     with zipfile.ZipFile(build.legacy(tmp_path, [wheel])) as made:
         listed = made.namelist()
     assert all(n.startswith("neuralocks/") for n in listed) and "neuralocks/packages/thing/__init__.py" in listed
+    assert f"neuralocks/wheels/{wheel.name}" in listed
     assert json.dumps(manifest["version"]) == json.dumps(
         build.version((build.HERE / "blender_manifest.toml").read_text())
     )

@@ -74,4 +74,12 @@ def test_training_says_why_it_failed(job, out, words):
 @pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
 def test_missing_trainer_comes_with_a_remedy(python, words):
     problem = training_job.problem(python)
-    assert words in problem and "pip install 'neuralocks[train]'" in problem
+    assert words in problem and f'pip install "{training_job.ADDON.parent}[train]"' in problem
+
+
+def test_the_remedy_names_the_wheel_that_comes_along(tmp_path, monkeypatch):
+    wheel = tmp_path / "wheels" / "neuralocks-1.0-py3-none-any.whl"
+    wheel.parent.mkdir()
+    wheel.touch()
+    monkeypatch.setattr(training_job, "ADDON", tmp_path)
+    assert f'pip install "{wheel}[train]"' in training_job.problem("")
