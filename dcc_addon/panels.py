@@ -80,6 +80,8 @@ def _motion(layout, armature, scene) -> None:
             words(
                 layout, f"Hair knows the motion of frames {first:g} to {last:g} only; widen the scene's range", "INFO"
             )
+    for text in sampled.bodies_off if sampled is not None else ():
+        words(layout, text, "INFO")
     message(layout, armature.name_full)
 
 

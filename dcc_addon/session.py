@@ -61,6 +61,9 @@ class SampledRig:
     posture: int = 0
     """How what is not keyed was posed; see `scene.sampling.posture_of`."""
 
+    bodies_off: tuple[str, ...] = ()
+    """What to say of bodies that are drawn elsewhere than hair is kept out of; see `scene.body_drawn`."""
+
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of the body meshes."""

@@ -18,7 +18,7 @@ from ..services.axes import to_core
 from ..services.hidden import unhidden
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
-from . import actions, rotations
+from . import actions, body_drawn, rotations
 from . import armature as armature_reader
 from . import body as body_reader
 from .binding import bind_places, hidden
@@ -151,7 +151,7 @@ class _Recording:
         self._own = np.empty((count, bones, 3, 3), np.float32)
         self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
         self._places = {name: np.empty((count, 4, 4)) for name in ["", *self._tracked]}
-        self._shapes = []
+        self._shapes, self._bodies_at, self._looked = [], {}, {count // 2, count - 1}
         self.reader = None
 
     def take(self, row: int) -> None:
@@ -199,6 +199,8 @@ class _Recording:
             self._places[other][row] = world(named(other), graph)
         values = [body_reader.shape_values(find(body), graph) for body in self._bodies]
         self._shapes.append(np.concatenate([np.zeros(0), *values]))
+        if row in self._looked:
+            self._bodies_at[row] = [body_drawn.drawn(find(body), graph) for body in self._bodies]
 
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""
@@ -251,6 +253,9 @@ class _Recording:
             own=self._own,
             rigging=self._rigging,
             posture=self._posture,
+            bodies_off=body_drawn.all_told(
+                armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
+            ),
         )
 
 

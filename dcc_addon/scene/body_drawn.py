@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a body is drawn from where its bones' weights and shape keys alone take it, which is all that hair is kept out
+of: modifiers, and settings of the armature's own, may move it further.
+"""
+
+import numpy as np
+
+from neuralocks_core.rotation import transformed
+
+from ..services.axes import to_core
+from .armature import matrix
+from .body import left_behind
+from .lookup import find
+from .watched import evaluated_for_itself
+
+FAR = 0.005
+"""Less is not told [m]."""
+REACH = 0.5
+"""How far from the head's joint it matters [m]."""
+
+
+def drawn(mesh_object, graph) -> np.ndarray | None:
+    """World points (V, 3) of a mesh as it is drawn, in Blender's space; None where these are not its own vertices, because a
+    modifier makes others, or where Blender does not evaluate it, or without its armature.
+    """
+    off = any(modifier.type == "ARMATURE" and not modifier.show_viewport for modifier in mesh_object.modifiers)
+    if off or not evaluated_for_itself(mesh_object, graph):
+        return None
+    evaluated = mesh_object.evaluated_get(graph)
+    vertices = evaluated.data.vertices
+    if len(vertices) != len(mesh_object.data.vertices):
+        return None
+    points = np.empty((len(vertices), 3), np.float32)
+    vertices.foreach_get("co", points.ravel())
+    return transformed(points, matrix(evaluated.matrix_world))
+
+
+def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -> tuple[str, ...]:
+    """What to say of the bodies of an armature that are drawn elsewhere than is expected.
+
+    Args:
+        bodies: their `BodyArrays`, together the body of the character.
+        seen: what `drawn` gave of each of them, by row of the clip.
+        character, clip: how hair knows them, in the core's space.
+        unit: metres of Blender's unit.
+    """
+    off = np.zeros(len(bodies))
+    for row, points in seen.items() if bodies else ():
+        posed = character.posed_body(clip.joints[row], clip.shape[row])
+        ends = np.cumsum([len(body.points) for body in bodies])[:-1]
+        for number, (shown, own) in enumerate(zip(points, np.split(posed, ends))):
+            if shown is not None and len(shown) == len(own):
+                shown = transformed(shown, to_core(unit))
+                near = np.linalg.norm(shown - clip.joints[row, character.head, :3, 3], axis=1) < REACH
+                off[number] = max(off[number], np.linalg.norm(shown - own, axis=1)[near].max(initial=0.0))
+    found = ((find(body.name), far) for body, far in zip(bodies, off) if far >= FAR)
+    return tuple(_told(thing, far) for thing, far in found if not left_behind(thing, armature))
+
+
+def _told(mesh_object, far: float) -> str:
+    why = ", ".join(_causes(mesh_object)) or "look at its parent, its weights and its bones"
+    return (
+        f"{mesh_object.name_full}: hair is kept out of it where weights and shape keys take it; near the head it is drawn up "
+        f"to {1000 * far:.0f} mm from there: {why}"
+    )
+
+
+def _causes(mesh_object) -> list[str]:
+    """What may move vertices besides weights and shape keys."""
+    found = []
+    if mesh_object.show_only_shape_key and mesh_object.data.shape_keys:
+        found.append("a pinned shape key")
+    for modifier in mesh_object.modifiers:
+        if modifier.type == "ARMATURE":
+            settings = {"Preserve Volume": modifier.use_deform_preserve_volume, "Vertex Group": modifier.vertex_group}
+            found += [f"{name} of '{modifier.name}'" for name, used in settings.items() if used]
+        elif modifier.show_viewport:
+            found.append(f"modifier '{modifier.name}'")
+    return found
