@@ -12,9 +12,9 @@ through the roots of each folder's files and through the scalp (`real_grooms.py`
 The scripted clips are made of the gestures that training draws at random, with sizes near the middle of the random
 ones': no clip was trained on, but it is motion of that kind. All is measured on the network's 24 vertices, before hair
 is kept out of the body. `echo` is the speed of the tips half a second to two seconds after a stop, in percent of the
-solver's largest after it, `echo error` that of their difference from the solver's. `turn` is the mean angle between successive edges: what is above the
-solver's is crinkled. `mirror` is how far the network's answer is
-from what it answers to the same hair and motion in a mirror, rms, in percent of how far hair is from rest. The floor is measured from one
+solver's largest after it, `echo error` that of their difference from the solver's. `turn` is the mean angle between
+successive edges: what is above the solver's is crinkled. `mirror` is how far the network's answer is from what it answers
+to the same hair and motion in a mirror, rms, in percent of how far hair is from rest. The floor is measured from one
 history's length on, and the columns after it are the network's in the same frames.
 """
 

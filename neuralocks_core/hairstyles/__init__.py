@@ -47,7 +47,7 @@ def grow(
         variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
 
     Raises:
-        NeuralocksError: an unknown style, no scalp, or a strand count out of range.
+        NeuralocksError: an unknown style, no scalp, a strand count out of range, or a variation below 0.
     """
     if style not in STYLES:
         raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
@@ -55,6 +55,8 @@ def grow(
         raise NeuralocksError(f"scalp: {scalp!r} is none; give a Scalp, such as hairstyles.from_head marks on a head")
     if not 1 <= count <= MOST_STRANDS:
         raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
+    if variation < 0:
+        raise NeuralocksError(f"style '{style}': there is no variation {variation}; give 0 or more")
     random = np.random.default_rng(seed)
     obstacle = body if isinstance(body, Obstacle) else Obstacle(scalp, body)
     size = scalp.radius / 0.1

@@ -66,8 +66,12 @@ def training_scene(
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file cannot be used, or there is no hair.
+        NeuralocksError: a file cannot be used, there is no hair, or there are to be variations of no library.
     """
+    if variations and LIBRARY not in grooms:
+        raise NeuralocksError(
+            f"--variations {variations}: are of the library's styles; add --groom {LIBRARY}, or leave it out"
+        )
     rigs = read_rigs(character, skeleton, head, joints)
     rig = rigs[0]
     if "head" not in rig.character.humanoid:

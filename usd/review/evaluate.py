@@ -100,14 +100,15 @@ class _Subject:
         self.chosen = whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self.valid = int(every.valid.sum())
-        self._within(groom)
+        arc, length = arc_lengths(groom)
+        self._within(groom, arc, length)
         rest = self.character.canonical(groom.points.astype(float))
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
         self.moved = np.zeros((total, count, K, 3), np.float32)
         self.own_rest = rest[self._own]
         self.own = np.zeros((total, len(self._own), 3), np.float32)
-        self.bends = OwnBends(groom, self.chosen, arc_lengths(groom)[0], rest, total)
+        self.bends = OwnBends(groom, self.chosen, arc, rest, total)
         sums, taut = [], []
         edges_at_rest = self._edge_lengths(rest)
         for frame, code in enumerate(baked.codes):
@@ -125,9 +126,8 @@ class _Subject:
         }
         self.stretch_energy = float(np.mean(taut))
 
-    def _within(self, groom) -> None:
+    def _within(self, groom, arc: np.ndarray, length: np.ndarray) -> None:
         """Where the chosen strands' network vertices lie between own vertices, and which own vertices that can move are measured."""
-        arc, length = arc_lengths(groom)
         self._low = np.zeros((len(self.chosen), K), int)
         self._part = np.zeros((len(self.chosen), K, 1))
         own, edges = [], []

@@ -39,9 +39,8 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     if not rig.skins:
         return []
     first, last = (off_skin(some_ends(prim, last=last), rig, to_bind) for last in (False, True))
-    if (
-        first <= NEAR
-    ):  # most hair's last points are much farther from the skin's own, and it is not measured more exactly
+    if first <= NEAR:
+        # Most hair's last points are much farther from the skin's own, and it is not measured more exactly.
         first = _turned_round(prim, rig, to_bind) if last <= CLEARLY * first else 0.0
     if last > NEAR or not first:
         return []

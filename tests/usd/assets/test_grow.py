@@ -46,6 +46,14 @@ def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatc
     np.testing.assert_allclose(own.rest, many[5].rest, atol=1e-6)
 
 
+def test_variations_are_of_a_style_of_the_library(tmp_path):
+    """Of a groom of one's own there are none, and a number below 0 is no variation."""
+    with pytest.raises(NeuralocksError, match="--variations 2.*--groom library"):
+        training_scene(BODY, [], variations=2)
+    with pytest.raises(NeuralocksError, match="no variation -1"):
+        grow("bob", BODY, tmp_path / "bob.usda", count=5, variation=-1)
+
+
 @pytest.mark.parametrize("unit, up", [(0.01, "Z"), (0.0254, "Y")])
 def test_a_groom_suits_the_stage_of_its_character(tmp_path, unit, up):
     """Laid over a character in another unit or axis, it sits on the head without a transform of the user's."""
