@@ -51,6 +51,11 @@ class Puppet:
             before = self._turns.get(joint, 0.0) + np.zeros_like(vectors)
             self._turns[joint] = rotation.to_vector(rotation.from_vector(vectors) @ rotation.from_vector(before))
 
+    def turn_about(self, height: float, vectors: np.ndarray) -> None:
+        """Turn the whole body by rotation vectors (T, 3) [rad] about a point so high above its root [m]."""
+        self.turn("root", vectors)
+        self.position += height * (UP - rotation.from_vector(vectors) @ UP)
+
     def turn_neck(self, vectors: np.ndarray) -> None:
         """A turn of the head (T, 3) [rad], a third of it in the neck as people do."""
         share = 1 / 3 if "neck" in self.character.humanoid else 0.0

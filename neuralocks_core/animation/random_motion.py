@@ -15,6 +15,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip, G
 
 KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
+WILD = ("spin", "tumble")
+"""Rarer and farther from standing: dancing and falling, which models learn but are not judged by unless asked."""
 REST = 0.3
 """[s] A random clip begins still, so that hair at rest is its true beginning."""
 
@@ -26,7 +28,7 @@ def random_clip(
     rate: float = 30.0,
     shape: np.ndarray | None = None,
 ) -> Clip:
-    """A random motion of one to three gestures over swaying and posture.
+    """A random motion of one to three gestures over swaying and posture; in one of five the whole body spins or tumbles.
 
     Args:
         character: who moves.
@@ -41,7 +43,8 @@ def random_clip(
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
-    for kind in dict.fromkeys(str(k) for k in chosen):
+    wild = [rng.choice(WILD)] if rng.random() < 0.2 else []
+    for kind in dict.fromkeys(str(k) for k in (*chosen, *wild)):
         _GESTURES[kind](puppet, _Dice(rng, seconds))
     return puppet.clip(shape)
 
@@ -50,10 +53,10 @@ def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: f
     """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
 
     Raises:
-        NeuralocksError: the kind is none of KINDS.
+        NeuralocksError: the kind is none of KINDS or WILD.
     """
-    if kind not in KINDS:
-        raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(KINDS)}")
+    if kind not in _GESTURES:
+        raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(_GESTURES)}")
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
     _GESTURES[kind](puppet, _Dice(None, seconds))
@@ -213,6 +216,23 @@ def _hold(puppet: Puppet, dice: _Dice) -> None:
     puppet.turn_neck(curve * turn)
 
 
+def _spin(puppet: Puppet, dice: _Dice) -> None:
+    """Some revolutions of the whole body, as in a pirouette."""
+    attack, hold, release = dice.between(0.15, 0.5), dice.between(0.2, 1.8), dice.between(0.15, 0.6)
+    rate = dice.sign() * dice.between(4.0, 14.0) * pulse(puppet.times, dice.start(0.3), attack, hold, release)
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(puppet.times))])
+    puppet.turn("root", turned[:, None] * UP)
+
+
+def _tumble(puppet: Puppet, dice: _Dice) -> None:
+    """The whole body goes over about a level axis: it falls to the ground, or rolls, or turns a cartwheel."""
+    whole = dice.between(0, 1) > 0.6
+    angle = dice.sign() * (2 * np.pi if whole else dice.between(0.6, 2.8))
+    duration = abs(angle) / dice.between(2.0, 5.0)
+    curve = ease(puppet.times, dice.start(0.3), duration)
+    puppet.turn_about(dice.between(0.0, 1.4), curve[:, None] * dice.direction() * angle)
+
+
 _GESTURES = {
     "shake": _shake,
     "turn": _turn,
@@ -225,4 +245,6 @@ _GESTURES = {
     "walk": _walk,
     "fall_and_stop": _fall_and_stop,
     "hold": _hold,
+    "spin": _spin,
+    "tumble": _tumble,
 }

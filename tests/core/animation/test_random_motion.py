@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from neuralocks_core import rotation
 from neuralocks_core.animation.random_motion import KINDS, random_clip, scripted_clip
 from tests.core.rigs import HEAD, person
 
@@ -52,3 +53,21 @@ def test_free_fall_is_free_fall():
     clip = scripted_clip(person(), "fall_and_stop", rate=120.0)
     down = np.diff(clip.joints[:, HEAD, 1, 3], 2) * 120**2
     assert np.median(down[down < -5]) == pytest.approx(-9.81, abs=0.05)
+
+
+def test_a_spin_turns_the_body_around_and_around_where_it_stands():
+    clip = scripted_clip(person(), "spin", rate=120.0)
+    root = clip.joints[:, 0, :3, :3]
+    steps = rotation.to_vector(root[1:] @ root[:-1].swapaxes(-1, -2))
+    assert np.abs(steps[:, [0, 2]]).max() < 1e-9
+    assert steps[:, 1].sum() > 4 * np.pi
+    assert np.ptp(clip.joints[:, 0, :3, 3], axis=0).max() < 1e-9
+
+
+def test_a_tumble_lays_the_body_down_about_a_point_that_stays():
+    clip = scripted_clip(person(), "tumble", rate=120.0)
+    root = clip.joints[:, 0]
+    assert root[-1, 1, 1] < 0.0  # beyond lying
+    pivot = 0.55 * 1.4
+    at = root[:, :3, 3] + pivot * root[:, :3, 1]
+    assert np.ptp(at, axis=0).max() < 1e-9
