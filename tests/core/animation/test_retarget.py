@@ -11,6 +11,7 @@ from neuralocks_core.animation.retarget import retarget
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.formats.bvh import read_bvh
 from neuralocks_core.rotation import from_vector
+from tests.core.animation.written_bvh import NAMINGS, write_bvh
 from tests.shared_data import SHARED
 
 REAL = SHARED / "motion"
@@ -111,3 +112,49 @@ def test_retargeting_to_a_turned_rig_turns_the_motion(woman, tmp_path):
     motion = take(REAL / "02_01.bvh")
     straight, other = retarget(motion, Character(skeleton)), retarget(motion, turned)
     assert np.allclose(whole @ straight.joints, other.joints, atol=1e-9)
+
+
+POSE = {
+    "hips": (0, 0, 40),
+    "chest": (5, 12, 0),
+    "neck": (0, 8, 10),
+    "head": (6, 20, 25),
+    "left_arm": (70, 0, 0),
+    "right_forearm": (0, 0, 80),
+}
+"""Turned as a whole by 40 degrees, bent, with one arm up and the other elbow bent to the front."""
+
+
+def turned(z, x, y):
+    """Turns about Z, X and Y [degrees], as the file's channels stand."""
+    each = zip(np.radians([z, x, y]), np.eye(3)[[2, 0, 1]], strict=True)
+    return np.linalg.multi_dot([from_vector(angle * axis) for angle, axis in each])
+
+
+@pytest.mark.parametrize("naming", NAMINGS)
+def test_a_written_pose_is_taken_whatever_the_joints_are_called(woman, tmp_path, naming):
+    clip = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", [{}, POSE], naming)), woman)
+    hips, chest, neck, head = (turned(*POSE[part]) for part in ("hips", "chest", "neck", "head"))
+    turns = woman.relative_rotations(clip.joints, [woman.humanoid[n] for n in ("hips", "chest", "neck", "head")])
+    assert np.allclose(turns[0], np.eye(3), atol=1e-9)
+    assert np.allclose(turns[1, 0], hips, atol=1e-9)
+    assert np.allclose(turns[1, 2:], [hips @ chest @ neck, hips @ chest @ neck @ head], atol=1e-9)
+    for child, joint, bone in (
+        ("left_lower_arm", "left_upper_arm", hips @ chest @ turned(*POSE["left_arm"]) @ [1, 0, 0]),
+        ("right_hand", "right_lower_arm", hips @ chest @ turned(*POSE["right_forearm"]) @ [-1, 0, 0]),
+        ("left_foot", "left_lower_leg", hips @ [0, -1, 0]),
+    ):
+        way = (place(clip, woman, child) - place(clip, woman, joint))[1]
+        assert np.allclose(way / np.linalg.norm(way), bone, atol=1e-9), child
+
+
+def test_written_steps_are_as_long_as_her_legs(woman, tmp_path):
+    """Twice the source's leg forward is twice hers; up and down likewise."""
+    leg = 84.0
+    places = [(0, 95, 0), (0, 95, 2 * leg), (0, 95 + leg / 4, 2 * leg)]
+    clip = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", [{}] * 3, places=places)), woman)
+    bind = woman.skeleton.bind[:, :3, 3]
+    thigh, shin, foot = (bind[woman.humanoid[f"left_{part}"]] for part in ("upper_leg", "lower_leg", "foot"))
+    hers = np.linalg.norm(shin - thigh) + np.linalg.norm(foot - shin)
+    hips = place(clip, woman, "hips")
+    assert np.allclose(hips[1:] - hips[0], [[0, 0, 2 * hers], [0, hers / 4, 2 * hers]], atol=1e-6)
