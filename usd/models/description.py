@@ -10,7 +10,7 @@ from neuralocks_core.measures import MEASURES
 from neuralocks_core.runtime import graph_session
 
 from ..border.units import FASTEST, SLOWEST
-from ..skel.clip_codes import CLOSE, SAME, STAND
+from ..skel.clip_codes import ALONE, CLOSE, SAME, STAND, STEP
 
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
@@ -44,7 +44,9 @@ _CLIP = (
     "the first: the character stands meanwhile. A start less than that before it adds nothing. Between two "
     f"samples farther apart than {CLOSE:g} s each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
     f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second, a framesPerSecond-th of a second, counted "
-    f"from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts"
+    f"from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and of the two sides of a "
+    f"step, which are less than {STEP:g} frames apart and more than {ALONE:g} times as far from the samples around them; no frame less than "
+    f"{STEP:g} frames before a step is a sample"
 )
 _SPACES = "(3, 3) without scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
 

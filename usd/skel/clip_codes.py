@@ -14,6 +14,11 @@ CLOSE = 1.5 / 24
 SAME = 1e-4
 """Samples nearer to each other, in frames, are one: layer offsets and other programs' clocks part what was keyed together,
 and over so little time a rounding error of a pose is a blow."""
+STEP = 0.25
+"""Samples at most so far apart, in frames, may be the two sides of a step, as programs write keys that hold,"""
+ALONE = 4.0
+"""if the next ones are more than so many times as far away. A smooth curve through both sides would swing far out, before the
+step, too: of the two the one after it counts, and the step takes a frame, as if each frame had a sample."""
 STAND = 0.1
 """A shot that begins at least so long [s] before its samples shows a character that stands meanwhile. An exporter's range is
 often a frame or two wider than its samples: standing before them, it would start with a blow."""
@@ -47,9 +52,26 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
         )
     begin = np.ceil(first) if frame == 1 else first
     frames = begin + frame * np.arange(np.floor((last - begin) / frame + 1e-9) + 1)
-    samples = np.unique(samples)
+    samples, steps = _after_steps(np.unique(samples), frame)
+    ahead = np.append(steps, np.inf)[np.searchsorted(steps, frames, side="right")] - frames
+    frames = frames[ahead >= STEP * frame]
     # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
     near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
     wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
     codes = np.unique(np.concatenate([frames[wide], samples]))
     return codes[np.diff(codes, append=np.inf) > SAME * frame]  # of a step's two samples the one after it
+
+
+def _after_steps(samples: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ascending samples (n,) without those on the earlier sides of steps, and where the steps are then (m,)."""
+    gaps = np.diff(samples, prepend=-np.inf, append=np.inf)
+    first = np.flatnonzero(gaps[:-1] >= STEP * frame)  # of each run of close samples
+    last = np.append(first[1:], len(samples)) - 1
+    span = samples[last] - samples[first]
+    step = (first < last) & (span < STEP * frame) & (ALONE * span < np.minimum(gaps[first], gaps[last + 1]))
+    if len(first) == 1:
+        return samples, samples[:0]  # this is all the motion there is
+    kept = np.ones(len(samples), bool)
+    for i, j in zip(first[step], last[step]):
+        kept[i:j] = False
+    return samples[kept], samples[last[step]]

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd
+from pxr import Gf, Usd, UsdSkel
 
 from neuralocks_core.runtime import StrandModel
 from usd.shot.stage import read_shot
@@ -40,3 +40,58 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
     np.testing.assert_array_equal(same, plain)
     np.testing.assert_allclose(standing.time_codes[[0, -1]], [1 - 0.1 * rate, 9])
     assert np.abs(other - plain).max() > 0.1
+
+
+def stepped(folder, samples, step=13.0, end=40):
+    """A shot in which the head turns about +Y within no time at `step`, sampled at these time codes."""
+    path = write_shot(folder, Recipe(frames=40), name=f"{len(samples)}")
+    stage = Usd.Stage.Open(str(path))
+    stage.SetEndTimeCode(end)
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    for attribute in (animation.GetRotationsAttr(), animation.GetTranslationsAttr(), animation.GetScalesAttr()):
+        bind = attribute.Get(1.0)
+        attribute.Clear()
+        attribute.Set(bind)
+    rotations = animation.GetRotationsAttr()
+    rest = list(rotations.Get())
+    rotations.Clear()
+    for code in samples:
+        turn = 0.5 * (code >= step)
+        turned = list(rest)
+        turned[3] = rest[3] * Gf.Quatf(float(np.cos(turn / 2)), 0, float(np.sin(turn / 2)), 0)
+        rotations.Set(turned, code)
+    stage.Save()
+    return read_shot(path).rigs[0]
+
+
+@pytest.mark.parametrize("step", [13.0, 13.004, 12.8])
+@pytest.mark.parametrize("apart", [0.2, 0.01, 0.001])
+def test_a_pair_of_samples_that_makes_a_step_is_felt_as_a_sample_a_frame_is(tmp_path, step, apart):
+    """As keys that hold are written. A spline through both would fling hair before the step, too."""
+    held = stepped(tmp_path, [1, step - apart, step, 40], step)
+    dense = stepped(tmp_path, range(1, 41), 13.0)
+    sampler = {
+        name: StrandModel.load().sampler(rig.character, rig.clip) for name, rig in (("held", held), ("dense", dense))
+    }
+    codes = [5, 9, 11, 12, 14, 16, 20, 30, 40]
+    is_, ought = (each.vectors(held.border.seconds(codes)) for each in sampler.values())
+    most = np.abs(ought - ought[0]).max()
+    assert np.abs(is_ - ought).max() < (0.01 if step == 13.0 else 0.5) * most
+    assert np.abs(is_[:2] - is_[0]).max() < 0.05 * most
+    # What is drawn stays as it is.
+    assert np.allclose(held.joints_at(step - apart), held.joints_at(1)) and not np.allclose(
+        held.joints_at(step), held.joints_at(1)
+    )
+
+
+def test_a_shot_on_twos_keeps_a_sample_a_step(tmp_path):
+    samples = np.sort([*np.arange(1, 40, 2), *(np.arange(3, 40, 2) - 1e-2)])
+    rig = stepped(tmp_path, samples)
+    assert not np.intersect1d(rig.time_codes, np.arange(3, 40, 2) - 1e-2).size
+    assert np.isin(np.arange(1, 40, 2), rig.time_codes).all()
+
+
+@pytest.mark.parametrize("end", [40, 1.15], ids=["ten a frame", "part of a frame"])
+def test_motion_that_is_sampled_finely_keeps_its_samples(tmp_path, end):
+    samples = np.arange(1, end + 1e-6, 0.1 if end == 40 else 0.05)
+    assert np.isin(samples, stepped(tmp_path, samples, end=end).time_codes).all()
