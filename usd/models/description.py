@@ -70,6 +70,9 @@ RIG_INPUT = {
     "gravity": STRAND_INPUT["gravity"],
     "history": _HISTORY + ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained",
     "clip": _CLIP,
+    "hats": "where a bone between the head and some chains moves on the head, as a hat's does, evaluate once more with that bone's "
+    "rotation as the head's, and take those chains' turns from there. Its history is one of its own, p the place to which "
+    "that bone carries the head's joint",
     "turns": "in the axes that each joint has in the model's rig: B, its row of `chains.axes`, is its world rotation in the bind "
     "pose that faces +Z. With J your joint's own there, D = T(J) B, the turn (w, v) becomes (w, det(D) D v)",
 }
