@@ -2,7 +2,6 @@
 """Training in the background: Blender stays usable, the panel shows how far it is."""
 
 import tempfile
-import threading
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +16,8 @@ from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
 from ..scene.redraw import redraw
 from ..services.threaded import Threaded, loading
-from ..services.training_job import TrainingJob, default_python, problem
+from ..services.trainers import Trainers
+from ..services.training_job import TrainingJob, default_python
 from ..session import session
 from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
 
@@ -26,8 +26,7 @@ LONGEST = 100
 
 _running: list["_Training"] = []
 """One at most. Not of the session, which ends with its file: a training goes on while other files are opened."""
-_checked: dict[str, str] = {}
-_asked: set[str] = set()
+_trainers = Trainers()
 
 
 def job() -> TrainingJob | None:
@@ -41,8 +40,9 @@ def stop() -> None:
         _running[0].job.cancel()
         _running[0].folder.cleanup()
         _running.clear()
-    if bpy.app.timers.is_registered(watch):
-        bpy.app.timers.unregister(watch)
+    for timer in (watch, await_answer):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
 
 
 def training_python() -> str:
@@ -53,12 +53,21 @@ def training_python() -> str:
 
 
 def known_problem() -> str | None:
-    """Why training cannot run here, with the remedy; None while the interpreter is being asked, which takes seconds."""
-    python = training_python()
-    if python not in _checked and python not in _asked:
-        _asked.add(python)
-        threading.Thread(target=lambda: _checked.setdefault(python, problem(python)), daemon=True).start()
-    return _checked.get(python)
+    """Why training cannot run here, with the remedy; None while the interpreter is first asked, which takes seconds. It is
+    asked again where it could not, and the panel drawn again with its answer.
+    """
+    answer = _trainers.known(training_python())
+    if _trainers.asking and not bpy.app.timers.is_registered(await_answer):
+        bpy.app.timers.register(await_answer, first_interval=0.2, persistent=True)
+    return answer
+
+
+def await_answer() -> float | None:
+    """Blender's timer: draws the panel once an interpreter has answered; seconds until the next look, None then."""
+    if _trainers.asking:
+        return 0.2
+    redraw()
+    return None
 
 
 class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
@@ -83,10 +92,9 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         target = shown_hair(context, armature) if self.kind == "strands" else armature
         check_own(target)  # it is given the model
         python, name, wanted = training_python(), armature.name_full, target.name_full
-        asking = Threaded(lambda _: problem(python), "Looking for what training needs", leave=True)
-        _checked[python] = yield from asking.steps()
-        if _checked[python]:
-            raise NeuralocksError(_checked[python])
+        asking = Threaded(lambda _: _trainers.look(python), "Looking for what training needs", leave=True)
+        if problem := (yield from asking.steps()):
+            raise NeuralocksError(problem)
         yield from loading("usd.assets.scene_writer")
         sampled = yield from sampling(context, named(name))
         armature, target = named(name), named(wanted)

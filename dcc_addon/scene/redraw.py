@@ -5,8 +5,8 @@ import bpy
 
 
 def redraw() -> None:
-    """Draw every 3D viewport again, its sidebar too."""
+    """Draw every 3D viewport again, its sidebar too, and the preferences, which say what training lacks."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
+            if area.type in ("VIEW_3D", "PREFERENCES"):
                 area.tag_redraw()

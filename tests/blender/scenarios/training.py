@@ -59,6 +59,37 @@ def training_meanwhile(folder: Path) -> None:
     assert bpy.data.objects["Hair"].neuralocks_hair.model == str(folder / "Hair_3.neuralocks")
 
 
+def remedy_followed(folder: Path) -> None:
+    """The panel learns by itself that a Python which could not train has got what it lacked."""
+    from dcc_addon.operators import training as operator
+    from dcc_addon.services import trainers, training_job
+
+    there, child = folder / "torch", folder / "child.py"
+    child.write_text(f"import os, sys; os.path.exists({str(there)!r}) or sys.exit('it lacks torch')")
+    python = shutil.which("python3") or sys.executable
+    kept = training_job.CHILD, operator.training_python, trainers.AGAIN
+    training_job.CHILD, operator.training_python, trainers.AGAIN = child, lambda: python, 0.5
+    operator._trainers = trainers.Trainers()
+    try:
+        assert operator.known_problem() is None and bpy.app.timers.is_registered(operator.await_answer)
+        assert "it lacks torch" in _told(lambda said: said is not None)
+        there.touch()
+        assert not _told(lambda said: not said)
+    finally:
+        training_job.CHILD, operator.training_python, trainers.AGAIN = kept
+
+
+def _told(until) -> str:
+    """What the panel says when it fits, drawn again after each answer only."""
+    from dcc_addon.operators import training as operator
+
+    end = time.monotonic() + 60
+    while not until(said := operator.known_problem()) and time.monotonic() < end:
+        while operator.await_answer() is not None and time.monotonic() < end:
+            time.sleep(0.05)
+    return said
+
+
 def _in_training(folder: Path):
     """Hair of a saved file for which a training of a second runs, which copies a model."""
     from dcc_addon.operators import training as operator
