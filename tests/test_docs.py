@@ -43,6 +43,36 @@ def modules() -> dict[str, set[str]]:
     return found
 
 
+@cache
+def classes() -> dict[str, set[str]]:
+    """Class -> its fields, methods and what its methods set, those of the classes that it is made from, too; classes of one
+    name count as one.
+    """
+    own: dict[str, set[str]] = {}
+    bases: dict[str, set[str]] = {}
+    for path in (path for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                own.setdefault(node.name, set()).update(members(node))
+                bases.setdefault(node.name, set()).update(base.id for base in node.bases if isinstance(base, ast.Name))
+
+    def whole(name: str) -> set[str]:
+        return own.get(name, set()).union(*map(whole, bases.get(name, ())))
+
+    return {name: whole(name) for name in own}
+
+
+def members(node: ast.ClassDef) -> set[str]:
+    """What stands in the body of a class, and what its methods set of `self`."""
+    names = {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
+    for each in node.body:
+        if isinstance(each, ast.Assign | ast.AnnAssign):
+            targets = each.targets if isinstance(each, ast.Assign) else [each.target]
+            names |= {target.id for target in targets if isinstance(target, ast.Name)}
+    stored = (each for each in ast.walk(node) if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store))
+    return names | {each.attr for each in stored if isinstance(each.value, ast.Name) and each.value.id == "self"}
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_what_is_named_exists(document):
     text = (ROOT / document).read_text("utf-8")
@@ -59,6 +89,9 @@ def test_what_is_named_exists(document):
             first, then = dotted.split(".")[:2]
             if first in known and then not in known[first] and then not in ("py", "json"):
                 missing.append(dotted)
+        for owner, field in re.findall(r"(?<![\w./])([A-Z]\w*)\.([A-Za-z_]\w*)", code):
+            if owner in classes() and field not in classes()[owner]:
+                missing.append(f"{owner}.{field}")
     assert not missing
 
 
