@@ -7,6 +7,8 @@ from neuralocks_core.errors import NeuralocksError
 
 NEARLY = 1e-4
 """How far the columns' products may be from a rotation's for two of Newton's steps to reach rounding."""
+FLAT = 1e-9
+"""A scale below it is none: there is no turn to read."""
 
 
 class Mirrored(NeuralocksError):
@@ -93,6 +95,11 @@ def volumes(linear: np.ndarray) -> np.ndarray:
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
+def flat(linear: np.ndarray, least: float = FLAT) -> np.ndarray:
+    """Which matrices (..., 3, 3) scale an axis by less than `least`, as a joint that hides what it moves does, (...) bool."""
+    return np.linalg.norm(linear, axis=-2).min(axis=-1) < least
+
+
 def transformed(points: np.ndarray, transform: np.ndarray) -> np.ndarray:
     """Points (..., 3) through an affine transform (4, 4), in float64."""
     return np.asarray(points, float) @ transform[:3, :3].T + transform[:3, 3]
@@ -157,7 +164,7 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
     if not np.isfinite(linear).all():
         raise NeuralocksError(f"{subject}: a transform holds NaN or infinity; repair the animation")
     scale = np.linalg.norm(linear, axis=-2, keepdims=True)
-    if scale.size and scale.min() < 1e-9:
+    if scale.size and scale.min() < FLAT:
         raise NeuralocksError(f"{subject}: a transform has zero scale; give every joint a scale above zero")
     linear = linear / scale
     if (volumes(linear) <= 0).any():

@@ -10,9 +10,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.carried import CarriedHair
-from neuralocks_core.rotation import rotation_part, to_quaternion
+from neuralocks_core.rotation import flat, rotation_part, to_quaternion
 
-from .hidden import FLAT
+from .hidden import NONE
 from .motion import Motion
 from .rig import RigArrays
 
@@ -40,8 +40,7 @@ def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.nd
     in `SampledRig`. What is flat has none.
     """
     linear = own[[motion.row(frame) for frame in frames]][:, joints]
-    flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < FLAT
-    turned = np.where(flat[..., None, None], np.eye(3), linear)
+    turned = np.where(flat(linear, NONE)[..., None, None], np.eye(3), linear)
     return to_quaternion(rotation_part(turned, "hair bones"))
 
 

@@ -4,12 +4,12 @@
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import volumes
+from neuralocks_core.rotation import flat, volumes
 
 from .rig import RigArrays
 
-FLAT, HIDDEN = 1e-6, 1e-4
-"""A scale below the first is none; what is hidden by that has the second instead."""
+NONE, HIDDEN = 1e-6, 1e-4
+"""A scale below the first is none, for Blender has single precision; what is hidden by that has the second instead."""
 
 
 def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.ndarray) -> np.ndarray:
@@ -25,16 +25,16 @@ def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.nd
     Raises:
         NeuralocksError: one of them is.
     """
-    flat = np.linalg.norm(joints[..., :3, :3], axis=-2).min(axis=-1) < FLAT
-    mirrored = (volumes(joints[..., :3, :3]) < 0) & ~flat
-    if not (flat.any() or mirrored.any()):
+    hidden = flat(joints[..., :3, :3], NONE)
+    mirrored = (volumes(joints[..., :3, :3]) < 0) & ~hidden
+    if not (hidden.any() or mirrored.any()):
         return joints
     _check(mirrored, needed, "a negative scale", rig, frames)
-    _check(flat, needed | set(np.flatnonzero(rig.parents < 0)), "zero scale", rig, frames)
+    _check(hidden, needed | set(np.flatnonzero(rig.parents < 0)), "zero scale", rig, frames)
     result = joints.copy()
     result[mirrored, :3, 0] *= -1
-    for joint in np.flatnonzero(flat.any(axis=0)):  # parents come first
-        rows = np.flatnonzero(flat[:, joint])
+    for joint in np.flatnonzero(hidden.any(axis=0)):  # parents come first
+        rows = np.flatnonzero(hidden[:, joint])
         above = result[rows, rig.parents[joint], :3, :3]
         size = np.cbrt(np.abs(np.linalg.det(above)))[:, None, None]
         result[rows, joint, :3, :3] = above * np.where(size > HIDDEN, HIDDEN / size, 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig.network import RigModel, RigSampler
-from neuralocks_core.rotation import angle_between, rotation_part, volumes
+from neuralocks_core.rotation import angle_between, flat, rotation_part, volumes
 
 TURNED = np.radians(0.5)
 """A carrier that is turned against the head by no more [rad] all the while is one with it, and so is one that is shifted by no
@@ -60,7 +60,7 @@ def _moves_apart(character: Character, clip: Clip, joint: int) -> bool:
     mirrored, has no turn to read; the head's serves.
     """
     linear = clip.joints[:, joint, :3, :3]
-    if joint == character.head or np.linalg.norm(linear, axis=-2).min() < 1e-9 or (volumes(linear) <= 0).any():
+    if joint == character.head or flat(linear).any() or (volumes(linear) <= 0).any():
         return False
     head, own = character.carrying(clip.joints), _carried_by(character, joint).carrying(clip.joints)
     shift = clip.joints[:, joint, :3, 3] - (head @ character.skeleton.bind[joint, :, 3])[:, :3]

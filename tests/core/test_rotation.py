@@ -46,6 +46,15 @@ def test_the_angle_between_rotations_is_that_of_the_turn_from_one_to_the_other()
     np.testing.assert_allclose(rotation.angle_between(a, b), angles, atol=1e-7)
 
 
+def test_what_scales_an_axis_to_nothing_is_flat():
+    linear = rotation.from_vector(np.random.default_rng(0).normal(size=(2, 3, 3))) * [1.0, 2.0, 3.0]
+    assert not rotation.flat(linear).any() and not rotation.flat(-linear, 0.5).any()
+    linear[0, 1, :, 1] = 0
+    linear[1, 2] *= 1e-7
+    assert np.argwhere(rotation.flat(linear)).tolist() == [[0, 1]]
+    assert np.argwhere(rotation.flat(linear, 1e-6)).tolist() == [[0, 1], [1, 2]]
+
+
 def test_affine_transforms_are_undone_by_their_inverse_and_flat_ones_refused():
     rng = np.random.default_rng(4)
     for size in (1e-3, 1.0, 1e3):

@@ -13,6 +13,7 @@ from neuralocks_core.boundary import POSE_JOINTS, joints_read
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair
+from neuralocks_core.rotation import flat
 from neuralocks_core.strands.arclength import count_pointlike
 
 from ..border.damage import text_of
@@ -196,10 +197,14 @@ def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
         return found
     for joint in dict.fromkeys(joints_read(rig.character, pose_joints)):
         linear = rig.clip.joints[:, joint, :3, :3]
-        flat = np.linalg.norm(linear, axis=-2).min(axis=-1) < 1e-9
+        hidden = flat(linear)
         for fact, bad, remedy in (
-            ("has zero scale", flat, "give it a scale above zero; 0.0001 hides what it moves, too"),
-            ("is mirrored or flat", ~flat & (np.linalg.det(linear) <= 0), "apply or remove the negative or zero scale"),
+            ("has zero scale", hidden, "give it a scale above zero; 0.0001 hides what it moves, too"),
+            (
+                "is mirrored or flat",
+                ~hidden & (np.linalg.det(linear) <= 0),
+                "apply or remove the negative or zero scale",
+            ),
         ):
             if bad.any():
                 code = rig.time_codes[bad.argmax()]
