@@ -14,7 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-HIDDEN, OUTPUTS, CHUNK = 256, 72, 512
+from neuralocks_core.network_sizes import HIDDEN, SHAPE
+
+CHUNK = 512
 MATRICES = ("middle", "out")
 """Weights that depend on the frame."""
 clock = time.perf_counter
@@ -68,7 +70,7 @@ class Inputs:
         self.strand = strand_inputs(real, codes)[take]
         edges = np.zeros_like(real.rest)
         edges[:, 1:] = np.diff(real.rest, axis=1)
-        self.edges = edges.reshape(len(edges), OUTPUTS)[take]
+        self.edges = edges.reshape(len(edges), SHAPE)[take]
         self.anchor = np.zeros_like(self.edges)
         self.part = model.run("strand.onnx", "strand_part", strand=self.strand)
 
@@ -236,7 +238,7 @@ def floor(strands: int, threads: int) -> float:
             list(pool.map(lambda _: session.run(None, {"x": x}), range(64)))
 
         _, once = timed(burst)
-    work = strands * (HIDDEN * HIDDEN + HIDDEN * OUTPUTS)
+    work = strands * (HIDDEN * HIDDEN + HIDDEN * SHAPE)
     return once * work / (64 * CHUNK * HIDDEN * HIDDEN)
 
 

@@ -17,24 +17,25 @@ from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
+from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
 do not depend on the machine."""
 IN = {
-    "encoder.onnx": {"shape": 72},
-    "strand.onnx": {"strand": 70},
-    "tail.onnx": {"strand_part": 256, "anchor": 72, "edges": 72},
+    "encoder.onnx": {"shape": SHAPE},
+    "strand.onnx": {"strand": STRAND},
+    "tail.onnx": {"strand_part": HIDDEN, "anchor": SHAPE, "edges": SHAPE},
 }
 """What the graphs read, and how many numbers in a row. `frame.onnx` reads the boundary vector, and the tail all that it gives,
 too."""
 OUT = {
-    "encoder.onnx": {"code": 32},
-    "strand.onnx": {"strand_part": 256},
-    "frame.onnx": {"frame_part": 256},
-    "tail.onnx": {"offsets": 72, "displacement": 72},
+    "encoder.onnx": {"code": CODE},
+    "strand.onnx": {"strand_part": HIDDEN},
+    "frame.onnx": {"frame_part": HIDDEN},
+    "tail.onnx": {"offsets": SHAPE, "displacement": SHAPE},
 }
-CHANGED = {"middle": 256, "out": 72}
+CHANGED = {"middle": HIDDEN, "out": SHAPE}
 """What the frame gives besides, where it changes the weights behind it."""
 LARGEST = 1e7
 """Answers whose root mean square is larger are of no hair, in whatever units it was made."""
@@ -97,7 +98,7 @@ class StrandModel:
         row = np.asarray(vector, np.float32).reshape(1, -1)
         values = self._computed("frame.onnx", list(self._shared), {"frame": row})
         return {
-            name: self._sane("frame.onnx", value, (1 if name == "frame_part" else 256, self._shared[name]))
+            name: self._sane("frame.onnx", value, (1 if name == "frame_part" else HIDDEN, self._shared[name]))
             for name, value in zip(self._shared, values)
         }
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neuralocks_core.groom import Groom
+from neuralocks_core.network_sizes import K
 from neuralocks_core.strands.arclength import resample
 from neuralocks_core.strands.centreline import centre_lines
 from neuralocks_core.strands.locks import lock_of_roots
@@ -16,10 +17,8 @@ from neuralocks_core.strands.locks import lock_of_roots
 if TYPE_CHECKING:
     from neuralocks_core.character import Character
 
-K = 24
-"""Vertices of a network strand, root first (72 network outputs are 24 x 3)."""
 CLAMPED = 2
-"""Of these, so many at the root never move against the head."""
+"""Of a strand's K vertices, so many at the root never move against the head."""
 
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""

@@ -12,12 +12,13 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.network_sizes import CODE, SHAPE
 from neuralocks_core.progress import Progress
 from neuralocks_core.strands.strand_set import K, StrandSet, scalp_local
 from neuralocks_core.training.descent import Schedule, descend
 
-LATENT, HIDDEN = 32, 256
-"""Length of a code, and width of the hidden layers."""
+HIDDEN = 256
+"""Width of the hidden layers."""
 
 
 def train_autoencoder(
@@ -54,7 +55,7 @@ def train_autoencoder(
     if not np.isfinite(shapes).all():
         raise NeuralocksError("strand shapes: some vertices are not finite; clean the groom first")
     generator = torch.Generator().manual_seed(seed)
-    data = torch.from_numpy(shapes.reshape(len(shapes), 3 * K))
+    data = torch.from_numpy(shapes.reshape(len(shapes), SHAPE))
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         model = StrandAutoencoder(principal=principal)
@@ -86,12 +87,12 @@ class StrandAutoencoder(nn.Module):
 
     def __init__(self, *, principal: bool = True):
         super().__init__()
-        self.encoder = _mlp(3 * K, HIDDEN, LATENT)
-        self.decoder = _mlp(LATENT, HIDDEN, 3 * K)
-        self.into = nn.Linear(3 * K, LATENT, bias=False) if principal else None
-        self.back = nn.Linear(LATENT, 3 * K, bias=False) if principal else None
-        self.register_buffer("mean", torch.zeros(3 * K))
-        self.register_buffer("scale", torch.ones(3 * K))
+        self.encoder = _mlp(SHAPE, HIDDEN, CODE)
+        self.decoder = _mlp(CODE, HIDDEN, SHAPE)
+        self.into = nn.Linear(SHAPE, CODE, bias=False) if principal else None
+        self.back = nn.Linear(CODE, SHAPE, bias=False) if principal else None
+        self.register_buffer("mean", torch.zeros(SHAPE))
+        self.register_buffer("scale", torch.ones(SHAPE))
 
     @torch.no_grad()
     def set_normalisation(self, shapes: Tensor) -> None:
@@ -128,13 +129,13 @@ class StrandAutoencoder(nn.Module):
     @torch.no_grad()
     def errors(self, shapes: np.ndarray) -> np.ndarray:
         """(n, 24, 3) strands -> (n, 24) distance between each vertex and its reconstruction, metres."""
-        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 3 * K)).to(self.mean.device)
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), SHAPE)).to(self.mean.device)
         return (self(flat) - flat).reshape(-1, K, 3).norm(dim=-1).cpu().numpy()
 
     @torch.no_grad()
     def codes(self, shapes: np.ndarray) -> np.ndarray:
         """(n, 24, 3) strands -> (n, 32) float32 codes."""
-        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), 3 * K)).to(self.mean.device)
+        flat = torch.from_numpy(np.asarray(shapes, np.float32).reshape(len(shapes), SHAPE)).to(self.mean.device)
         return self.encode(flat).cpu().numpy()
 
     def codes_of(self, strands: StrandSet) -> np.ndarray:

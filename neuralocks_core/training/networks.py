@@ -7,14 +7,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from neuralocks_core.network_sizes import CODE, HIDDEN, STRAND
 from neuralocks_core.strands.strand_set import CLAMPED, K
 
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
-CODES = slice(2, 66)
+CODES = slice(2, 2 + 2 * CODE)
 """Where the strand's and its lock's code lie among the strand inputs."""
-HIDDEN = 256
-"""Width of both hidden layers."""
 DEEP = 192
 """Width of the deep map of the frame."""
 RANKS = (64, 32)
@@ -56,7 +55,7 @@ class StrandNet(nn.Module):
             per strand.
     """
 
-    def __init__(self, frame_size: int, strand_size: int = 70, *, motion: str = "linear"):
+    def __init__(self, frame_size: int, strand_size: int = STRAND, *, motion: str = "linear"):
         super().__init__()
         if motion not in MOTIONS:
             raise ValueError(f"motion: {motion!r} is not one of {MOTIONS}")

@@ -7,6 +7,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.materials import Material
 from neuralocks_core.measures import MEASURES
+from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
 
 from ..border.units import FASTEST, SLOWEST
@@ -15,15 +16,15 @@ from ..skel.clip_codes import ALONE, CLOSE, SAME, STAND, STEP
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
 GRAPHS = {
-    "encoder.onnx": "once a groom: `shape` (S, 72), root-relative points of 24 vertices in scalp axes [m] "
-    "-> `code` (S, 32)",
-    "strand.onnx": "once a groom: `strand` (S, 70): root UV 2, own code 32, mean code of its lock 32, root normal 3, "
-    "length 1 [m] -> `strand_part` (S, 256)",
-    "frame.onnx": "once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, 256), and where the frame "
-    "changes the weights behind, `middle` (256, 256) and `out` (256, 72)",
-    "tail.onnx": "per strand and frame: `strand_part` (S, 256), all that `frame.onnx` gave, `anchor` (S, 72): the `offsets` "
-    "answered for the held bind pose (zeros where the model is not anchored), `edges` (S, 72): rest[i] - rest[i-1] "
-    "with row 0 zero [m] -> `offsets` (S, 72), `displacement` (S, 72) in canonical space [m]",
+    "encoder.onnx": f"once a groom: `shape` (S, {SHAPE}), root-relative points of {K} vertices in scalp axes [m] "
+    f"-> `code` (S, {CODE})",
+    "strand.onnx": f"once a groom: `strand` (S, {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
+    f"length 1 [m] -> `strand_part` (S, {HIDDEN})",
+    "frame.onnx": f"once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, {HIDDEN}), and where the frame "
+    f"changes the weights behind, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
+    "tail.onnx": f"per strand and frame: `strand_part` (S, {HIDDEN}), all that `frame.onnx` gave, `anchor` (S, {SHAPE}): the `offsets` "
+    f"answered for the held bind pose (zeros where the model is not anchored), `edges` (S, {SHAPE}): rest[i] - rest[i-1] "
+    f"with row 0 zero [m] -> `offsets` (S, {SHAPE}), `displacement` (S, {SHAPE}) in canonical space [m]",
     "rig.onnx": "`features` (B, F) of B characters -> `turns` (B, joints, 4) wxyz, joints as in the model's `chains`: local "
     "rotation now = local rotation in the bind pose * turn. The C header of `neuralocks rig export-c` makes the features, too",
 }

@@ -12,6 +12,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
+from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.rotation import rotation_part, sizes
 from neuralocks_core.runtime import StrandModel
 
@@ -19,14 +20,14 @@ from ..baking.placing import GroomPlacer
 from ..shot.stage import StageGroom, read_shot
 
 ARRAYS = {
-    "rest": "(S, 24, 3) float32, the strands at rest in canonical space [m]: even in arc length of the author's, and where "
+    "rest": f"(S, {K}, 3) float32, the strands at rest in canonical space [m]: even in arc length of the author's, and where "
     "these wind finer, the line that they wind around. A bake's points are these strands where a groom is already so; any "
     "other groom's own points follow them",
     "valid": "(S,) bool, false where a strand is one point: its displacement is 0",
-    "strand_part": "(S, 256) float32, input of tail.onnx",
-    "anchor": "(S, 72) float32, input of tail.onnx, for the default material and the body shape of the first frame: "
+    "strand_part": f"(S, {HIDDEN}) float32, input of tail.onnx",
+    "anchor": f"(S, {SHAPE}) float32, input of tail.onnx, for the default material and the body shape of the first frame: "
     "`offsets` of tail.onnx with `anchor` zero and the frame `held`",
-    "edges": "(S, 72) float32, input of tail.onnx",
+    "edges": f"(S, {SHAPE}) float32, input of tail.onnx",
     "held": "(F,) float32, boundary vector of the bind pose, held",
     "facing": "(3, 3) float64, rotation from bind-world to canonical axes",
     "canonical_to_head": "(4, 4) float64, from canonical space to that of the head joint. The joint's world transform times this "
@@ -39,9 +40,9 @@ ARRAYS = {
     "length": "(S,) float32, of each strand [m], for `clumping`",
     "tie": "(S,) float32, how firmly each strand is tied into its lock, for `clumping`",
     "lock": "(S,) int32, each strand's lock as far as it is tied together, a row of the three that follow",
-    "lock_strand_part": "(L, 256) float32, input of tail.onnx for the mean strand of each lock",
-    "lock_anchor": "(L, 72) float32, as `anchor`",
-    "lock_edges": "(L, 72) float32, as `edges`",
+    "lock_strand_part": f"(L, {HIDDEN}) float32, input of tail.onnx for the mean strand of each lock",
+    "lock_anchor": f"(L, {SHAPE}) float32, as `anchor`",
+    "lock_edges": f"(L, {SHAPE}) float32, as `edges`",
 }
 """Arrays of a groom's file -> what they are."""
 

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many numbers the strand network reads and gives: the widths of a model file's graphs (docs/architecture.md)."""
+
+K = 24
+"""Vertices of a network strand, root first."""
+SHAPE = 3 * K
+"""Numbers of a strand's vertices or edges, and of the network's answer."""
+CODE = 32
+"""Numbers that stand for a strand's rest shape."""
+STRAND = 2 + 2 * CODE + 3 + 1
+"""What the network reads of a strand: uv, its code and its lock's, root normal, length."""
+HIDDEN = 256
+"""Width of both hidden layers."""
