@@ -66,23 +66,12 @@ class BoundarySpec:
             )
 
     @classmethod
-    def from_json(cls, values: dict, path=None) -> "BoundarySpec":
+    def from_json(cls, values: dict) -> "BoundarySpec":
         """Make it from what `to_json` gave.
-
-        Args:
-            values: plain, of a file perhaps.
-            path: of that file, for messages.
 
         Raises:
             NeuralocksError: it holds what cannot be, or what a later version knows.
         """
-        try:
-            return cls._parsed(values)
-        except NeuralocksError as error:
-            raise NeuralocksError(f"{path}: {error}" if path else str(error)) from None
-
-    @classmethod
-    def _parsed(cls, values) -> "BoundarySpec":
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
             raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")

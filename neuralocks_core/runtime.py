@@ -15,7 +15,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND
 
@@ -55,7 +55,8 @@ class StrandModel:
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
         self.file = file
         self.meta = file.meta
-        self.spec = BoundarySpec.from_json(file.meta.get("boundary"), file.path)
+        with about(file.path):
+            self.spec = BoundarySpec.from_json(file.meta.get("boundary"))
         self.anchored = file.meta.get("anchored", False)
         if not isinstance(self.anchored, bool):
             raise NeuralocksError(f"{file.path}: its 'anchored' is neither true nor false; get an undamaged copy")

@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid
 from neuralocks_core.character import Character, Skeleton
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.formats.bvh import Motion
 from neuralocks_core.motion import Clip
 
@@ -41,10 +41,8 @@ def retarget(motion: Motion, character: Character) -> Clip:
     Raises:
         NeuralocksError: the source has no joints that are named like a head or hips.
     """
-    try:
+    with about(motion.name):
         source = Character(motion.skeleton)
-    except NeuralocksError as error:
-        raise NeuralocksError(f"{motion.name}: {error}") from None
     turns = _turns(motion, source, character)
     joints = _posed(turns, character, len(motion.clip.times))
     joints[..., :3, 3] += _travel(motion, source, character, joints)[:, None]

@@ -15,7 +15,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import half_turns
@@ -165,6 +165,11 @@ class RigModel:
         """
         path = model_file.shipped("rig") if path is None else path
         meta = model_file.read(path, "rig").meta
+        with about(path):
+            return cls._of(meta)
+
+    @classmethod
+    def _of(cls, meta: dict) -> "RigModel":
         try:
             return cls(
                 HairChains.from_json(meta["chains"]),
@@ -174,12 +179,12 @@ class RigModel:
                 float(meta["max_angle"]),
                 *(meta[name] for name in ("training", "report", "credits")),
             )
-        except NeuralocksError as error:
-            raise NeuralocksError(f"{path}: {error}") from None
+        except NeuralocksError:
+            raise
         except KeyError as error:
-            raise NeuralocksError(f"{path}: its description lacks {error}; get an undamaged copy") from None
+            raise NeuralocksError(f"its description lacks {error}; get an undamaged copy") from None
         except (TypeError, ValueError, AttributeError, OverflowError):  # whose own words tell a user nothing
-            raise NeuralocksError(f"{path}: its description is unreadable; get an undamaged copy") from None
+            raise NeuralocksError("its description is unreadable; get an undamaged copy") from None
 
 
 class RigSampler:

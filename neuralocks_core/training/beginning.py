@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.onnx_graph import OnnxWeights
 from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training import checkpoint
@@ -71,7 +71,8 @@ class Beginning:
         """
         deep = self._graphs["frame.onnx"].layers
         has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
-        read = BoundarySpec.from_json(self._meta.get("boundary"), self.path)
+        with about(self.path):
+            read = BoundarySpec.from_json(self._meta.get("boundary"))
         has["boundary"] = spec if _reads_all_of(read, spec) else read
         has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
         wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}

@@ -5,6 +5,7 @@ import numpy as np
 
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.errors import about
 from neuralocks_core.materials import Material
 from neuralocks_core.measures import MEASURES
 from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
@@ -97,7 +98,8 @@ SLIDERS = {
 
 def described(file: model_file.ModelFile) -> dict:
     """The content of `description.json`, but for a shot's grooms."""
-    spec = BoundarySpec.from_json(file.meta.get("boundary"), file.path)
+    with about(file.path):
+        spec = BoundarySpec.from_json(file.meta.get("boundary"))
     training = {name: value for name, value in file.meta["training"].items() if name != "curve"}
     result = {"units": UNITS, "graphs": _graphs(file)}
     if file.kind == "strands":
