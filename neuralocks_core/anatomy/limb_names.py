@@ -13,7 +13,7 @@ PARTS = {
     "foot": ("foot", "ankle"),
     "eye": ("eye", "eyeball"),
 }
-_COLLARS = ("clavicle", "collar", "collarbone", "clav", "scapula")
+_COLLARS = tuple(word for word in PARTS["shoulder"] if word != "shoulder")
 _COLLAR_ENDS = ("collarbone", "clavicle")
 """A collar bone is told by these also after other words: CAT has an `ArmCollarbone`."""
 
