@@ -6,11 +6,11 @@ import pytest
 
 from neuralocks_core.character import Skeleton
 from neuralocks_core.motion import Clip
-from neuralocks_core.rig import RigModel, RigSampler, find_chains, rig_spec
+from neuralocks_core.rig import RigSampler, find_chains, rig_spec
 from neuralocks_core.rig.carried import CarriedHair
-from neuralocks_core.rig.network import feature_columns, input_limits
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character, tail
+from tests.rig_models import random_rig_model
 
 TIMES = np.linspace(0, 2, 61)
 NODDING = np.outer(0.6 * np.sin(4 * TIMES), [1.0, 0.3, 0.0])
@@ -20,12 +20,7 @@ def rig(dynamic=True):
     """A head with a hat, a tail on each, and a network of random weights; the joints of head, hat and hair."""
     hat = [("hat", "head", (0, 1.7, 0))]
     who = character(hat + tail("own_hair") + tail("hat_hair", parent="hat", at=(0, 1.65, -0.15)))
-    chains, spec, rng = find_chains(who, patterns=["*_hair_1"]), rig_spec(dynamic), np.random.default_rng(0)
-    size, layers = len(feature_columns(spec)), []
-    for out in (16, 3 * len(chains)):
-        layers.append((rng.normal(0, 0.5 / np.sqrt(size), (out, size)), rng.normal(0, 0.1, out)))
-        size = out
-    return who, RigModel(chains, spec, tuple(layers), input_limits(spec))
+    return who, random_rig_model(find_chains(who, patterns=["*_hair_1"]), rig_spec(dynamic))
 
 
 def clip(skeleton: Skeleton, joint: str, vectors: np.ndarray, pivot: str) -> Clip:
