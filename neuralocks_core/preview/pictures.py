@@ -80,7 +80,7 @@ def _nearest(times: np.ndarray, clock: np.ndarray) -> np.ndarray:
     return np.where(clock - times[before] <= np.abs(times[after] - clock), before, after)
 
 
-def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, _rate: float | None) -> None:
     from PIL import Image, ImageDraw
 
     images = list(images)
