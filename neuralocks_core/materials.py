@@ -9,7 +9,7 @@ from numbers import Real
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.plain_numbers import plain_number
+from neuralocks_core.number_words import plain_number
 
 RANGES = {
     "bend": (2e-4, 5e-3),

@@ -13,7 +13,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
-from neuralocks_core.plain import plain
+from neuralocks_core.json_values import plain
 
 LABELS = {
     "stretch_percent": ("length error, mean", "%", "of a strand's rest length, in head space"),

@@ -4,7 +4,7 @@
 import math
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.plain_numbers import plain_number
+from neuralocks_core.number_words import plain_number
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 """Name -> metres."""

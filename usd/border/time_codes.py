@@ -5,7 +5,7 @@ import math
 from fractions import Fraction
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.plain_numbers import plain_number
+from neuralocks_core.number_words import plain_number
 
 from .amounts import check_number
 

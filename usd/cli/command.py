@@ -12,7 +12,7 @@ from pathlib import Path
 import typer
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.plain import plain
+from neuralocks_core.json_values import plain
 
 from ..border.stopping import deferred, stoppable
 

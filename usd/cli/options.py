@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.plain_numbers import plain_number
+from neuralocks_core.number_words import plain_number
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine to read.")]

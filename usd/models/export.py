@@ -8,7 +8,7 @@ from pathlib import Path
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.plain import plain
+from neuralocks_core.json_values import plain
 
 from ..border.stopping import check
 from .description import described

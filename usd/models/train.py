@@ -15,7 +15,7 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.plain_numbers import plain_number
+from neuralocks_core.number_words import plain_number
 from neuralocks_core.progress import Progress
 
 from ..border.extras import check_training

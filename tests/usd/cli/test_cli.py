@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import model as model_file
-from neuralocks_core.plain import plain
+from neuralocks_core.json_values import plain
 from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
