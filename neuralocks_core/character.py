@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A character: skeleton, body surface, and which joint is which."""
+"""A character: its skeleton, and which joint is which, with its body."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
+from neuralocks_core.skinned_body import Body
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
@@ -78,68 +78,6 @@ def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
     """
     few = np.unique(np.linspace(0, len(posed) - 1, 16).astype(int))
     return sizes(posed[few] @ np.linalg.inv(bind))
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """Skinned triangle mesh in bind pose.
-
-    Attributes:
-        points: (V, 3) [m], world space of the bind pose.
-        triangles: (F, 3) int, outward by the right-hand rule.
-        joint_indices: (V, I) int.
-        joint_weights: (V, I), each row sums to one.
-        shapes: blend shape name -> offsets (V, 3) [m].
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    joint_indices: np.ndarray
-    joint_weights: np.ndarray
-    shapes: dict[str, np.ndarray] = field(default_factory=dict)
-
-    @classmethod
-    def joined(cls, parts: Sequence["Body"]) -> "Body | None":
-        """Several bodies as one, whose shapes of one name are one shape; None where there are none."""
-        if not parts:
-            return None
-        ends = np.cumsum([0] + [len(part.points) for part in parts])
-        width, shapes = max(part.joint_indices.shape[1] for part in parts), {}
-        wider = [((0, 0), (0, width - part.joint_indices.shape[1])) for part in parts]
-        for part, start, end in zip(parts, ends, ends[1:]):
-            for name, offsets in part.shapes.items():
-                shapes.setdefault(name, np.zeros((ends[-1], 3)))[start:end] = offsets
-        return cls(
-            np.concatenate([part.points for part in parts]),
-            np.concatenate([part.triangles + start for part, start in zip(parts, ends)]),
-            np.concatenate([np.pad(part.joint_indices, by) for part, by in zip(parts, wider)]),
-            np.concatenate([np.pad(part.joint_weights, by) for part, by in zip(parts, wider)]),
-            shapes,
-        )
-
-    def part(self, vertices: np.ndarray, triangles: np.ndarray) -> "Body":
-        """Some of the vertices (v,), with triangles (f, 3) whose corners are counted among these."""
-        return Body(
-            self.points[vertices],
-            triangles,
-            self.joint_indices[vertices],
-            self.joint_weights[vertices],
-            {name: offsets[vertices] for name, offsets in self.shapes.items()},
-        )
-
-    def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
-        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
-        points = self.points
-        for offsets, weight in zip(self.shapes.values(), () if weights is None else weights):
-            if weight:  # a face has hundreds, of which a frame shows a few
-                points = points + weight * offsets
-        return points
-
-    def posed(self, skinning: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-        """World points (V, 3) by linear blend skinning; `skinning` (J, 4, 4) are posed @ inverse(bind) transforms."""
-        points = self.shaped(weights)
-        blended = np.einsum("vi,vixy->vxy", self.joint_weights, skinning[self.joint_indices, :3])
-        return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
 
 
 @dataclass(frozen=True, eq=False)

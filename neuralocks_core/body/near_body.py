@@ -6,8 +6,8 @@ import scipy.sparse
 
 from neuralocks_core.body.head_field import head_field
 from neuralocks_core.body.moving_skin import Box, PosedSkin, Skin
-from neuralocks_core.character import Body
 from neuralocks_core.rotation import transformed
+from neuralocks_core.skinned_body import Body
 
 HEAD, SKIN = 1, 2
 CURVED = 0.004

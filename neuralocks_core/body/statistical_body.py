@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import connected_pieces
 from neuralocks_core.own_folder import own_folder, writable
+from neuralocks_core.skinned_body import Body
 
 DEFAULT_PHENOTYPE = {"gender": 1.0, "age": 2 / 3, "muscle": 0.5, "weight": 0.45, "height": 0.5, "proportions": 0.6}
 """A young adult woman; anny's parameters lie in 0..1 (gender 1 is female, age 2/3 is 25 years)."""

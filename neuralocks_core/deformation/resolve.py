@@ -9,9 +9,10 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody, PosedBody
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Character
 from neuralocks_core.deformation.laying import SLACK, clearance, resolved, rest_distance
 from neuralocks_core.motion import Clip
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
 
 STILL = 1e-3

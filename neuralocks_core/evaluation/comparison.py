@@ -6,13 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from neuralocks_core import metrics
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress
 from neuralocks_core.rotation import rotation_part
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.smooth_motion import SmoothMotion
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet

@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
+from neuralocks_core.skinned_body import Body
 
 ROOM = 0.2
 """So far beyond where hair rests [m] it could come to touch a body: the neck bends."""

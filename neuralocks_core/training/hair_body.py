@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Character
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.skinned_body import Body
 
 CELL = 0.012
 """[m] Vertices within one such cell become one; on a head's curvature that moves the surface by 0.2 mm."""

@@ -10,11 +10,11 @@ import trimesh
 
 from dcc_addon.services import bones, widths
 from dcc_addon.services.live import LiveHair
-from neuralocks_core.character import Body
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
+from neuralocks_core.skinned_body import Body
 from tests.core.rig.builders import character
 
 

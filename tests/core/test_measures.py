@@ -8,8 +8,9 @@ import pytest
 import trimesh
 
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.measures import AVERAGE, HIGHEST, LOWEST, body_measures
+from neuralocks_core.skinned_body import Body
 from tests.core.rigs import HEAD, POSITIONS, moved, person
 
 SPINE, NECK = 1, 2

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel
 
-from neuralocks_core.character import Body
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import inside_out
 from neuralocks_core.rotation import transformed
+from neuralocks_core.skinned_body import Body
 
 from ..border.arrays import column_matrix
 from ..border.placement import Placement

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.character import Body
+from neuralocks_core.skinned_body import Body
 
 
 def _part(seed: int, count: int, influences: int, names: str) -> Body:

@@ -7,8 +7,8 @@ import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody
-from neuralocks_core.character import Body
 from neuralocks_core.deformation.laying import MARGIN, clearance, resolved
+from neuralocks_core.skinned_body import Body
 
 STEPS = 161
 

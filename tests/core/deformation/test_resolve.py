@@ -7,12 +7,13 @@ import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Character
 from neuralocks_core.deformation.laying import MARGIN, clearance, resolved, rest_distance
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import strand_set
 from tests.core import rigs
 

@@ -7,10 +7,11 @@ import trimesh
 from scipy.interpolate import CubicSpline
 
 from neuralocks_core import metrics, rotation
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.evaluation.comparison import simulated
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import strand_set
 
 from .. import rigs

@@ -9,7 +9,6 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
-from neuralocks_core.character import Body
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
@@ -19,6 +18,7 @@ from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_quaternion, from_vector
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import BodyPatch
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments

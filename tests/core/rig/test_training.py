@@ -10,7 +10,6 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
-from neuralocks_core.character import Body
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains, rig_spec
@@ -18,6 +17,7 @@ from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, s
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import posed_distances, rest_distances
 from neuralocks_core.training.rig.dynamic import train_dynamic

@@ -5,7 +5,8 @@ import numpy as np
 import trimesh
 
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.hair_body import hair_body
 
 from .. import rigs

@@ -8,10 +8,11 @@ import pytest
 import torch
 
 from neuralocks_core.boundary import BoundarySpec
-from neuralocks_core.character import Body, Character
+from neuralocks_core.character import Character
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.physics.bend_twist import Cosserat
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MomentPool, nearest_planes

@@ -9,9 +9,10 @@ from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 from neuralocks_core.animation.random_motion import random_clip
 from neuralocks_core.body.statistical_body import DEFAULT_PHENOTYPE, SHAPES, StatisticalBody, statistical_body
-from neuralocks_core.character import Body, Character, Skeleton
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import body_measures, measures_read
+from neuralocks_core.skinned_body import Body
 from usd.assets.animation import write_animation
 from usd.assets.body import SKELETON, write_body
 from usd.shot.stage import read_rigs, read_shot
