@@ -5,8 +5,6 @@ import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.collider import Collider
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
@@ -57,9 +55,7 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     only one end of the strands does, that is rather their root.
     """
     body, head = rig.character.body, rig.character.humanoid.get("head")
-    try:
-        surface = Collider(body.points, body.triangles)
-    except NeuralocksError:  # a mesh of points alone: no more can be said than how far these are
+    if rig.surface is None:  # no more can be said than how far its points are
         return 0.0
     vertices = cKDTree(body.points)
     on_head = np.zeros(len(body.points))
@@ -69,7 +65,7 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     def told(last: bool) -> tuple[float, float]:
         """Distance [m] and share on the head; roots that begin inside of skin are on it."""
         ends = [transformed(points, to_bind) for points in either_ends(prim, last=last)]
-        far = [surface.distance(points)[0] for points in ends]
+        far = [rig.surface.distance(points)[0] for points in ends]
         middle = min(float(np.median(abs(each) if last else each.clip(0))) for each in far)
         return middle, float(on_head[vertices.query(ends[-1])[1]].mean())
 

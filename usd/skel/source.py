@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP, Clip
@@ -105,6 +106,15 @@ class StageRig:
     def skins(self) -> list[cKDTree]:
         """The points of each mesh in bind world [m], by nearness."""
         return [cKDTree(transformed(mesh.points, self.to_bind @ mesh.geom_bind)) for mesh in self.meshes]
+
+    @cached_property
+    def surface(self) -> Collider | None:
+        """The body in bind pose, for distances from its faces; None where it has no face."""
+        body = self.character.body
+        try:
+            return None if body is None else Collider(body.points, body.triangles)
+        except NeuralocksError:  # a mesh of points alone
+            return None
 
     @cached_property
     def _to_world(self) -> np.ndarray:

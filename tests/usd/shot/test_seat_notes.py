@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, Vt
+from pxr import Sdf, Usd, UsdGeom, Vt
 
+from neuralocks_core.body.collider import Collider
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
@@ -47,6 +48,21 @@ def test_short_strands_and_those_with_tips_on_the_chest_are_told_too(tmp_path):
         notes = _from_to(path, scalp, tips, turned=True)
         assert len(notes) == 1 and "from tip to root" in notes[0], notes
         assert not _from_to(path, scalp, tips, turned=False)
+
+
+def test_a_body_is_prepared_once_for_all_short_hair_on_it(tmp_path, monkeypatch):
+    """Brows, lashes and fuzz come in many prims; the surface of a scanned body takes a tenth of a second."""
+    made, prepare = [], Collider.__init__
+    monkeypatch.setattr(Collider, "__init__", lambda self, *given: made.append(self) or prepare(self, *given))
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    assert _from_to(path, (CENTRE, RADIUS), (CENTRE, RADIUS + 0.02), turned=True)
+    stage = Usd.Stage.Open(str(path))
+    for name in ("Brow", "Fuzz"):
+        Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), f"/Hero/{name}")
+    stage.Save()
+    made.clear()
+    assert sum("from tip to root" in note for note in read_shot(path).notes) == 3
+    assert len(made) == 1
 
 
 def test_hair_that_touches_skin_with_its_tips_is_not_taken_for_turned_round(tmp_path):
