@@ -80,8 +80,7 @@ def attach(
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
         to_bind = rig.to_bind @ geom_bind(prim)
-        turned = upside_down(prim, rig, to_bind)
-        joint, why, shares = _by_own_binding(prim, rig, last=bool(turned))
+        joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
         notes += turned or _spread(rig, path, joint, shares)
         found = Attachment(
             rig=rig,
@@ -116,8 +115,10 @@ def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: boo
         NeuralocksError: a binding cannot be used.
     """
     if bound_skeleton(prim) == rig.path:
-        return rig.source.names[_by_own_binding(prim, rig)[0]], str(prim.GetPath())
+        joint = _by_own_binding(prim, rig, rig.to_bind @ geom_bind(prim))[0]
+        return rig.source.names[joint], str(prim.GetPath())
     if seated and (seat := find_seat(prim, rig, placement, NEAR)) is not None:
+        seat, _ = _of_roots(prim, seat, placement)
         return rig.source.names[_by_seat(seat)[0]], str(seat.mesh.prim.GetPath())
     return None
 
@@ -144,9 +145,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
     # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
     seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
-    turned = upside_down(prim, seat.rig, seat.to_bind)
-    if turned:  # its tips may lie on shoulders
-        seat = find_seat(prim, seat.rig, placement, NEAR, last=True) or seat
+    seat, turned = _of_roots(prim, seat, placement)
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
@@ -208,20 +207,29 @@ def _trunk(rig: StageRig) -> float:
     return float(np.linalg.norm(bind[rig.character.head] - bind[rig.character.humanoid.get("hips", 0)]))
 
 
-def _by_own_binding(prim: Usd.Prim, rig: StageRig, last: bool = False) -> tuple[int, str, np.ndarray]:
-    """The joint that carries a groom which is bound to the rig, why, and the share (J,) of each joint in its roots, which are
-    the strands' `last` points where these run from tip to root.
+def _by_own_binding(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> tuple[int, str, np.ndarray, list[str]]:
+    """The joint that carries a groom which is bound to the rig, why, the share (J,) of each joint in its roots, and the note
+    on strands that run from tip to root, whose roots are their last points.
 
     What hangs farther down is weighted as a rigger would have it move without simulation, by the chest or an arm.
     """
     indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
-    roots = ends(prim, last=last)
+    turned = upside_down(prim, rig, to_bind)
+    roots = ends(prim, last=bool(turned))
     shares = _shares(rig, indices[roots], weights[roots])
-    return *_carrier(rig, shares, exact=True), shares
+    return *_carrier(rig, shares, exact=True), shares, turned
+
+
+def _of_roots(prim: Usd.Prim, seat: Seat, placement: Placement) -> tuple[Seat, list[str]]:
+    """The seat of a groom's roots, and the note on strands that run from tip to root: their tips may lie on shoulders."""
+    turned = upside_down(prim, seat.rig, seat.to_bind)
+    if turned:
+        seat = find_seat(prim, seat.rig, placement, NEAR, last=True) or seat
+    return seat, turned
 
 
 def _by_seat(seat: Seat) -> tuple[int, str, np.ndarray]:
-    """The same for a groom that sits on a mesh, by the skin under its roots."""
+    """The joint, why and the shares for a groom that sits on a mesh, by the skin under its roots."""
     shares = _shares(seat.rig, seat.mesh.indices[seat.points], seat.mesh.weights[seat.points])
     return *_carrier(seat.rig, shares), shares
 

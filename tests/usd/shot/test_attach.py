@@ -12,7 +12,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
-from ..shots import HEAD, Recipe, add_curves, strand_points, write_shot
+from ..shots import CENTRE, HEAD, RADIUS, Recipe, add_curves, strand_points, write_shot
 
 
 @pytest.mark.parametrize(
@@ -96,6 +96,30 @@ def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
     shot = read_shot(path)
     assert [item.joint for item in shot.grooms] == [found.joint, "hips/spine"]
     assert not any("is not used" in note for note in shot.notes), "the head was not named by hand"
+
+
+@pytest.mark.parametrize("bound", ["own", "mesh"])
+def test_the_roots_of_strands_from_tip_to_root_tell_the_head(tmp_path, bound):
+    """The tips lie on the chest, or are painted to move with it."""
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound=bound)))
+    stage = Usd.Stage.Open(str(path))
+    scalp = strand_points(40, 2)[:, 0]
+    chest = np.array([0, 1.3, 0]) + 0.155 * (scalp - CENTRE) / RADIUS
+    strands = (chest[:, None] + np.linspace(0, 1, 12)[:, None] * (scalp - chest)[:, None]).reshape(-1, 3)
+    hair = stage.GetPrimAtPath("/Hero/Hair")
+    UsdGeom.BasisCurves(hair).GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands, np.float32)))
+    if bound == "own":
+        joints = np.tile(np.int32([1] * 6 + [HEAD] * 6), 40)
+        binding = UsdSkel.BindingAPI(hair)
+        binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(joints))
+        binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray([1.0] * len(joints)))
+    stage.Save()
+    shot = read_shot(path)
+    (item,) = shot.grooms
+    assert sum("from tip to root" in note for note in shot.notes) == 1
+    head = item.attachment.rig.source.names[item.attachment.character.head]
+    assert (item.joint, head) == ("hips/spine/Hals/Kopf",) * 2
+    assert not any("is not used" in note for note in shot.notes)
 
 
 def test_a_hat_takes_no_hair_from_the_head_under_it(tmp_path):
