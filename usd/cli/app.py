@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _kept(word: str) -> str:
     """A word, a blank for an empty one: a path of no letters is the current folder to whoever is given it."""
-    return f"{word} " if not word or word.startswith("--") and word.endswith("=") else word
+    return f"{word} " if not word or word.startswith("--") and word.find("=") == len(word) - 1 else word
 
 
 def _version(wanted: bool) -> None:

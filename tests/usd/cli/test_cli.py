@@ -164,6 +164,11 @@ def test_an_empty_path_is_not_the_current_folder(tmp_path, capsys, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_value_may_end_in_an_equals_sign(capsys):
+    assert status("bake", "s.usda", "--out=a=") == 1
+    assert capsys.readouterr().err.startswith("error: a=: ")
+
+
 def test_numbers_are_written_plainly(tmp_path, model, capsys):
     shot = write_shot(tmp_path)
     for words, fact in (
