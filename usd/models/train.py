@@ -21,6 +21,8 @@ from neuralocks_core.progress import Progress
 from ..border.extras import check_training
 
 METHODS = ("rollouts", "selfsupervised")
+SHARES = ("mirror", "warmup")
+"""Settings that are a share of something, 1 at most."""
 SHIPPED, NOTHING = "shipped", "nothing"
 """Words for what a training begins with."""
 MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
@@ -144,7 +146,9 @@ def _check_amounts(given: dict) -> None:
 
 
 def _check_choices(options, known: dict[str, tuple[str, ...]]) -> None:
-    """Known before the simulations begin: words that are among the known ones, counts from 1, weights not below 0."""
+    """Known before the simulations begin: words that are among the known ones, counts from 1, weights not below 0, shares
+    up to 1.
+    """
     for name, default in ((field.name, field.default) for field in dataclasses.fields(options)):
         value = getattr(options, name)
         if name in known and value not in known[name]:
@@ -155,6 +159,8 @@ def _check_choices(options, known: dict[str, tuple[str, ...]]) -> None:
             raise NeuralocksError(f"--set {name}={value}: must be at least 1")
         if isinstance(default, float | tuple) and not all(v >= 0 for v in np.atleast_1d(value)):
             raise NeuralocksError(f"--set {name}={value}: must not be below 0")
+        if name in SHARES and value > 1:
+            raise NeuralocksError(f"--set {name}={value:g}: is a share; give a number from 0 to 1")
 
 
 def parsed(kind: type, settings: dict) -> dict:

@@ -331,6 +331,8 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
         (("--set", "minutes=-5"), "--minutes"),
         (("--set", "rate=-1"), "rate"),
         (("--set", "clips=0"), "clips"),
+        (("--set", "mirror=5"), "mirror=5"),
+        ((*selfsupervised, "--set", "warmup=1.5"), "warmup=1.5"),
         (("--set", "motion=magic"), "modulated"),
         (("--set", "seed=-1"), "--seed"),
         (("--processes", "100000"), "at most 256"),
