@@ -101,7 +101,8 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
 
 
 def _inputs(scene: TrainingScene) -> dict:
-    body, clips = scene.character.body, scene.clips
+    character, clips = scene.character, scene.clips
+    body, skeleton = character.body, character.skeleton
     own = (
         []
         if body is None
@@ -109,7 +110,15 @@ def _inputs(scene: TrainingScene) -> dict:
     )
     facts = {
         "seed": scene.seed,
-        "character": _digest([scene.character.skeleton.bind, *own]),
+        "character": _digest(
+            [
+                skeleton.bind,
+                skeleton.parents,
+                np.array(sorted(character.humanoid.items())),
+                np.array(character.carrying_joint),
+                *own,
+            ]
+        ),
         "groom": _digest([groom.rest for groom in scene.grooms]),
         "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),

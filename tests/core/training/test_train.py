@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import model
+from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from tests.core.rigs import person, straight_hair
@@ -162,8 +163,12 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
         with pytest.raises(NeuralocksError, match=f"other settings in {name}"):
             train_strands(scene, out, RegressionOptions(steps=4, **tiny, **{name: value}), rollouts=4, resume=True)
     shorter = tuple(replace(groom, rest=0.9 * groom.rest) for groom in scene.grooms)
+    joints = scene.character.humanoid.joints
+    renamed = replace(scene.character, humanoid=Humanoid({**joints, "upper_chest": joints["hips"]}))
     for other, fact in (
         (replace(scene, seed=7), f"begun with --seed {scene.seed}; resume with that"),
+        (replace(scene, character=renamed), "begun with another character"),
+        (replace(scene, character=replace(scene.character, carrier=2)), "begun with another character"),
         (replace(scene, grooms=shorter), "begun with another groom; resume with the same, or train without"),
     ):
         with pytest.raises(NeuralocksError, match=fact):
