@@ -26,7 +26,11 @@ def write_frame(path: Path, points: np.ndarray) -> None:
 
 def read_rows(path: Path, rows: slice) -> np.ndarray:
     """Points (n, 3) float32 from `rows.start` to before `rows.stop`. Raises OSError, or ValueError where they are fewer."""
-    return np.fromfile(path, np.float32, 3 * (rows.stop - rows.start), offset=12 * rows.start).reshape(-1, 3)
+    count = 3 * (rows.stop - rows.start)
+    numbers = np.fromfile(path, np.float32, count, offset=12 * rows.start)
+    if len(numbers) < count:
+        raise ValueError("it is cut short")
+    return numbers.reshape(-1, 3)
 
 
 def has_size(path: Path, points: int) -> bool:

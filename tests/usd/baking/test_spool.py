@@ -52,6 +52,18 @@ def test_frames_that_were_left_damaged_are_not_taken_over(tmp_path, points):
     again.discard()
 
 
+def test_a_frame_that_is_cut_short_while_it_is_used_is_one_line(tmp_path):
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    spool.write(0, 1.0, np.ones((10, 3)))
+    with open(spool._path(0, 1.0), "r+b") as file:
+        file.truncate(5 * 12)
+    assert len(spool.read(0, 1.0, slice(0, 5))) == 5
+    for rows in (slice(0, 10), slice(5, 10), slice(8, 10)):
+        with pytest.raises(NeuralocksError, match="cannot be read .*; bake again"):
+            spool.read(0, 1.0, rows)
+    spool.discard()
+
+
 def test_folders_and_links_in_the_place_of_frames_make_way(tmp_path):
     folder = tmp_path / ".bake.usdc.baking"
     spool = Spool(tmp_path / "bake.usdc", "a")
