@@ -36,7 +36,7 @@ def stateless_floor(
     triangles: np.ndarray | None = None,
     material: Any = None,
     *,
-    history: int = 60,
+    history: int,
     every: int = 10,
     truth: np.ndarray | None = None,
     progress: Progress | None = None,

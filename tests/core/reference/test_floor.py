@@ -34,3 +34,5 @@ def test_restarts_measure_rest_on_the_body_at_rest():
 def test_short_clip_is_refused():
     with pytest.raises(NeuralocksError, match="longer"):
         stateless_floor(groom(2), shaken(10), history=20)
+    with pytest.raises(TypeError, match="history"):  # it has no usual length: each model reads its own
+        stateless_floor(groom(2), shaken(10))
