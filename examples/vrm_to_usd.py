@@ -15,6 +15,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+LONGEST = 63
+"""Bytes of a name in Blender."""
+
 
 def main() -> None:
     """Convert one file."""
@@ -76,19 +79,25 @@ def packed(scene: dict, rest: bytes) -> bytes:
 
 
 def name_apart(scene: dict) -> None:
-    """Give all nodes names that USD takes as they are, no two the same: glTF allows equal ones, and Blender numbers those
-    itself.
+    """Give all nodes names that USD and Blender take as they are, no two the same: glTF allows equal ones and long ones, and
+    Blender numbers those and cuts these itself.
     """
     taken = set()
     for node in scene.get("nodes", ()):
         safe = "".join(letter if f"_{letter}".isidentifier() else "_" for letter in node.get("name") or "node")
-        name = safe = safe if safe.isidentifier() else f"_{safe}"
+        safe = safe if safe.isidentifier() else f"_{safe}"
+        name = cut(safe)
         number = 1
         while name in taken:
             number += 1
-            name = f"{safe}_{number}"
+            name = cut(safe, f"_{number}")
         taken.add(name)
         node["name"] = name
+
+
+def cut(name: str, ending: str = "") -> str:
+    """A name and its ending, of whole letters and no more bytes than LONGEST."""
+    return name.encode()[: LONGEST - len(ending)].decode(errors="ignore") + ending
 
 
 def spring_bone_names(scene: dict) -> list[str]:

@@ -56,6 +56,16 @@ def test_equal_names_and_none_are_told_apart():
     assert found == ["a_b", "a_b_2", "a_b_3", "_1"]
 
 
+def test_long_names_are_cut_to_what_blender_takes():
+    """At a letter, and told apart after that: a chain is printed by the name that its joint has."""
+    stem, kana = "Hair_" + 58 * "a", "前" * 22
+    nodes = [{"name": "Head", "children": [1, 2, 3]}, {"name": stem + "_A"}, {"name": stem + "_B"}, {"name": kana}]
+    springs = [{"joints": [{"node": node}]} for node in (1, 2, 3)]
+    head = {"humanoid": {"humanBones": {"head": {"node": 0}}}}
+    found = names({"VRMC_vrm": head, "VRMC_springBone": {"springs": springs}}, nodes)
+    assert found == [stem, stem[:-2] + "_2", kana[:21]]
+
+
 def test_what_is_no_binary_gltf_is_refused(tmp_path):
     (path := tmp_path / "avatar.vrm").write_text("{}")
     with pytest.raises(SystemExit, match="no binary glTF file"):

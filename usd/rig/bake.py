@@ -224,11 +224,11 @@ def _turns(hair, carried, clip, codes, strength, progress) -> np.ndarray:
 
 
 def _name_notes(source) -> list[str]:
-    """Blender names a bone after the last part of its joint's path, and cuts that at 63 characters."""
+    """Blender names a bone after the last part of its joint's path, and cuts that at 63 bytes."""
     leaves = [leaf(name) for name in source.names]
-    long = next((n for n in leaves if len(n) > 63), None)
+    long = next((n for n in leaves if len(n.encode()) > 63), None)
     if long:
-        return [f"{source.path}: joint '{long}' has more than 63 characters; Blender cuts its name"]
+        return [f"{source.path}: the name of joint '{long}' has more than 63 bytes in UTF-8; Blender cuts it"]
     double = next((n for n in leaves if leaves.count(n) > 1), None)
     if double:
         return [f"{source.path}: several joints are named '{double}'; Blender renames all but one"]

@@ -108,6 +108,20 @@ def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
         bake_rig(shot, tmp_path / "out.usda", model, joints={"neck": "b03"})
 
 
+@pytest.mark.parametrize(("letters", "told"), [(21, False), (22, True)])
+def test_a_name_that_blender_cuts_is_told(edited, tmp_path, letters, told):
+    """It counts bytes, of which each of these letters has three."""
+
+    def change(stage):
+        for prim in ("Rig", "Motion"):
+            joints = stage.GetPrimAtPath(f"/Who/{prim}").GetAttribute("joints")
+            joints.Set([name.replace("hair_3", letters * "髪") for name in joints.Get()])
+
+    shot = edited(change)
+    notes = bake_rig(shot, tmp_path / "hair.usda", model_for(read_rigged_hair(shot))).notes
+    assert any("more than 63 bytes" in note for note in notes) == told
+
+
 def test_a_strength_that_a_model_of_held_poses_does_not_have_is_told(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     for dynamic, strength, told in ((False, 0.5, True), (False, 1, False), (True, 0.5, False)):
