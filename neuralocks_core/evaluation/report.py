@@ -46,6 +46,13 @@ LABELS = {
 }
 """Name of a measure -> what a person reads, unit, remark."""
 
+BADNESS = {
+    "motion_ratio": lambda ratio: abs(ratio - 1),
+    "dynamic_frames": lambda count: -count,
+    "tip_correlation": lambda correlation: -correlation,
+}
+"""How bad a value of a measure is, where the one farthest from 0 is not the worst."""
+
 EACH = 8
 """Grooms of which each has tables of its own; of more, one table tells the mean and the worst, and so many are drawn."""
 
@@ -147,19 +154,20 @@ class Card:
         return table
 
     def _overview(self, title, grooms):
-        """Of each measure the mean over the grooms, every strand counting alike, and the one farthest from nothing."""
+        """Of each measure the mean over the grooms, every strand counting alike, and the worst of them."""
         from rich.table import Table
 
         table = Table(title=title, title_justify="left")
-        for heading in ("", "mean", "most", "", "in"):
-            table.add_column(heading, justify="right" if heading in ("mean", "most") else "left")
+        for heading in ("", "mean", "worst", "", "in"):
+            table.add_column(heading, justify="right" if heading in ("mean", "worst") else "left")
         for key, (label, unit, _) in LABELS.items():
             found = {name: values[key] for name, values in grooms.items() if _finite(values.get(key))}
             if found:
-                most = max(found, key=lambda name: abs(found[name]))
+                bad = BADNESS.get(key, abs)
+                worst = max(found, key=lambda name: bad(found[name]))
                 strands = [self.grooms[name].get("strands", 1) for name in found]
                 mean = np.average(list(found.values()), weights=strands)
-                table.add_row(label, _number(mean), _number(found[most]), unit, most)
+                table.add_row(label, _number(mean), _number(found[worst]), unit, worst)
         return table
 
     def _comparison(self, name):

@@ -32,14 +32,24 @@ def test_text_holds_every_number_and_note():
 def test_of_many_grooms_one_table_tells_mean_and_worst(tmp_path):
     """Hair in hundreds of prims: nobody reads hundreds of tables, and no picture is as tall."""
     grooms = {f"/Hair/lock{i}": {"strands": 1 + i % 2, "droop_cm": -float(i), "settling_s": np.nan} for i in range(40)}
-    compared = {name: {"bake": {"motion_ratio": 0.5}, "rigid": {"motion_ratio": 0.0}} for name in grooms}
+    good = {"motion_ratio": 1.05, "tip_correlation": 0.9, "dynamic_frames": 40, "tip_percent": 2.0}
+    compared = {name: {"bake": dict(good), "rigid": {"motion_ratio": 0.0}} for name in grooms}
+    compared["/Hair/lock3"]["bake"] |= {"motion_ratio": 0.0625, "dynamic_frames": 7}
+    compared["/Hair/lock4"]["bake"] |= {"tip_correlation": -0.25, "tip_percent": 31.0}
     text = Card("bake", grooms, compared, notes=("a note",)).text()
     assert len(text.splitlines()) < 25
     (row,) = [line for line in text.splitlines() if "droop" in line]
     mean = np.average(-np.arange(40.0), weights=[1, 2] * 20)
     assert all(word in row for word in (f"{mean:.3g}", "-39", "/Hair/lock39", "cm"))
     assert "settling" not in text
-    assert "motion ratio" in text
+    for measure, worst, name in (
+        ("motion ratio", "0.0625", "lock3"),
+        ("dynamic samples", "7", "lock3"),
+        ("tip curve", "-0.25", "lock4"),
+        ("of the tips", "31", "lock4"),
+    ):
+        (row,) = [line for line in text.splitlines() if measure in line]
+        assert f" {worst} " in row and f"/Hair/{name} " in row
     assert "a note" in text
     curves = {name: {"times": np.arange(3.0), "bake": np.zeros((3, 3))} for name in grooms}
     picture = Card("bake", grooms, {}, curves).plot(tmp_path / "curves.svg").read_text()
