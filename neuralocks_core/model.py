@@ -17,6 +17,11 @@ KINDS = {
     "strands": ("encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"),
     "rig": ("rig.onnx",),
 }
+REMEDIES = {
+    "strands": "train with a smaller --set rate",
+    "rig": "give --bend, --weight and --damping nearer to their defaults",
+}
+"""By kind, what a user can do against a training whose numbers ran away."""
 CARD = (("training", dict, "table of values"), ("report", dict, "table of values"), ("credits", list, "list of lines"))
 """What every model says of itself, empty where its file does not."""
 _LARGEST = 64 << 20
@@ -84,7 +89,7 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
         text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
     except ValueError:
         raise NeuralocksError(
-            f"{path}: its description would hold NaN or infinity, as of a training that ran away; train with smaller steps"
+            f"{path}: its description would hold NaN or infinity, as of a training that ran away; {REMEDIES[meta['kind']]}"
         ) from None
     with atomic_write(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in {"model.json": text.encode(), **graphs}.items():

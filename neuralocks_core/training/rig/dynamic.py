@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.animation.random_motion import random_clip
+from neuralocks_core.model import REMEDIES
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
@@ -20,7 +21,7 @@ from neuralocks_core.training.descent import Schedule, descend, muon
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
-from neuralocks_core.training.rig.network import REMEDY, TinyNet
+from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
 
 _VELOCITY = 20.0
@@ -107,7 +108,7 @@ def train_dynamic(
 
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
-    for state in descend(muon(net, _RATE, 0.1), losses, schedule, remedy=REMEDY):
+    for state in descend(muon(net, _RATE, 0.1), losses, schedule, remedy=REMEDIES["rig"]):
         far = simulated + int((learned - simulated) * state.done)
         say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {

@@ -10,9 +10,6 @@ from neuralocks_core.rig.network import MAX_ANGLE, POSE, RigModel, held_features
 from neuralocks_core.training.rig.energy import bounded_turns
 from neuralocks_core.training.rig.poses import PosePool
 
-REMEDY = "give --bend, --weight and --damping nearer to their defaults"
-"""Against a training whose losses grow beyond numbers."""
-
 
 class TinyNet(torch.nn.Module):
     """Two hidden layers; gives turns (B, N, 4) wxyz in canonical axes, none for the held bind pose.

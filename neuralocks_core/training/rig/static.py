@@ -9,13 +9,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import torch
 
+from neuralocks_core.model import REMEDIES
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend, muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
-from neuralocks_core.training.rig.network import REMEDY, TinyNet
+from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
 
 _POOL = 512
@@ -69,7 +70,7 @@ def train_static(
 
     began = time.monotonic()
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
-    for state in descend(muon(net, _RATE, 0.0), losses, schedule, remedy=REMEDY):
+    for state in descend(muon(net, _RATE, 0.0), losses, schedule, remedy=REMEDIES["rig"]):
         say(int(_LEARNING * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
     training = {
         "method": "quasi-static, self-supervised",

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One network in numpy and ONNX: the same answers, one at a time and many, and a file that keeps them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,15 @@ def test_batch_and_single_agree():
     model = random_model()
     features = random_features(model, 50)
     np.testing.assert_allclose(model.evaluate(features)[7], model.evaluate(features[7]), atol=1e-6)
+
+
+def test_a_report_that_ran_away_is_not_written(tmp_path):
+    """What helps is an option of `rig train`: it has no --set."""
+    pytest.importorskip("onnx")
+    bad = replace(random_model(), report={"loss": np.inf})
+    with pytest.raises(NeuralocksError, match="m.neuralocks: .* NaN .*; give --bend, --weight and --damping nearer"):
+        bad.save(tmp_path / "m.neuralocks")
+    assert not list(tmp_path.iterdir())
 
 
 def test_model_file_round_trip(tmp_path):
