@@ -2,7 +2,7 @@
 """A folder that one process at a time works in; its lock ends with the process that holds it, however that ends."""
 
 import os
-import shutil
+from contextlib import suppress
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -40,18 +40,13 @@ class FolderLock:
             raise cannot_write(subject, error) from None
         raise NeuralocksError(f"{subject}: {busy}")
 
-    @property
-    def alone(self) -> bool:
-        """Whether nothing else is in the folder."""
-        return self.folder.is_dir() and os.listdir(self.folder) == ["lock"]
-
-    def release(self, remove: bool) -> None:
-        """Let go of the folder, and remove it with all that is in it if that is wanted."""
+    def release(self) -> None:
+        """Let go of the folder, and remove it if nothing else is in it."""
         if os.name == "nt":
             self._lock.close()  # Windows removes no open file
-        if remove:
-            # Before the lock is given up: another process that takes it would lose what is its own.
-            shutil.rmtree(self.folder, ignore_errors=True)
+        with suppress(OSError):  # another process has it, or something is kept in it
+            (self.folder / "lock").unlink()
+            self.folder.rmdir()
         self._lock.close()
 
 

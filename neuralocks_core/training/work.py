@@ -71,7 +71,7 @@ def claimed(work: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        lock.release(remove=lock.alone)
+        lock.release()
 
 
 def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:

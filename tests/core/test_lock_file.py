@@ -8,16 +8,17 @@ from neuralocks_core.lock_file import FolderLock
 
 
 def test_second_is_refused(tmp_path):
-    """While it is held, and not afterwards; what is in it stays unless it is to go."""
+    """While it is held, and not afterwards; what is in it stays, and an empty one goes."""
     folder = tmp_path / "work"
     first = FolderLock(folder, folder, "busy")
     (folder / "kept").touch()
     with pytest.raises(NeuralocksError, match="busy"):
         FolderLock(folder, folder, "busy")
-    first.release(remove=False)
+    first.release()
+    assert [path.name for path in folder.iterdir()] == ["kept"]
     second = FolderLock(folder, folder, "busy")
-    assert (folder / "kept").exists() and not second.alone
-    second.release(remove=True)
+    (folder / "kept").unlink()
+    second.release()
     assert not folder.exists()
 
 
@@ -30,14 +31,14 @@ def test_removed_while_it_is_opened(tmp_path, monkeypatch):
 
     def left_in_between(*arguments):
         if holders:
-            holders.pop().release(remove=True)
+            holders.pop().release()
         lock(*arguments)
 
     monkeypatch.setattr(fcntl, "flock", left_in_between)
     second = FolderLock(folder, folder, "busy")
     with pytest.raises(NeuralocksError, match="busy"):
         FolderLock(folder, folder, "busy")
-    second.release(remove=True)
+    second.release()
 
 
 def test_no_folder_can_be_made(tmp_path):

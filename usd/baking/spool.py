@@ -8,6 +8,7 @@ import re
 import shutil
 import stat
 import uuid
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -113,13 +114,18 @@ class Spool:
     def close(self) -> None:
         """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
         if any(self.folder.glob("*.frame")):
-            self._lock.release(remove=False)
+            self._lock.release()
         else:
             self.discard()
 
     def discard(self) -> None:
-        """Remove the folder, and the folders made for an output that was not written."""
-        self._lock.release(remove=True)
+        """Remove what is ours, and the folder and those made for an output that was not written if nothing else is in them."""
+        # Before the lock is given up: another process that takes it would lose what is its own.
+        for path in list(self.folder.glob("*")):
+            if re.fullmatch(rf"{_FRAME}|{_PART}|inputs", path.name):
+                with suppress(OSError):
+                    _remove(path)
+        self._lock.release()
         remove_empty(self._made)
 
     def _path(self, groom: int, time_code: float) -> Path:

@@ -2,14 +2,13 @@
 """Finished frames beside the output: whatever lies there already, one line or a clean start."""
 
 import errno
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from usd.baking.spool import Spool
+from usd.baking.spool import Spool, _remove
 
 
 def test_a_damaged_mark_means_a_fresh_start(tmp_path):
@@ -108,16 +107,32 @@ def test_a_disk_without_room_for_a_mark_is_left_as_it_was(tmp_path, monkeypatch)
 
 def test_the_folder_is_locked_until_it_is_gone(tmp_path, monkeypatch):
     pytest.importorskip("fcntl")
-    spool, remove = Spool(tmp_path / "bake.usdc", "a"), shutil.rmtree
+    spool, removed = Spool(tmp_path / "bake.usdc", "a"), []
 
-    def checked(folder, **options):
+    def checked(path):
         with pytest.raises(NeuralocksError, match="another bake"):
             Spool(tmp_path / "bake.usdc", "b")
-        remove(folder, **options)
+        removed.append(path.name)
+        _remove(path)
 
-    monkeypatch.setattr(shutil, "rmtree", checked)
+    spool.write(0, 1.0, np.zeros((2, 3)))
+    monkeypatch.setattr("usd.baking.spool._remove", checked)
     spool.discard()
-    assert not list(tmp_path.iterdir())
+    assert len(removed) == 2 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ["finish", "close", "discard"])
+def test_what_a_user_put_into_the_folder_stays(tmp_path, ending):
+    folder = tmp_path / ".bake.usdc.baking"
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    (folder / "notes.txt").write_text("mine")
+    (folder / "mine").mkdir()
+    spool.layer_path.write_bytes(b"layer")
+    if ending == "finish":
+        spool.write(0, 1.0, np.zeros((2, 3)))
+    getattr(spool, ending)()
+    assert sorted(path.name for path in folder.iterdir()) == ["mine", "notes.txt"]
+    assert (tmp_path / "bake.usdc").exists() == (ending == "finish")
 
 
 def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
