@@ -54,7 +54,7 @@ def train_command(
     joint: Joints = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
     variations: Annotated[
-        int, typer.Option(min=0, max=1000, help="Of each style of the library, beside the style itself.")
+        int, typer.Option(min=0, max=50, help="Of each style of the library, beside the style itself.")
     ] = 0,
     rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,

@@ -66,7 +66,7 @@ def train(
         begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
             it reads are the shipped model's.
         resume: go on with an interrupted training.
-        variations: of each style of the library, beside the style itself.
+        variations: of each style of the library, beside the style itself; 50 at most.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
@@ -109,7 +109,7 @@ def train(
     begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
-        variations=variations, tell=tell, **history,
+        variations=variations, tell=tell, progress=progress, **history,
     )  # fmt: skip
     command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
     return train_strands(

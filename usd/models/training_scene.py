@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 from neuralocks_core.training.rollouts import TrainingScene
@@ -36,6 +37,9 @@ LIBRARY = "library"
 MOST_STRANDS = 3000
 """Strands of a groom that are learned from, as in the paper; the network deforms all of them afterwards."""
 
+MOST_VARIATIONS = 50
+"""Of each style, beside the style itself: all of their strands are in memory together."""
+
 
 def training_scene(
     character: str | Path,
@@ -48,6 +52,7 @@ def training_scene(
     seed: int = 0,
     variations: int = 0,
     tell: Callable[[list[str]], None] | None = None,
+    progress: Progress | None = None,
     **settings,
 ) -> TrainingScene:
     """Read a character, its grooms and motion for training.
@@ -61,13 +66,16 @@ def training_scene(
         head: joint that is the head, where its name does not tell.
         joints: semantic joint -> joint, where names do not tell.
         seed: of everything random.
-        variations: of each style of the library, beside the style itself.
+        variations: of each style of the library, beside the style itself; MOST_VARIATIONS at most.
         tell: called with notes for the user.
+        progress: called with (done, total, message) while styles grow.
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file cannot be used, there is no hair, or there are to be variations of no library.
+        NeuralocksError: a file cannot be used, there is no hair, or there are to be variations of no library, or too many.
     """
+    if not 0 <= variations <= MOST_VARIATIONS:
+        raise NeuralocksError(f"--variations {variations}: must be from 0 to {MOST_VARIATIONS}")
     if variations and LIBRARY not in grooms:
         raise NeuralocksError(
             f"--variations {variations}: are of the library's styles; add --groom {LIBRARY}, or leave it out"
@@ -79,7 +87,10 @@ def training_scene(
     notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
     for source in grooms or [str(character)]:
-        found += _library(rig.character, seed, variations) if source == LIBRARY else _file(source, rig, head, notes)
+        if source == LIBRARY:
+            found += _library(rig.character, seed, variations, progress or silent)
+        else:
+            found += _file(source, rig, head, notes)
     clips = tuple(read_clip(path, rig.character) for path in motion)
     if tell:
         tell(list(dict.fromkeys(notes)))
@@ -102,13 +113,13 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     return [strands for strands in found if strands.valid.any()]
 
 
-def _library(character: Character, seed: int, variations: int) -> list[StrandSet]:
-    barber = Barber(character)
-    return [
-        _strands(barber.grow(style, MOST_STRANDS, seed + i, variation), character)
-        for variation in range(1 + variations)
-        for i, style in enumerate(STYLES)
-    ]
+def _library(character: Character, seed: int, variations: int, progress: Progress) -> list[StrandSet]:
+    barber, found, total = Barber(character), [], len(STYLES) * (1 + variations)
+    for variation in range(1 + variations):
+        for i, style in enumerate(STYLES):
+            progress(len(found), total, f"growing {style}")
+            found.append(_strands(barber.grow(style, MOST_STRANDS, seed + i, variation), character))
+    return found
 
 
 def _strands(groom: Groom, character: Character) -> StrandSet:

@@ -36,8 +36,11 @@ def test_a_style_grows_on_the_head_and_is_repeatable(tmp_path):
 def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatch):
     monkeypatch.setattr(training_scene_module, "STYLES", {"bob": None, "coils": None})
     monkeypatch.setattr(training_scene_module, "MOST_STRANDS", 40)
-    few, many = (training_scene(BODY, ["library"], variations=count).grooms for count in (0, 2))
+    told = []
+    few = training_scene(BODY, ["library"]).grooms
+    many = training_scene(BODY, ["library"], variations=2, progress=lambda *said: told.append(said)).grooms
     assert (len(few), len(many)) == (2, 6)
+    assert told == [(done, 6, f"growing {style}") for done, style in enumerate(["bob", "coils"] * 3)]
     for groom, same in zip(few, many[:2], strict=True):
         np.testing.assert_array_equal(groom.rest, same.rest)
     # What `grow --variation` gives is what is learned from.
@@ -50,6 +53,9 @@ def test_variations_are_of_a_style_of_the_library(tmp_path):
     """Of a groom of one's own there are none, and a number below 0 is no variation."""
     with pytest.raises(NeuralocksError, match="--variations 2.*--groom library"):
         training_scene(BODY, [], variations=2)
+    for count in (-1, 51):
+        with pytest.raises(NeuralocksError, match=f"--variations {count}: must be from 0 to 50"):
+            training_scene(BODY, ["library"], variations=count)
     with pytest.raises(NeuralocksError, match="no variation -1"):
         grow("bob", BODY, tmp_path / "bob.usda", count=5, variation=-1)
 

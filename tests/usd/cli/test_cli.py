@@ -190,6 +190,12 @@ def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys
     assert os.listdir(tmp_path / "model") == ["rig.onnx"]
 
 
+def test_so_many_variations_as_fit_into_memory(capsys):
+    words = ("train", "--character", "c.usda", "--groom", "library", "-o", "m.neuralocks", "--variations", "51")
+    assert status(*words) == 2
+    assert "--variations" in capsys.readouterr().err
+
+
 def test_a_seed_is_one_of_numpys(capsys):
     for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
         assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
