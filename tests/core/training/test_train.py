@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training on rollouts: repeatable material, hair that learns to move, runs that survive a kill."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -101,26 +100,32 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     assert np.ptp(tips, axis=0).max() > 0.03
 
 
-def test_a_killed_run_goes_on(scene, tmp_path):
+def test_a_killed_run_goes_on(scene, tmp_path, monkeypatch):
     """Killed while the first simulations are made, and again after the first checkpoint."""
     out = tmp_path / "hair.neuralocks"
     work = tmp_path / "hair.neuralocks.training"
     short = RegressionOptions(steps=40, clips=8, strands=4)
-    made = {}
-    for resume, moment in ((False, "first simulations"), (True, "motion error")):
 
-        def kill(done, total, message, moment=moment):
-            if moment in message:
-                while len(list(work.glob("*/*.npz"))) < 2:  # how soon they come is the machine's business
-                    time.sleep(0.01)
-                raise KeyboardInterrupt
+    def kill_early(farm, count, say):
+        wait(farm, 2, say)
+        raise KeyboardInterrupt
 
-        with pytest.raises(KeyboardInterrupt):
-            train_strands(scene, out, short, rollouts=30, resume=resume, progress=kill)
-        assert not out.exists() and (work / "checkpoint.npz").exists() == resume
-        kept = {path: path.stat().st_mtime_ns for path in [work / "codes.npz", *work.glob("*/*.npz")]}
-        assert len(kept) > 2 and made.items() <= kept.items()
-        made = kept
+    def kill_late(done, total, message):
+        if "motion error" in message:
+            raise KeyboardInterrupt
+
+    def kept():
+        return {path: path.stat().st_mtime_ns for path in [work / "codes.npz", *work.glob("*/*.npz")]}
+
+    wait = methods.wait
+    with monkeypatch.context() as first, pytest.raises(KeyboardInterrupt):
+        first.setattr(methods, "wait", kill_early)
+        train_strands(scene, out, short, rollouts=30)
+    made = kept()
+    assert not out.exists() and not (work / "checkpoint.npz").exists() and len(made) > 2
+    with pytest.raises(KeyboardInterrupt):
+        train_strands(scene, out, short, rollouts=30, resume=True, progress=kill_late)
+    assert not out.exists() and (work / "checkpoint.npz").exists() and made.items() <= kept().items()
     train_strands(scene, out, short, rollouts=30, resume=True)
     assert model.read(out).meta["training"]["steps"] >= 40
 
