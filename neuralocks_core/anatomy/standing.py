@@ -19,6 +19,9 @@ NEAR = 30.0
 """Where nothing tells what is up, the nearest quarter turn is meant if it is this near [degrees]."""
 LIES = 60.0
 """Legs and trunk that are farther off the vertical [degrees] are those of a character that lies."""
+SHORT = 0.25
+"""Legs shorter than this share of the trunk are none: they were measured from a root on the floor, or by joints of a control."""
+THIGHS = ("left_upper_leg", "right_upper_leg")
 FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
 
 
@@ -32,7 +35,7 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     Args:
         placed: their turn and scale (3, 3) at rest.
         joints: places (J, 3) in the bind pose, without them.
-        humanoid: which of these are head, hips and feet.
+        humanoid: which of these are head, hips, legs and feet.
         up: the direction (3,) that is up where the parents are.
 
     Returns:
@@ -65,7 +68,7 @@ def lies(joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> tuple[bool, 
 
     Args:
         joints: places (J, 3) in the bind pose.
-        humanoid: which of these are head, hips and feet.
+        humanoid: which of these are head, hips, legs and feet.
         up: the direction (3,) that is up there.
     """
     legs, trunk = _axes(joints, humanoid)
@@ -79,9 +82,13 @@ def _tilt(axis: np.ndarray, up: np.ndarray) -> float:
 
 
 def _axes(joints: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Directions (3,) from the feet to the hips and from the hips to the head; None where these are not known."""
-    feet = [joints[humanoid[name]] for name in FEET if name in humanoid]
+    """Directions (3,) from the feet to the upper ends of the legs and from the hips to the head; None where these are not known."""
+    feet, thighs = ([joints[humanoid[name]] for name in names if name in humanoid] for names in (FEET, THIGHS))
     head, hips = (joints[humanoid[name]] if name in humanoid else None for name in ("head", "hips"))
-    legs = hips - np.mean(feet, axis=0) if feet and hips is not None else None
+    # The hips, where the ways from head and legs meet, may be a root on the floor, below the feet.
+    top = np.mean(thighs, axis=0) if thighs else hips
+    legs = top - np.mean(feet, axis=0) if feet and top is not None else None
     trunk = head - hips if head is not None and hips is not None else None
+    if legs is not None and trunk is not None and np.linalg.norm(legs) < SHORT * np.linalg.norm(trunk):
+        legs = None
     return tuple(None if a is None or not np.linalg.norm(a) else a / np.linalg.norm(a) for a in (legs, trunk))

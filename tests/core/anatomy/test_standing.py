@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a character lies in its bind pose."""
+"""Whether a character lies in its bind pose, and how much of its parents' turn is axes."""
 
 import numpy as np
 import pytest
 
 from neuralocks_core.anatomy.humanoid import Humanoid
-from neuralocks_core.anatomy.standing import lies
+from neuralocks_core.anatomy.standing import lies, standing
 
 NAMED = {"hips": 0, "head": 1, "left_foot": 2, "right_foot": 3}
 UPRIGHT = np.array([[0, 1, 0], [0, 1.6, 0.05], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
 FLAT = UPRIGHT[:, [0, 2, 1]]
 ON_ALL_FOURS = np.array([[0, 1, 0], [0, 1.1, 1], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""What places joints that count Y as up in a stage that counts Z."""
 SEATED = np.array([[0, 0.1, 0], [0, 0.7, 0], [0.2, 0.1, 0.9], [-0.2, 0.1, 0.9]])
 
 
@@ -24,3 +26,23 @@ def test_without_legs_a_level_trunk_may_be_an_animals():
     assert lies(ON_ALL_FOURS, trunk, np.array([0, 1, 0])) == (True, False)
     assert lies(UPRIGHT, trunk, np.array([0, 1, 0])) == (False, False)
     assert not lies(UPRIGHT[:1], Humanoid({"head": 0}), np.array([0, 1, 0]))[0]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("hips", "head", "left_foot", "right_foot"),
+        ("hips", "head", "left_upper_leg", "right_upper_leg", "left_foot", "right_foot"),
+    ],
+)
+def test_a_root_on_the_floor_is_no_upper_end_of_legs(names):
+    """The ways from head and legs meet there in a rig whose thighs hang from its root, or with controls for them."""
+    places = {"hips": (0, 0, 0), "head": (0, 1.6, 0), "upper_leg": (0.1, 0.9, 0), "foot": (0.1, 0.08, 0)}
+    joints = np.array([places[name.removeprefix("left_").removeprefix("right_")] for name in names])
+    joints *= [[-1 if "right" in name else 1, 1, 1] for name in names]
+    humanoid = Humanoid({name: joint for joint, name in enumerate(names)})
+    assert np.array_equal(standing(Z_UP, joints, humanoid, np.array([0, 0, 1.0])), Z_UP)
+    assert not lies(joints, humanoid, np.array([0, 1.0, 0]))[0]
+    # Where the legs are known, they tell that a character was laid down by its parents.
+    if "left_upper_leg" in names:
+        assert np.array_equal(standing(Z_UP, joints, humanoid, np.array([0, 1.0, 0])), np.eye(3))
