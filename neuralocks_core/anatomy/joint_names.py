@@ -4,6 +4,7 @@ somebody means.
 """
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -84,8 +85,8 @@ def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
 
 
 def _own_words(name: str) -> list[str]:
-    """Words of a joint's own name, those of MikuMikuDance as their English ones."""
-    name = without_namespace(name)
+    """Words of a joint's own name, those of MikuMikuDance as their English ones; its `ＩＫ` and `Ｄ` of full width are letters."""
+    name = without_namespace(unicodedata.normalize("NFKC", name))
     if not name.isascii():
         for word, part in _JAPANESE.items():
             name = name.replace(word, part)

@@ -27,14 +27,16 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
         parents: (J,) parent indices, -1 for roots.
     """
 
-    def nearest(option, fits):
-        hits = [i for i in range(len(keys)) if sides[i] == side and fits(keys[i], option)]
+    every = range(len(keys))
+
+    def nearest(option, fits, among):
+        hits = [i for i in among if sides[i] == side and fits(keys[i], option)]
         # `LHipJoint` over `LeftHip` is a mere socket at the pelvis: of several hips, the lowest is the thigh.
         sign = -1 if option == "hip" else 1
         return min(hits, key=lambda i: (sign * depth(i, parents), i), default=None)
 
-    def first(options, fits=str.__eq__):
-        hits = (nearest(option, fits) for option in options)
+    def first(options, fits=str.__eq__, among=every):
+        hits = (nearest(option, fits, among) for option in options)
         return next((hit for hit in hits if hit is not None), None)
 
     found = {part: first(options) for part, options in PARTS.items()}
@@ -43,6 +45,9 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
     collar = worded if collar is None else collar
     if found["shoulder"] is None:
         found["shoulder"] = collar
+    if found["lower_leg"] is not None:  # a control of the leg may have its name, and stand nearer to the root
+        over = first(PARTS["upper_leg"], among=ancestors(found["lower_leg"], parents)[1:])
+        found["upper_leg"] = found["upper_leg"] if over is None else over
     if found["upper_leg"] is None and _numbered(found["lower_leg"], side, sides, keys, parents):
         found["upper_leg"], found["lower_leg"] = found["lower_leg"], None
     if found["upper_arm"] is None and plain is not None:

@@ -197,6 +197,22 @@ RIGS = {
             "left_eye": "左目",
         },
     ),
+    "MikuMikuDance with controls in letters of full width": (
+        "全ての親\n センター\n  上半身\n   首\n    頭\n   左肩Ｐ\n    左肩\n     左腕\n   右腕\n  下半身\n   左足\n    左ひざ\n"
+        "     左足首\n   左足Ｄ\n    左ひざＤ\n   右足\n    右ひざ\n 左足ＩＫ\n 右足ＩＫ",
+        {
+            "hips": "センター",
+            "left_shoulder": "左肩",
+            "left_upper_leg": "左足",
+            "left_lower_leg": "左ひざ",
+            "right_upper_leg": "右足",
+        },
+    ),
+    "controls that are called as the leg's own joints, nearer to the root": (
+        "root\n thigh_l\n thigh_r\n pelvis\n  spine\n   neck\n    head\n  rig\n   thigh_l\n    calf_l\n     foot_l\n   thigh_r\n"
+        "    calf_r",
+        {"hips": "pelvis"},
+    ),
     "Motive": (
         "Hip\n Ab\n  Chest\n   Neck\n    Head\n   LShoulder\n    LUArm\n     LFArm\n      LHand\n   RShoulder\n    RUArm\n"
         "     RFArm\n LThigh\n  LShin\n RThigh",
