@@ -40,6 +40,9 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
         return next((hit for hit in hits if hit is not None), None)
 
     found = {part: first(options) for part, options in PARTS.items()}
+    for end in ("hand", "foot"):  # SMPL and Kinect call toes `foot`, below `ankle`, and fingers `hand`, below `wrist`
+        way = [] if found[end] is None else ancestors(found[end], parents)[::-1]
+        found[end] = next((i for i in way if sides[i] == side and keys[i] in PARTS[end]), None)
     worded = first(_COLLAR_ENDS, str.endswith)
     collar, plain = first(_COLLARS), first(("shoulder",))
     collar = worded if collar is None else collar

@@ -213,6 +213,16 @@ RIGS = {
         "    calf_r",
         {"hips": "pelvis"},
     ),
+    "SMPL, with feet below ankles and hands below wrists": (
+        "Pelvis\n L_Hip\n  L_Knee\n   L_Ankle\n    L_Foot\n R_Hip\n Spine1\n  Neck\n   Head\n  L_Collar\n   L_Shoulder\n    L_Elbow\n"
+        "     L_Wrist\n      L_Hand\n  R_Collar\n   R_Shoulder",
+        {"left_lower_leg": "L_Knee", "left_foot": "L_Ankle", "left_lower_arm": "L_Elbow", "left_hand": "L_Wrist"},
+    ),
+    "ankles and wrists that are parts of feet and hands": (
+        "pelvis\n thigh_l\n  calf_l\n   foot_l\n    ankle_l\n thigh_r\n spine\n  neck\n   head\n  clavicle_l\n   upperarm_l\n"
+        "    lowerarm_l\n     hand_l\n     wrist_l\n  upperarm_r",
+        {"left_foot": "foot_l", "left_hand": "hand_l"},
+    ),
     "Motive": (
         "Hip\n Ab\n  Chest\n   Neck\n    Head\n   LShoulder\n    LUArm\n     LFArm\n      LHand\n   RShoulder\n    RUArm\n"
         "     RFArm\n LThigh\n  LShin\n RThigh",
