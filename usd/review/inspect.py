@@ -110,7 +110,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         stops.append(not_animated(rigs[0]))
     search = HairSearch(rigs, head, spoils)
     grooms = _grooms(search, curves, border, spoils, stops)
-    spoils += without_body(search.carriers, rigs)
+    spoils += search.off_heads() + without_body(search.carriers, rigs)
     if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
         spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
     elif not curves:

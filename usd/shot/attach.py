@@ -139,6 +139,12 @@ def rig_joint(found: Attachment) -> str:
     return found.rig.source.names[found.character.carrying_joint]
 
 
+def off_head(found: Attachment) -> bool:
+    """Whether the carrying joint takes the part of a head that the rig has elsewhere, as it does for fur on a chest."""
+    own = found.rig.character.humanoid.get("head")
+    return own not in (None, found.character.head) and found.character.head != _head_by_name(found.rig)
+
+
 def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     nearest = min(seat.distance for seat in seats)

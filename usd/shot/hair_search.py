@@ -6,9 +6,11 @@ from dataclasses import replace
 
 from pxr import Usd
 
+from neuralocks_core.anatomy.joint_names import leaf
+
 from ..border.placement import Placement
 from ..skel.source import StageRig
-from .attach import Attachment, attach, of_another
+from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far
@@ -44,12 +46,17 @@ class HairSearch:
         self._named, self._others = named, list(others)
         self._far: list[str] = []
         self._controls: list[str] = []
+        self._off_head: list[str] = []
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
         """Why curves are not taken for hair: notes where other hair was found, the first of them the error where none was."""
         others = [] if self._named else other_hair(self.rigs)
         return few(others) + few(self._far) + controls_left_out(self._controls)
+
+    def off_heads(self) -> list[str]:
+        """The notes on hair that is not on a head, where none on that hair names its joint."""
+        return few(self._off_head, "grooms ride on other joints than the head")
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others, and are not closed."""
@@ -73,13 +80,18 @@ class HairSearch:
         if not self._named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
             return None
+        told = len(self._notes)
         found = attach(prim, self.rigs, placement, self._head, self._notes)
         if found.far and not self._named:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
         carrying = replace(found.rig, character=found.character)
-        self._notes += moved_as_open(prim) + left_as_they_are(prim) + untrained(carrying) + unevenly_scaled(carrying)
+        away, joint = off_head(found), leaf(rig_joint(found))
+        if away and not any(f"{joint}'" in note for note in self._notes[told:]):
+            self._off_head.append(f"{path}: rides on '{joint}', not on a head")
+        measured = [] if away else untrained(carrying)  # a chest has not a head's measures
+        self._notes += moved_as_open(prim) + left_as_they_are(prim) + measured + unevenly_scaled(carrying)
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

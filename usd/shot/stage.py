@@ -17,7 +17,7 @@ from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
 from ..border.units import Border
 from ..skel.source import StageRig, find_skeletons
-from .attach import Attachment, rig_joint
+from .attach import Attachment, off_head, rig_joint
 from .character_notes import lies_down, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
@@ -129,7 +129,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         raise NeuralocksError(
             (*no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
         )
-    notes += no_hair
+    notes += no_hair + search.off_heads()
     if not grooms:
         found = _moving(found, notes)
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
@@ -141,7 +141,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         carrying = replace(item.attachment.rig, character=item.attachment.character)
         if stops := without_turn(carrying):
             raise NeuralocksError(stops[0])
-        notes += rig_notes(carrying)
+        notes += rig_notes(item.attachment.rig if off_head(item.attachment) else carrying)
     first, last = frame_range(stage, used)
     return Shot(
         path=path,

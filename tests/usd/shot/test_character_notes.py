@@ -11,7 +11,7 @@ from usd.review.inspect import inspect
 from usd.rig.stage import rigged_notes
 from usd.shot.stage import read_shot
 
-from ..shots import CENTRE, JOINTS, Recipe, write_shot
+from ..shots import CENTRE, JOINTS, Recipe, add_curves, write_shot
 
 LIES = "/Hero/Rig: lies down in its bind pose"
 ELBOWS = {"left_lower_arm": "arm_twist_L", "right_lower_arm": "arm_twist_R"}
@@ -133,6 +133,27 @@ def test_a_head_larger_than_a_network_has_seen_is_told(tmp_path, size, told):
         assert said[0].startswith(
             "/Hero/Rig: its head height over its joint is 0.26 m (trained: 0.128 to 0.175), its head half"
         )
+
+
+def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path):
+    """Whose size and neck are looked for at the joint that carries the fur."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    hair = read_shot(path).notes
+    stage = Usd.Stage.Open(str(path))
+    skin = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr()
+    points = np.array(skin.Get())
+    chest = points[:, 1] < 1.5
+    points[chest, 0] *= 2.5
+    skin.Set(Vt.Vec3fArray.FromNumpy(points.astype(np.float32)))
+    low = points[chest & (points[:, 1] < 1.3)]
+    add_curves(stage, "/Hero/Fur", np.stack([low, low + [0, 0, 0.02]], axis=1))
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        assert set(notes) - set(hair) == {"/Hero/Fur: rides on 'spine', not on a head"}
+    assert read_shot(path, head="spine").grooms[1].joint == "hips/spine"
+    assert not any("rides on" in note for note in read_shot(path, head="spine").notes), (
+        "its user says that it is the head"
+    )
 
 
 def test_arms_that_no_joint_continues_are_told_to_count_as_straight(tmp_path):
