@@ -21,6 +21,9 @@ EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
 LARGEST_FILE = 4 * 2**30
 """Bytes; a groom of a million strands of 100 vertices is a third of it."""
 
+SCALP = 0.16
+"""Width of a narrow scalp [m]."""
+
 WIDEST = 0.005
 """A hair wider than this [m] says that the file's thickness is in another unit than its points."""
 
@@ -64,11 +67,16 @@ def read_with_look(
     _check_finite(points, path)
 
     scale = wanted if wanted is not None else raw.unit
-    if scale is None:
-        scale = _likely_unit(raw, points)
-        name = next(n for n, value in UNITS.items() if value == scale)
-        fact = f"does not state its unit; took 1 {name}, which suits a human scalp"
-        notes.append(f"{path}: {fact}; --unit says otherwise")
+    if wanted is None:
+        scalp = _scalp(raw, points)
+        size = float((points.max(axis=0).astype(np.float64) - points.min(axis=0)).max())
+        likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
+        if scale is None:
+            scale = likely
+            notes.append(f"{path}: does not state its unit; {_taken(scalp, likely)}; --unit says otherwise")
+        elif scale != likely and size > 0:  # ten times off, or more
+            fact = f"its format counts in {_name(scale)}, which makes it {scale * size:.3g} m of hair"
+            notes.append(f"{path}: {fact}; --unit {_name(likely)}?")
     axis = wanted_axis or raw.up
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows or is no number is dealt with below
         points = points * np.float32(scale)
@@ -138,11 +146,27 @@ def _check_finite(points: np.ndarray, path: Path) -> None:
         )
 
 
-def _likely_unit(raw: RawGroom, points: np.ndarray) -> float:
-    """The one of m, cm and mm that makes the roots' extent nearest to a narrow scalp's 16 cm, in ratio."""
+def _scalp(raw: RawGroom, points: np.ndarray) -> float:
+    """Width of the scalp, by the roots, in units of the file."""
     starts = np.cumsum(raw.counts, dtype=np.int64) - raw.counts
     roots = points[starts[raw.counts > 0]].astype(np.float64)
-    extent = float(np.ptp(np.percentile(roots, [2, 98], axis=0), axis=0).max()) if len(roots) else 0.0
-    if extent <= 0.0:  # one strand, or all from one point
-        extent = float(np.ptp(points.astype(np.float64), axis=0).max(initial=0.0)) / 2
-    return min((1.0, 0.01, 0.001), key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / 0.16)))
+    return float(np.ptp(np.percentile(roots, [2, 98], axis=0), axis=0).max()) if len(roots) else 0.0
+
+
+def _likely_unit(extent: float, units=(1.0, 0.01, 0.001)) -> float:
+    """The one of the units [m] by which an extent is nearest to a narrow scalp's, in ratio."""
+    return min(units, key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / SCALP)))
+
+
+def _taken(scalp: float, unit: float) -> str:
+    """Which unit was taken and how wide it makes the scalp; and how wide inches would, where that suits a narrow one better."""
+    inch = UNITS["in"]
+    if scalp <= 0:
+        return f"took 1 {_name(unit)}, which suits hair"
+    told = f"took 1 {_name(unit)}, by which the scalp is {100 * scalp * unit:.3g} cm wide"
+    narrow = unit < inch and _likely_unit(scalp, (unit, inch)) == inch
+    return f"{told}, narrow; in inches {100 * scalp * inch:.3g} cm" if narrow else told
+
+
+def _name(unit: float) -> str:
+    return next(name for name, metres in UNITS.items() if metres == unit)

@@ -12,7 +12,14 @@ POINTS = np.random.default_rng(0).normal(size=(8, 3)).astype("<f4") * 0.1
 
 
 def tressfx_text(points=POINTS, counts=COUNTS):
-    lines = ["version 2.0", "scale 1.0", "rotation 0 0 0", "translation 0 0 0", "numStrands 3", "is sorted 1"]
+    lines = [
+        "version 2.0",
+        "scale 1.0",
+        "rotation 0 0 0",
+        "translation 0 0 0",
+        f"numStrands {len(counts)}",
+        "is sorted 1",
+    ]
     at = 0
     for strand, n in enumerate(counts):
         lines.append(f"strand {strand} numVerts {n} texcoord 0.25 0.{strand}00000")
@@ -48,11 +55,11 @@ def hair_in_colors():
     return header + np.array([3, 0, 2], "<u2").tobytes() + b"".join(array.tobytes() for array in arrays)
 
 
-def counted(columns):
+def counted(columns, points=POINTS):
     parts, at = [struct.pack("<i", 3)], 0
     for n in COUNTS:
         rows = np.zeros((n, columns), "<f4")
-        rows[:, :3] = POINTS[at : at + n]
+        rows[:, :3] = points[at : at + n]
         parts += [struct.pack("<i", n), rows.tobytes()]
         at += n
     return b"".join(parts)

@@ -12,9 +12,10 @@ from scipy.spatial import cKDTree
 from neuralocks_core import formats
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.look import Look
+from neuralocks_core.formats.units import UNITS
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import strand_set
-from tests.core.formats.groom_files import COUNTS, FILES, POINTS, put, tressfx_text, write_hair
+from tests.core.formats.groom_files import COUNTS, FILES, POINTS, counted, put, tressfx_text, write_hair
 from tests.shared_data import SHARED
 
 DATA = SHARED / "grooms"
@@ -71,6 +72,37 @@ def test_units_of_the_formats(folder):
         groom, notes = formats.read_with_notes(put(folder, "text.tfx", scaled))
         assert np.ptp(groom.points) == pytest.approx(0.2, rel=1e-4)
         assert "does not state its unit" in notes[0]
+
+
+@pytest.mark.parametrize(
+    "unit, words", [("m", ""), ("cm", "36 m of hair; --unit cm?"), ("mm", "360 m of hair; --unit mm?")]
+)
+def test_hair_that_its_formats_unit_makes_too_large_is_told(folder, unit, words):
+    points = POINTS / np.ptp(POINTS, axis=0).max() * np.float32(0.36 / UNITS[unit])
+    path = put(folder, "large.data", counted(3, points))
+    groom, notes = formats.read_with_notes(path)
+    told = [note for note in notes if "--unit" in note]
+    assert told == ([f"{path}: its format counts in m, which makes it {words}"] if words else [])
+    np.testing.assert_array_equal(groom.points, points)
+    assert not any("--unit" in note for note in formats.read_with_notes(path, unit)[1])
+
+
+@pytest.mark.parametrize(
+    "metres, words",
+    [
+        (0.01, "took 1 cm, by which the scalp is 17 cm wide; --unit"),
+        (0.0254, "took 1 cm, by which the scalp is 6.69 cm wide, narrow; in inches 17 cm; --unit"),
+        (0.3048, "took 1 m, by which the scalp is 55.8 cm wide; --unit"),
+        (0.1, "took 1 cm, by which the scalp is 1.7 cm wide, narrow; in inches 4.32 cm; --unit"),
+    ],
+)
+def test_the_scalps_width_is_told_where_no_unit_is_stated(folder, metres, words):
+    points = np.zeros((51, 2, 3))
+    points[..., 0] = np.linspace(0, 0.17 / 0.96 / metres, 51)[:, None]  # all but the outermost roots count
+    points[:, 1, 1] = -0.2 / metres
+    content = tressfx_text(points.reshape(-1, 3), [2] * 51)
+    (note,) = formats.read_with_notes(put(folder, "scalp.tfx", content))[1]
+    assert words in note
 
 
 def test_the_text_format_may_begin_with_a_mark_and_hold_comments(folder):
