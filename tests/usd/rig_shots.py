@@ -20,10 +20,21 @@ def model_for(hair, dynamic=False) -> RigModel:
 
 
 def small_shot(
-    path, scale=1.0, z_up=False, rate=24, frames=24, head_moves=True, bind=True, weights=1.0, orient=None, step=0.07
+    path,
+    scale=1.0,
+    z_up=False,
+    rate=24,
+    frames=24,
+    head_moves=True,
+    bind=True,
+    weights=1.0,
+    orient=None,
+    step=0.07,
+    mirrored=6,
 ) -> Path:
     """A head with one tail of three joints and an end, nodding; in any unit and up axis, with the hair's axes turned by
-    `orient` (3, 3), its joints `step` [m] below each other.
+    `orient` (3, 3), its joints `step` [m] below each other. Joint `mirrored` and what hangs from it have a negative scale,
+    which moves nothing: in the bind pose, at rest and in the animation.
     """
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)
@@ -41,6 +52,8 @@ def small_shot(
     world = [np.block([[turn, (scale * turn @ np.array(p))[:, None]], [np.zeros(3), 1]]) for p in places]
     for hair in world[2:]:
         hair[:3, :3] = hair[:3, :3] @ (np.eye(3) if orient is None else orient)
+    for joint in world[mirrored:]:
+        joint[:3, 0] *= -1
 
     def rows(matrices):
         return Vt.Matrix4dArray([Gf.Matrix4d(*np.asarray(m).T.ravel().tolist()) for m in matrices])
@@ -61,7 +74,7 @@ def small_shot(
     binding.CreateJointWeightsPrimvar(False, 1).Set([weights] * 9)
     motion = UsdSkel.Animation.Define(stage, "/Who/Motion")
     motion.CreateJointsAttr(joints)
-    motion.CreateScalesAttr([Gf.Vec3h(1)] * 6)
+    motion.CreateScalesAttr([Gf.Vec3h(-1 if joint == mirrored else 1, 1, 1) for joint in range(6)])
     motion.CreateTranslationsAttr([Gf.Vec3f(*map(float, m[:3, 3])) for m in local])
     motion.CreateRotationsAttr()
     for frame in range(frames + 1):

@@ -104,7 +104,7 @@ def bake_rig(
     codes = _with_samples(hair, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     carried = CarriedHair(model, moved, hair.source.character, clip)
-    turns = _turns(hair, carried, clip, codes, strength, progress)
+    turns = hair.source.authored_turns(moved, _turns(hair, carried, clip, codes, strength, progress))
     notes = [
         *_renamed(trained, model.chains),
         *_resized(source.path, size),
@@ -209,7 +209,7 @@ def _rotation_samples(hair: RiggedHair) -> list[float]:
 
 
 def _turns(hair, carried, clip, codes, strength, progress) -> np.ndarray:
-    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes, those of the shot's rig."""
+    """Turns of the hair joints (T, N, 4) wxyz in their own bind axes, those of the shot's rig as read."""
     chains = carried.model.chains
     turns = np.empty((len(codes), len(chains), 4))
     for row, code in enumerate(codes):

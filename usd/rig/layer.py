@@ -26,7 +26,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
         shot: file that the layer goes over.
         out: file to write.
         codes: ascending time codes of the rotations, (T,).
-        turns: of the hair joints in their own bind axes, (T, N, 4) wxyz.
+        turns: of the hair joints in their own bind axes as authored, (T, N, 4) wxyz.
 
     Returns:
         path of the new SkelAnimation.

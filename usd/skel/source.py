@@ -57,6 +57,14 @@ class StageRig:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
 
+    def authored_turns(self, joints: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, out of those in the core's: a turn
+        about axes that `joint_trim` mirrors along x is (w, x, -y, -z) in the file's.
+        """
+        result = np.array(turns)
+        result[..., self._trim[joints, 0, 0] < 0, 2:] *= -1
+        return result
+
     def loop_notes(self, codes=(), replaced=()) -> list[str]:
         """What is wrong with the motion as a loop, whose last sample must show the pose of its first, and with time codes at
         which it is to be baked.

@@ -62,6 +62,21 @@ def test_joint_orients_cancel(tmp_path):
     assert np.abs(since[0] - since[1]).max() < 1e-5 and np.abs(since[0] - np.eye(3)).max() > 0.1
 
 
+@pytest.mark.parametrize("first", [0, 1], ids=["all", "head and hair"])
+def test_mirrored_joints_move_alike(tmp_path, first):
+    """Axes of negative scale, which some rigs have from the root or from the head on, are a matter of the file alone."""
+    orient = from_vector(np.array([1.2, -0.4, 2.0]))
+    plain = small_shot(tmp_path / "plain.usda", orient=orient)
+    model, places = model_for(read_rigged_hair(plain)), []
+    for shot in (plain, small_shot(tmp_path / "mirrored.usda", orient=orient, mirrored=first)):
+        bake_rig(shot, tmp_path / f"out_{shot.name}", model)
+        both = (read_rigged_hair(path).source.source for path in (shot, tmp_path / f"out_{shot.name}"))
+        places.append([source.posed([1, 7, 13, 20])[:, :, :3, 3] for source in both])
+    (still, moved), (mirrored_still, mirrored_moved) = places
+    assert np.abs(moved - mirrored_moved).max() < 1e-6 and np.abs(moved - still).max() > 0.01
+    assert np.abs(still - mirrored_still)[:, :2].max() < 1e-6
+
+
 @pytest.mark.parametrize(
     ("size", "told"), [(1.015, None), (1.03, "1.03 times as large"), (0.75, "0.75 times as large")]
 )
