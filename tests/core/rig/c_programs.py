@@ -17,7 +17,8 @@ def compiled(folder, source, options=("-O2",), compiler=("gcc", "c", "c99")):
         pytest.skip(f"no {compiler[0]} to compile the header with")
     (folder / "main.src").write_text(source)
     name, lang, std = compiler
-    command = [name, "-x", lang, f"-std={std}", *FLAGS, *options, "main.src", "-lm", "-o", "main"]
+    own = ["-Wcomma"] if "clang" in name else []
+    command = [name, "-x", lang, f"-std={std}", *FLAGS, *own, *options, "main.src", "-lm", "-o", "main"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return folder / "main"
