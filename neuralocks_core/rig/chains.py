@@ -138,16 +138,21 @@ class HairChains:
         places: dict[str, list[int]] = {}
         for index in np.flatnonzero(below):
             places.setdefault(leaf(names[index]), []).append(int(index))
-        double = next((name for name in self.names if len(places.get(name, ())) > 1), None)
-        if double:
-            raise NeuralocksError(f"model: several joints below the head are named '{double}'; rename all but one")
         missing = [name for name in self.names if name not in places]
         if missing:
             raise NeuralocksError(
                 f"model: it moves {len(self)} joints in {len(self.roots)} chains, but below this head there is no joint "
                 f"'{missing[0]}' ({len(missing)} of them missing); train a model for this rig (neuralocks rig train)"
             )
-        return np.array([places[name][0] for name in self.names], int)
+        joints: list[int] = []
+        for name, parent in zip(self.names, self.parents):
+            found = places[name]
+            if len(found) > 1 and parent >= 0:  # the tip of a lock and that of a tongue, say
+                found = [joint for joint in found if names[joint] == f"{names[joints[parent]]}/{name}"]
+            if len(found) != 1:
+                raise NeuralocksError(f"model: several joints below the head are named '{name}'; rename all but one")
+            joints += found
+        return np.array(joints, int)
 
     def check_same(self, other: "HairChains") -> float:
         """Refuse a model that was trained for chains of another shape: bones off by more than 2 %, all sizes alike, or a

@@ -23,8 +23,8 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
         meshes: the skinned meshes, which tell where free ends lie.
 
     Raises:
-        NeuralocksError: no joint moves, a bone has no length, two joints share a name, or one is mirrored or unevenly
-            scaled.
+        NeuralocksError: no joint moves, a bone has no length, two hair joints share a name, a chain's first joint has the
+            name of another one below the head, or one is mirrored or unevenly scaled.
     """
     skeleton = character.skeleton
     places = character.canonical(skeleton.bind[:, :3, 3])
@@ -40,6 +40,13 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     double = next((n for n in names if names.count(n) > 1), None)
     if double:
         raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give them names of their own")
+    # A model tells joints of one name apart by what they hang from, but for the first of a chain.
+    below = [leaf(skeleton.names[j]) for j in np.flatnonzero(skeleton.below(character.head))]
+    double = next((name for name, j in zip(names, joints) if j in tops and below.count(name) > 1), None)
+    if double:
+        raise NeuralocksError(
+            f"skeleton: {below.count(double)} joints below the head are named '{double}', as a hair chain; rename all but that one"
+        )
     parents = np.array([rows.get(int(skeleton.parents[j]), -1) if j not in tops else -1 for j in joints], int)
     chain = np.zeros(len(joints), int)
     for row, parent in enumerate(parents):

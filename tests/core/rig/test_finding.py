@@ -167,6 +167,28 @@ def test_a_model_for_other_chains_is_refused():
     assert HairChains.from_json(chains.to_json()).names == chains.names
 
 
+def test_joints_called_alike_are_told_apart_by_what_they_hang_from():
+    """A jaw's tip is not a lock's; where nothing tells, none is taken."""
+    lock = [("hair", "head", (0, 1.6, -0.1)), ("tip", "hair", (0, 1.5, -0.1)), ("end", "tip", (0, 1.4, -0.1))]
+    chains = find_chains(character(lock))
+    names = ["neck/head", "neck/head/jaw", "neck/head/jaw/tip", "neck/head/hair", "neck/head/hair/tip"]
+    assert chains.names == ("hair", "tip")
+    assert chains.match(names, np.ones(5, bool)).tolist() == [3, 4]
+    for other in ("neck/head/hat/hair", "tip"):
+        alike = [*(name.rpartition("/")[2] if other == "tip" else name for name in names), other]
+        with pytest.raises(NeuralocksError, match=f"several joints below the head are named '{other[-4:].strip('/')}'"):
+            chains.match(alike, np.ones(6, bool))
+
+
+def test_a_rig_with_another_joint_called_as_a_chain_is_refused_before_it_is_trained():
+    """No bake could tell which one the model moves."""
+    rig = character([*tail("lock", 2), ("jaw", "head", (0, 1.5, 0.1)), ("tip", "jaw", (0, 1.5, 0.2))]).skeleton
+    assert find_chains(Character(rig)).names == ("lock_1",)
+    who = Character(replace(rig, names=[name.replace("/tip", "/lock_1") for name in rig.names]))
+    with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', as a hair chain; rename"):
+        find_chains(who)
+
+
 @pytest.mark.parametrize(
     ("names", "there", "called"),
     [
