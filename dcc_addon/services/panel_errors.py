@@ -13,7 +13,6 @@ WORDS = (
     ("name it with --head JOINT", "choose it as Head bone"),
     ("name the joint that carries the hair with --head JOINT", "choose the bone that carries the hair as Head bone"),
     ("name that with --head ", "choose as Head bone "),
-    ("use another pattern or another --head", "use another pattern or another Head bone"),
     ("with --chains", "under Chains"),
     ("--chains", "Chains"),
     ("; neuralocks inspect lists all", "; choose a bone of the rig"),

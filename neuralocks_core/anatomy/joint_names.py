@@ -64,6 +64,15 @@ def leaf(path: str) -> str:
     return path.rsplit("/", 1)[-1]
 
 
+def carrier(head: str, *paths: str) -> str:
+    """The own name of the joint from which the head and some other joints hang, all given by their paths; where they share
+    none, that of the root above the first of the others.
+    """
+    own = [path.strip("/").split("/") for path in paths]
+    shared = commonprefix([head.strip("/").split("/"), *own])
+    return shared[-1] if shared else own[0][0]
+
+
 def without_namespace(name: str) -> str:
     """A joint's own name without what stands before a colon."""
     return name.rsplit(":", 1)[-1]

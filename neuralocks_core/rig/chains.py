@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.anatomy.joint_names import leaf, prefixed_otherwise
+from neuralocks_core.anatomy.joint_names import carrier, leaf, prefixed_otherwise
 from neuralocks_core.errors import NeuralocksError
 
 SAME_AXES = 1e-5
@@ -139,6 +139,13 @@ class HairChains:
         for index in np.flatnonzero(below):
             places.setdefault(leaf(names[index]), []).append(int(index))
         missing = [name for name in self.names if name not in places]
+        hung = [path for path in names if leaf(path) in missing]
+        if missing and {leaf(path) for path in hung}.issuperset(missing):
+            above = carrier(names[int(np.argmax(below))], *hung)
+            raise NeuralocksError(
+                f"model: joint '{leaf(hung[0])}' does not hang below this head, but from '{above}': name that with --head {above}, "
+                "as in training, or train a model for this rig (neuralocks rig train)"
+            )
         if missing:
             raise NeuralocksError(
                 f"model: it moves {len(self)} joints in {len(self.roots)} chains, but below this head there is no joint "

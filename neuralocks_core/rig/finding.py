@@ -5,7 +5,7 @@ import fnmatch
 
 import numpy as np
 
-from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
@@ -74,9 +74,10 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
     below = character.skeleton.below(character.head)
     inside = [joint for joint in hits if below[joint] and joint != character.head]
     if not inside:
+        above, head = carrier(names[character.head], *(names[joint] for joint in hits)), leaf(names[character.head])
         raise NeuralocksError(
-            f"--chains: joint '{leaf(names[hits[0]])}' does not hang below the head joint "
-            f"'{leaf(names[character.head])}'; use another pattern or another --head"
+            f"skeleton: joint '{leaf(names[hits[0]])}' does not hang below the head joint '{head}', but from '{above}': name that "
+            f"with --head {above}, as in training, or name other joints"
         )
     hits = inside  # what a tail or a coat calls its joints is its own matter
     inner = np.zeros(len(names), bool)

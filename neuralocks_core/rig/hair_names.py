@@ -5,10 +5,11 @@ import re
 
 from neuralocks_core.anatomy.joint_names import leaf, without_namespace, words
 
-_HAIR = (
-    "hair|pony|braid|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|pigtail|twintail|ahoge|kami|mane|plait|dread"
-    "|bun(?!ny)|forelock|sidelock|sideburn|wig(?!gle)|topknot|cowlick|ringlet|mohawk|quiff|ponite"
+_HAIR_ALONE = (
+    "hair|pony|braid|pigtail|twintail|ahoge|mane|plait|dreadlock|forelock|sidelock|sideburn|topknot|cowlick|ringlet|mohawk|quiff"
+    "|ponite"
 )
+_HAIR = f"{_HAIR_ALONE}|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|kami|dread|bun(?!ny)|wig(?!gle)"
 _FACE = (
     "(?:left|right)?eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead"
     "|pupil|iris|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
@@ -45,6 +46,12 @@ def says_hair(name: str) -> bool:
         return True
     # Below a head these are hair, unless another word says what is meant: `brow_tail`, まつ毛.
     return not says_face(name) and (_begins(name, "tail|tuft") or "毛" in whole)
+
+
+def says_hair_alone(name: str) -> bool:
+    """Whether a joint's path or name says hair wherever the joint hangs: below a chest a fringe or a tail is a garment's."""
+    whole = _whole(name)
+    return not _WORN_IN_HAIR.search(whole) and bool(_begins(name, _HAIR_ALONE) or _HAIR_ANYWHERE.search(whole))
 
 
 def says_face(name: str) -> bool:

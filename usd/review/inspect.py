@@ -21,6 +21,7 @@ from ..border.placement import Placement
 from ..border.stage_files import OTHERS, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
+from ..rig.outside import outside_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
@@ -152,7 +153,7 @@ def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
-    spoils += weight_notes(rig) + facing_notes(rig) + mirrored_notes(rig, chains)
+    spoils += weight_notes(rig) + facing_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
     ]

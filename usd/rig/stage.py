@@ -25,6 +25,7 @@ from ..shot.notes import another_head, unfound, unlikely_head
 from ..skel.source import StageRig, find_skeletons, read_rig
 from ..skel.surface import find_skins, rest_primvar
 from .facing import facing_notes
+from .outside import outside_notes
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
@@ -135,7 +136,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
         pose_joints: semantic joints that the network reads beside the head.
     """
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
-    return [*source.notes, *weight_notes(source), *facing_notes(source), *found]
+    return [*source.notes, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

@@ -10,7 +10,7 @@ from neuralocks_core.anatomy.joint_names import prefixed_otherwise
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import HairChains, find_chains
-from neuralocks_core.rig.hair_names import says_face, says_hair
+from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character, skin, tail
 
@@ -52,6 +52,13 @@ def test_what_names_of_many_conventions_say():
     assert [name for name in hair.split() if not says_hair(name)] == []
     assert [name for name in other.split() if says_hair(name)] == []
     assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
+
+
+def test_what_says_hair_wherever_it_hangs():
+    """Coats have tails, fringes and strands; fingers curl, and rigs have locators."""
+    assert all(map(says_hair_alone, "hair0_0 J_Sec_Hair1_01 PonyTail_L 左髪_1 braid_02 Mane_01".split()))
+    other = "coat_tail_01 jacket_fringe_L strand_2 index_curl_L lock_01 bundle_3 HairPin_L scarf_01"
+    assert [name for name in other.split() if says_hair_alone(name)] == []
 
 
 @pytest.mark.parametrize("name", ["hair_group", "head_twist"])
@@ -187,6 +194,19 @@ def test_a_rig_with_another_joint_called_as_a_chain_is_refused_before_it_is_trai
     who = Character(replace(rig, names=[name.replace("/tip", "/lock_1") for name in rig.names]))
     with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', as a hair chain; rename"):
         find_chains(who)
+
+
+def test_hair_below_another_joint_than_the_head_names_it():
+    """A model that was trained with `--head` needs it again."""
+    names = ["chest", "chest/neck", "chest/neck/head", "chest/neck/hairs", "chest/neck/hairs/hair_1"]
+    names.append(f"{names[-1]}/hair_2")
+    chains, below = find_chains(character(tail("hair", 3))), np.arange(6) == 2
+    with pytest.raises(
+        NeuralocksError, match="'hair_1' .*, but from 'neck': name that with --head neck, as in training"
+    ):
+        chains.match(names, below)
+    with pytest.raises(NeuralocksError, match="there is no joint 'hair_1'"):
+        chains.match(names[:5], below[:5])
 
 
 @pytest.mark.parametrize(

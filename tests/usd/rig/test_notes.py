@@ -204,3 +204,47 @@ def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp
     assert re.search(said, "\n".join(inspect(path)["stops"]))
     path = edited(lambda stage: hide(stage, 4))
     assert bake_rig(path, tmp_path / "out.usda", model).samples and not inspect(path)["stops"]
+
+
+def _named(*joints):
+    """A change that gives the six joints other paths; those with skin are the third to the fifth."""
+
+    def change(stage):
+        for path in ("/Who/Rig", "/Who/Motion"):
+            stage.GetPrimAtPath(path).GetAttribute("joints").Set(joints)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("above", "lock", "told"),
+    [
+        (
+            "hips/neck",
+            "pony",
+            "'pony' hangs from 'neck' and is not moved; to move all, train and bake with --head neck",
+        ),
+        ("hips", "hair_back", "'hair_back' hangs from 'hips' and is not moved; hang them from the head in the rig"),
+        ("hips", "tail_0", None),
+        ("hips/neck", "scarf_fringe", None),
+    ],
+)
+def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, told):
+    """Hair on the head makes a bake go well, of which the rest is no part."""
+    head = "hips/neck/head"
+    shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{above}/{lock}", f"{head}/hair_0/end"))
+    hair = read_rigged_hair(shot)
+    baked = bake_rig(shot, tmp_path / "out.usda", model_for(hair)).notes
+    for notes in (baked, rigged_notes(hair.source), inspect(shot)["spoils"]):
+        assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
+
+
+@pytest.mark.parametrize("locks", [["pony"], ["hair_0", "pony"]])
+def test_a_model_of_hair_on_the_neck_needs_the_head_that_it_was_trained_with(edited, tmp_path, locks):
+    shot = edited(_named("neck", "neck/head", "neck/head/hair_0", "neck/head/hair_0/end", "neck/pony", "neck/pony/end"))
+    hair = read_rigged_hair(shot, head="neck", chains=locks)
+    assert len(hair.rig.chains) == len(locks)
+    with pytest.raises(
+        NeuralocksError, match="'pony' does not hang .*, but from 'neck': name that with --head neck, as"
+    ):
+        bake_rig(shot, tmp_path / "out.usda", model_for(hair))
