@@ -90,10 +90,11 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
         check_own(armature)
         if not actions.has_keys(armature):
             raise NeuralocksError(f"{armature.name_full}: it has no baked hair keys; bake them first")
+        actions.check_lasting(armature)
         show_rest(armature)  # what Live keeps was turned by the keys; it puts aside anew how the bones are without them
-        actions.remove(armature)
+        library = actions.remove(armature)
         refresh(context.scene)
-        return f"{armature.name_full}: baked hair keys removed"
+        return f"{armature.name_full}: baked hair keys {f'of {library} muted here' if library else 'removed'}"
 
 
 class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):

@@ -14,8 +14,11 @@ from .lookup import identified, identity
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
-HAIR = TRACK, BEFORE
-"""Both."""
+OVERRIDE = " (Override)"
+"""How the names of both end on an overridden character, whose own file may have tracks of them: Blender knows them by name,
+and would give these what the new ones have."""
+HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
+"""All of them."""
 KEPT = "neuralocks_rotations"
 """Property of the action with how the hair bones were turned before."""
 STILL = 1e-6
@@ -38,7 +41,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
     # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
-    modes = rotations.free_modes(armature, bones, rotations.KEYED)
+    modes = rotations.free_modes(armature, bones, rotations.KEYED, without=HAIR)
     before = rotations.kept(armature, bones)
     for name in bones:
         armature.pose.bones[name].rotation_mode = modes[name]
@@ -46,10 +49,12 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
         frames = np.concatenate([np.floor(frames[:1]), frames])
         turns, own = (np.concatenate([each[:1], each]) for each in (turns, own))
     needed = 1 if np.ptp(own, axis=0).max(initial=0.0) < STILL else len(frames)
-    _strip(data, BEFORE, _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed]))
+    ending = OVERRIDE if armature.override_library else ""
+    below = _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed])
+    _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
     action[KEPT] = before
-    _strip(data, TRACK, action)
+    _strip(data, TRACK + ending, action)
     return action
 
 
@@ -57,7 +62,8 @@ def check_heard(armature) -> None:
     """Refuse where baked keys would not be heard.
 
     Raises:
-        NeuralocksError: a strip is being tweaked, strips are switched off, or those of another track alone play.
+        NeuralocksError: a strip is being tweaked, strips are switched off, or those of another track alone play, or will when
+            the file is opened again.
     """
     name, data = armature.name_full, armature.animation_data
     if data is None:
@@ -74,6 +80,21 @@ def check_heard(armature) -> None:
         if track.is_solo and track.name not in HAIR:
             raise NeuralocksError(
                 f"{name}: NLA track '{track.name}' is solo, so that no other one plays; take its star off"
+            )
+    check_lasting(armature)
+
+
+def check_lasting(armature) -> None:
+    """Refuse where an earlier bake cannot be taken off an overridden character for good.
+
+    Raises:
+        NeuralocksError: a track of it from the character's own file is solo.
+    """
+    for track in _of_library(armature):
+        if track.is_solo:
+            raise NeuralocksError(
+                f"{armature.name_full}: NLA track '{track.name}' of {_library(armature)} is solo, and Blender makes it so again "
+                "when this file is opened; take its star off in that file"
             )
 
 
@@ -116,17 +137,23 @@ def as_before(armature) -> dict[str, dict[str, list]]:
     return {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
 
 
-def remove(armature) -> bool:
-    """Take an earlier bake off and turn the bones as they were before it; whether there was one."""
-    tracks, actions = _tracks(armature), _actions(armature)
+def remove(armature) -> str:
+    """Take an earlier bake off and turn the bones as they were before it. Tracks from the file of an overridden character,
+    which Blender would bring back when this one is opened, are muted; gives that file's name, empty where there are none.
+    """
+    tracks, actions, lasting = _tracks(armature), _actions(armature), _of_library(armature)
+    muted = _library(armature) if any(track in lasting for track in tracks) else ""
     for track in tracks:
         _unstar(track)
-        armature.animation_data.nla_tracks.remove(track)
+        if track in lasting:
+            track.mute = True
+        else:
+            armature.animation_data.nla_tracks.remove(track)
     for action in actions:
         rotations.give_back(armature, action.get(KEPT, ""))
         if not action.users:
             bpy.data.actions.remove(action)
-    return bool(tracks)
+    return muted
 
 
 @contextmanager
@@ -144,7 +171,7 @@ def without(armature):
         yield
     finally:
         armature = identified(number)  # found anew: an undo may have come between
-        for track in _tracks(armature) if armature is not None else ():
+        for track in _named(armature) if armature is not None else ():
             track.mute, solo = tracks.get(track.name, (track.mute, False))
             if solo:
                 track.is_solo = True
@@ -159,8 +186,28 @@ def _unstar(track) -> None:
 
 
 def _tracks(armature) -> list:
+    """Tracks of an earlier bake; without those from the file of an overridden character where all of these are muted, for
+    that is how they are taken off.
+    """
+    lasting = _of_library(armature)
+    off = all(track.mute and not track.is_solo for track in lasting)
+    return [track for track in _named(armature) if not (off and track in lasting)]
+
+
+def _named(armature) -> list:
+    """Tracks of the hair's names."""
     data = armature.animation_data
     return [track for track in data.nla_tracks if track.name in HAIR] if data else []
+
+
+def _of_library(armature) -> list:
+    """Those of them that an overridden character has from its own file."""
+    return [track for track in _named(armature) if track.is_override_data] if armature.override_library else []
+
+
+def _library(armature) -> str:
+    """The name of the file that an overridden armature is from."""
+    return armature.override_library.reference.library.name
 
 
 def _actions(armature) -> list:

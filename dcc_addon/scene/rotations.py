@@ -89,9 +89,11 @@ def _bone(armature, name: str, place: list, found: dict):
     return there[0] if len(there) == 1 else None
 
 
-def free_modes(armature, bones, modes=tuple(CHANNELS)) -> dict[str, str]:
-    """For each bone the first rotation mode whose values no animation writes; the last one where all are animated."""
-    written = animated(armature.animation_data)
+def free_modes(armature, bones, modes=tuple(CHANNELS), without=()) -> dict[str, str]:
+    """For each bone the first rotation mode whose values no animation writes, but for NLA tracks of the names `without`; the
+    last one where all are animated.
+    """
+    written = animated(armature.animation_data, without)
     found = {}
     for name in bones:
         start = f'pose.bones["{bpy.utils.escape_identifier(name)}"].'

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A shot with a library override of a character whose own file has a bake already: what is done to it there lasts."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, messages, refused
+
+TRACKS = ["Neuralocks Before Hair", "Neuralocks Hair"]
+FRAMES = 1001, 1010, 1020
+
+
+def keyed_in_a_shot(folder: Path) -> None:
+    """Hair keys baked in a shot with animation of its own play after it is opened again, those of the library are silent, and
+    so they stay when the shot's are removed.
+    """
+    rig = _keyed_library(folder)
+    assert [track.name for track in rig.animation_data.nla_tracks] == TRACKS
+    rig = _overridden(folder)
+    of_library = _turns(rig)
+    rig.animation_data.action = None
+    scenes.dance(rig, (1001, 1024))
+    own = rig.neuralocks_character
+    own.rig_live = True
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    live = _turns(rig)
+    assert apart(live, of_library) > 0.1 and not messages(), messages()
+    for _ in range(2):  # a second bake takes the place of the first
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        assert apart(_turns(rig), live) < SAME
+        rig = _opened_again(folder)
+        assert apart(_turns(rig), live) < SAME
+        tracks = rig.animation_data.nla_tracks
+        assert [track.mute for track in tracks] == [True, True, False, False], [*tracks]
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_live = True
+    assert apart(_turns(rig), live) < SAME and not messages(), messages()
+    rig.neuralocks_character.rig_live = False
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    still = _turns(rig)
+    assert apart(still, live) > 0.01
+    rig = _opened_again(folder)
+    assert [(track.name, track.mute) for track in rig.animation_data.nla_tracks] == [(name, True) for name in TRACKS]
+    assert apart(_turns(rig), still) < 1e-6 and rig.pose.bones["hair.01"].rotation_mode == "XYZ"
+    refused(bpy.ops.neuralocks.remove_keys, "no baked hair keys")
+
+
+def keys_of_a_library(folder: Path) -> None:
+    """Hair keys from the library are muted where they cannot be removed, until the character is local; a star there, which
+    Blender brings back, is refused.
+    """
+    _keyed_library(folder)
+    rig = _overridden(folder)
+    keyed = _turns(rig)
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    rig = _opened_again(folder)
+    tracks = rig.animation_data.nla_tracks
+    assert [(track.name, track.mute) for track in tracks] == [(name, True) for name in TRACKS]
+    assert apart(_turns(rig), keyed) > 0.01
+    refused(bpy.ops.neuralocks.remove_keys, "no baked hair keys")
+    tracks[0].mute = False
+    rig.make_local()
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"} and not rig.animation_data.nla_tracks
+
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "library.blend"))
+    bpy.data.objects["Rig"].animation_data.nla_tracks[TRACKS[1]].is_solo = True
+    bpy.ops.wm.save_mainfile()
+    rig = _overridden(folder)
+    for operator in (bpy.ops.neuralocks.bake_keys, bpy.ops.neuralocks.remove_keys):
+        refused(operator, "Neuralocks Hair", "library.blend", "star")
+    assert not any(track.mute for track in rig.animation_data.nla_tracks)
+
+
+def _keyed_library(folder: Path):
+    """A file with a character whose hair keys are baked at frames 1 to 24."""
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    scenes.collect("Character")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    return rig
+
+
+def _overridden(folder: Path):
+    """The armature of that character in a saved shot of frames 1001 to 1024."""
+    scenes.empty()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    scene, character = bpy.context.scene, bpy.data.collections["Character"]
+    scene.collection.children.link(character)
+    character.override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    scene.frame_start, scene.frame_end = 1001, 1024
+    scene.neuralocks.armature = _own("ARMATURE")
+    return _own("ARMATURE")
+
+
+def _opened_again(folder: Path):
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    return _own("ARMATURE")
+
+
+def _own(kind: str):
+    """The object of this kind that is not linked."""
+    return next(thing for thing in bpy.data.objects if thing.type == kind and thing.library is None)
+
+
+def _turns(rig) -> np.ndarray:
+    """Matrices (T, 2, 4, 4) of the hair bones at FRAMES, as they are shown."""
+    found = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        found.append([np.array(rig.pose.bones[bone].matrix) for bone in ("hair.01", "hair.02")])
+    return np.array(found)
