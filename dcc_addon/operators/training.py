@@ -11,18 +11,19 @@ from bpy.props import EnumProperty
 from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
+from ..models import SETTING
 from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
+from ..scene.paths import library_of
 from ..scene.redraw import redraw
+from ..scene.save_as import named_here, set_path
+from ..services.names import file_label
 from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
 from ..services.training_job import TrainingJob, default_python
 from ..session import session
 from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
-
-LONGEST = 100
-"""Bytes of an object's name that a file is named with; names may be as long as no file system takes them."""
 
 _running: list["_Training"] = []
 """One at most. Not of the session, which ends with its file: a training goes on while other files are opened."""
@@ -170,10 +171,10 @@ def finish() -> str | None:
     elif target is None:
         message = f"{name}: trained, but it is not in this file any more; choose its model by hand: {running.out}"
     else:
-        if wanted.kind == "strands":
-            target.neuralocks_hair.model = running.out
-        else:
-            target.neuralocks_character.rig_model = running.out
+        setting = SETTING[wanted.kind]
+        set_path(target, setting, named_here(running.out))
+        if library_of(target, setting) is not None:  # of an override the same words mean beside its own file
+            set_path(target, setting, running.out)
         _remember()
         message, well = f"{target.name_full}: trained", True
     session.trained = message, well
@@ -207,8 +208,7 @@ def watch() -> float | None:
 
 def _out(name: str) -> str:
     """A new model file beside the .blend, or in the user's own folder while that is not saved."""
-    label = "".join(c if c.isalnum() else "_" for c in name)
-    label = label.encode()[:LONGEST].decode(errors="ignore")
+    label = file_label(name)
     folder = (
         Path(bpy.data.filepath).parent
         if bpy.data.filepath

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths when a file is saved in another folder: Blender remakes its own that begin with //, but not those of add-ons."""
+"""Paths as a file names them: with // beside it. When it is saved in another folder Blender remakes its own of these, but not
+those of add-ons.
+"""
 
 import os
 
@@ -29,6 +31,11 @@ class Remade:
             return
         for name, setting, path in self._kept:
             set_path(bpy.data.objects[name, None], setting, path)
+
+
+def named_here(path: str) -> str:
+    """An absolute path as it is named in this file, so that both can be moved together; itself while this is not saved."""
+    return relative(path, os.path.dirname(bpy.data.filepath)) if bpy.data.filepath else path
 
 
 def relative(path: str, folder: str) -> str:

@@ -20,6 +20,16 @@ def joint_identifier(name: str) -> str:
     return kept if kept[0].isidentifier() else f"_{kept}"
 
 
+LONGEST = 100
+"""Bytes of an object's name that a file is named with; names may be as long as no file system takes them."""
+
+
+def file_label(name: str) -> str:
+    """`name` as a part of a file's name: with letters of all scripts, for a plain one would be the same for many."""
+    label = "".join(c if c.isalnum() else "_" for c in name)
+    return label.encode()[:LONGEST].decode(errors="ignore")
+
+
 def unique(names: list[str], made=identifier) -> list[str]:
     """Identifiers of `names`, each different from all others (Blender reads only the last part of a joint path)."""
     taken: set[str] = set()

@@ -6,6 +6,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from unittest import SkipTest
 
 import bpy
@@ -15,16 +16,19 @@ from tests.blender.checks import MODEL, messages, refused
 
 
 def training(folder: Path) -> None:
-    """Train: in another process, its model goes to the hair that it was trained for; a second one at once is refused,
-    and no exported character stays behind.
+    """Train: in another process, its model goes to the hair that it was trained for, and is named beside this file; a second
+    one at once is refused, and no exported character stays behind.
     """
+    from dcc_addon.models import model_path
+
     strands = _in_training(folder)
     exported = Path(tempfile.tempdir)
     assert len(list(exported.iterdir())) == 1
     refused(bpy.ops.neuralocks.train, "one is running already")
     assert _ended() == ("Hair: trained", True)
     assert not list(exported.iterdir())
-    assert Path(strands.neuralocks_hair.model).parent == folder
+    assert strands.neuralocks_hair.model == "//Hair_1.neuralocks", "it does not move with the file"
+    assert Path(model_path(strands)) == folder / "Hair_1.neuralocks"
     strands.neuralocks_hair.live = True
     bpy.context.scene.frame_set(9)
     assert "Hair" not in messages(), messages()
@@ -39,7 +43,7 @@ def training_meanwhile(folder: Path) -> None:
     strands = _in_training(folder)
     strands.name = "H" * 255
     assert _ended() == (f"{strands.name}: trained", True)
-    assert strands.neuralocks_hair.model == str(folder / "Hair_1.neuralocks")
+    assert strands.neuralocks_hair.model == "//Hair_1.neuralocks"
     assert bpy.ops.neuralocks.train() == {"FINISHED"}
     bpy.data.objects.remove(strands)
     said, well = _ended()
@@ -56,7 +60,31 @@ def training_meanwhile(folder: Path) -> None:
     _in_training(folder)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "train.blend"))
     assert _ended() == ("Hair: trained", True)
-    assert bpy.data.objects["Hair"].neuralocks_hair.model == str(folder / "Hair_3.neuralocks")
+    assert bpy.data.objects["Hair"].neuralocks_hair.model == "//Hair_3.neuralocks"
+
+
+def trained_in_a_shot(folder: Path) -> None:
+    """The model of overridden hair is found, also where its own file names one by the same words beside itself."""
+    from dcc_addon.models import model_path
+    from dcc_addon.operators import training as operator
+
+    library, out = folder / "library", folder / "Hair_1.neuralocks"
+    library.mkdir()
+    for place in (library, folder):
+        shutil.copy(MODEL, place / out.name)
+    scenes.hair(scenes.armature(), 20).neuralocks_hair.model = f"//{out.name}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(library / "library.blend"))
+    scenes.empty()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    with bpy.data.libraries.load(str(library / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Hair"]
+    strands = bpy.data.objects["Hair"].override_create()
+    assert Path(model_path(strands)).samefile(library / out.name)
+    ended = SimpleNamespace(running=False, succeeded=True, out=str(out), cancel=lambda: None)
+    exported = SimpleNamespace(cleanup=lambda: None)
+    operator._running.append(operator._Training(ended, operator._Target.of(strands, "strands"), exported))
+    assert _ended() == (f"{strands.name_full}: trained", True)
+    assert Path(model_path(strands)).samefile(out)
 
 
 def remedy_followed(folder: Path) -> None:
@@ -176,7 +204,7 @@ def trained_for_real(folder: Path) -> None:
     print(sorted(said))
     assert session.trained == ("Hair: trained", True)
     assert len(said) > 3 and shares == sorted(shares)
-    assert Path(strands.neuralocks_hair.model).parent == folder and Path(strands.neuralocks_hair.model).exists()
+    assert Path(bpy.path.abspath(strands.neuralocks_hair.model)).samefile(folder / "Hair_1.neuralocks")
     strands.neuralocks_hair.live = True
     scene.frame_set(9)
     assert "Hair" not in messages(), messages()
