@@ -11,7 +11,7 @@ from neuralocks_core.motion import LOOP_GAP
 
 from .operators.training import job, known_problem
 from .scene.actions import has_keys
-from .scene.attach import MODIFIER
+from .scene.attach import has_cache
 from .scene.muting import off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
@@ -211,7 +211,7 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("neuralocks.bake_attach", icon="LINKED")
         taking = row.row(align=True)
-        taking.enabled = settings.hair is not None and MODIFIER in settings.hair.modifiers
+        taking.enabled = settings.hair is not None and has_cache(settings.hair)
         taking.operator("neuralocks.detach", text="", icon="X")
 
 

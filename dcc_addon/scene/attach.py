@@ -7,7 +7,8 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from .muting import mute_deformers, unmute_deformers
+from .muting import mute_deformers, off_meanwhile, unmute_deformers
+from .save_as import named_here
 
 MODIFIER = "Neuralocks Cache"
 REPLACED = "replaced"
@@ -36,12 +37,21 @@ def check_possible(hair) -> None:
         )
 
 
+def has_cache(thing) -> bool:
+    """Whether a cache is on an object; one from the file of an overridden object is taken off by being switched off."""
+    modifier = thing.modifiers.get(MODIFIER)
+    if modifier is None:
+        return False
+    shown = modifier.show_viewport or modifier.show_render or MODIFIER in off_meanwhile(thing)
+    return shown or _original(thing, modifier) is None
+
+
 def players(path: str) -> list:
     """Hair objects that play the USD file `path`."""
     return [
         thing
         for thing in bpy.data.objects
-        if (modifier := thing.modifiers.get(MODIFIER)) and modifier.cache_file and _is(modifier.cache_file, path)
+        if has_cache(thing) and (cache := thing.modifiers[MODIFIER].cache_file) and _is(cache, path)
     ]
 
 
@@ -52,10 +62,11 @@ def attach(hair, path: str, prim: str, scene) -> None:
     cache = _cache_file(path)
     cache.scale = 1.0
     _follow_time(cache, scene)
-    modifier = hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
+    modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
+    modifier.show_viewport = modifier.show_render = True
     modifier.cache_file = cache
     modifier.object_path = prim
-    if len(hair.modifiers) > 1:
+    if len(hair.modifiers) > 1 and _original(hair, modifier) is None:
         index = hair.modifiers.find(MODIFIER)
         if hasattr(hair.modifiers, "move"):
             hair.modifiers.move(index, 0)
@@ -63,15 +74,26 @@ def attach(hair, path: str, prim: str, scene) -> None:
 
 def detach(hair) -> bool:
     """Take the cache off, and let the hair follow its surface as before; whether there was one."""
-    modifier = hair.modifiers.get(MODIFIER)
-    if modifier is None:
+    if not has_cache(hair):
         return False
-    cache = modifier.cache_file
-    hair.modifiers.remove(modifier)
+    modifier = hair.modifiers[MODIFIER]
+    cache, original = modifier.cache_file, _original(hair, modifier)
+    if original is None:
+        hair.modifiers.remove(modifier)
+    else:  # Blender would bring it back when this file is opened again
+        modifier.show_viewport = modifier.show_render = False
+        modifier.cache_file, modifier.object_path = original.cache_file, original.object_path
     if cache is not None and not cache.users:
         bpy.data.batch_remove([cache])  # cache files have no remove of their own
     unmute_deformers(hair, REPLACED)
     return True
+
+
+def _original(thing, modifier):
+    """The modifier that one of an overridden object comes from; None of any other."""
+    if thing.override_library is None or not modifier.is_override_data:
+        return None
+    return thing.override_library.reference.modifiers.get(modifier.name)
 
 
 def _follow_time(cache, scene) -> None:
@@ -93,8 +115,7 @@ def _cache_file(path: str):
             return cache
     bpy.ops.cachefile.open(filepath=path)
     cache = next(c for c in bpy.data.cache_files if c.name not in known)
-    if bpy.data.filepath and os.path.splitdrive(path)[0] == os.path.splitdrive(bpy.data.filepath)[0]:
-        cache.filepath = bpy.path.relpath(path)
+    cache.filepath = named_here(path)
     return cache
 
 

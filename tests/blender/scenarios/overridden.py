@@ -6,8 +6,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from dcc_addon.scene.attach import has_cache
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, messages, refused
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
 
 TRACKS = ["Neuralocks Before Hair", "Neuralocks Hair"]
 FRAMES = 1001, 1010, 1020
@@ -72,6 +73,50 @@ def keys_of_a_library(folder: Path) -> None:
     for operator in (bpy.ops.neuralocks.bake_keys, bpy.ops.neuralocks.remove_keys):
         refused(operator, "Neuralocks Hair", "library.blend", "star")
     assert not any(track.mute for track in rig.animation_data.nla_tracks)
+
+
+def cached_in_a_shot(folder: Path) -> None:
+    """A cache that hair has from its library, taken off in a shot, stays off when the shot is opened again, as does one that
+    the shot gave the hair instead; what moves the hair without it is on.
+    """
+    needs_usd()
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    deform = scenes.surface_deform(strands).name
+    make_live(rig, strands)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    assert bpy.ops.neuralocks.bake_attach(filepath="//library.usdc") == {"FINISHED"}
+    scenes.collect("Character")
+    bpy.ops.wm.save_mainfile()
+    rig = _overridden(folder)
+    rig.animation_data.action = None
+    scenes.dance(rig, (1001, 1024))
+    scene, strands = bpy.context.scene, _own("CURVES")
+    scene.neuralocks.hair = strands
+
+    def on(strands) -> dict:
+        return {m.name: m.show_viewport and m.show_render for m in strands.modifiers}
+
+    assert on(strands) == {"Neuralocks Cache": True, deform: False}
+    for file in ("library", "shot"):
+        cached = points_at(strands, 1010)
+        assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+        still = points_at(strands, 1010)
+        assert apart(still, cached) > 0.001, file
+        _opened_again(folder)
+        strands = _own("CURVES")
+        assert on(strands) == {"Neuralocks Cache": False, deform: True} and not has_cache(strands), file
+        assert [cache.name_full.partition(" ")[0] for cache in bpy.data.cache_files] == ["library.usdc"]
+        assert apart(points_at(strands, 1010), still) < 1e-6, file
+        if file == "library":
+            assert bpy.ops.neuralocks.bake_attach(filepath="//shot.usdc") == {"FINISHED"}
+            cached = points_at(strands, 1010)
+            _opened_again(folder)
+            strands = _own("CURVES")
+            assert on(strands) == {"Neuralocks Cache": True, deform: False}
+            assert apart(points_at(strands, 1010), cached) < 1e-6
+            assert apart(cached, baked_points(folder / "shot.usdc", "/Character/Hair_Hair", 1010)) < SAME
 
 
 def _keyed_library(folder: Path):
