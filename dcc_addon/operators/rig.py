@@ -18,9 +18,11 @@ from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.paths import FILE, absolute
 from ..scene.up_to_date import ensure
-from ..services.bones import chains_of, own_turns
+from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
+from ..services.names import file_label
 from ..services.overwriting import check_ours
+from ..services.panel_errors import for_the_panel
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
@@ -128,8 +130,10 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
                 lambda say: bake_rig(shot, out, model, head=head, strength=strength, loop=loop, progress=say),
                 "Baking the hair bones",
             )
-            yield from job.steps(0.5)
-        return f"{name}: hair bones written to {out}"
+            result = yield from job.steps(0.5)
+        self.report({"INFO"}, f"{name}: hair bones written to {out}")
+        for note in result.notes:  # last, for Blender shows the last line longest
+            self.report({"WARNING"}, for_the_panel(note.replace(result.skeleton, name)))
 
 
 class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
@@ -139,18 +143,21 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     bl_label = "Export C Header"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="Header to write", default="//neuralocks_hair.h", **FILE)
+    filepath: StringProperty(
+        name="File", description="Header to write; beside this file, named after the character, when empty", **FILE
+    )
 
     def work(self, context):
         from neuralocks_core.rig.export_c import example_beside, export_c, made_here
 
-        if not self.filepath.strip():
-            raise NeuralocksError("Export: no file is named; choose where the header is written")
         armature = shown_armature(context)
-        out = Path(absolute(self.filepath))
+        path = self.filepath.strip() or f"//{file_label(armature.name)}_hair.h"
+        out = Path(absolute(path))
         if out.is_dir():
-            raise NeuralocksError(f"{self.filepath}: this is a folder; name the header that is to be written in it")
-        model = RigModel.load(model_path(armature, "rig"))
+            raise NeuralocksError(f"{path}: this is a folder; name the header that is to be written in it")
+        sampled, model = ensure(context, armature), RigModel.load(model_path(armature, "rig"))
+        # Says where the model is another rig's, as the shipped one is.
+        LiveBones.of(model, sampled.rig, sampled.character, armature.neuralocks_character.chains)
         check_ours([out, example_beside(out)], made_here)
         export_c(model, out)
         return f"C header written to {out}"

@@ -202,10 +202,10 @@ def new_folder(folder: Path) -> None:
 
 
 def no_file(folder: Path) -> None:
-    """A header is not written under an empty name, or over a folder."""
+    """A header is not written over a folder, nor without a name beside a file that is not saved."""
     rig, export = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.ops.neuralocks.export_c
     bpy.context.scene.neuralocks.armature = rig
-    refused(lambda: export(filepath=" "), "no file is named")
+    refused(export, "//Rig_hair.h", "not saved yet")
     for path in (".", str(folder)):
         refused(lambda path=path: export(filepath=path), "this is a folder")
 

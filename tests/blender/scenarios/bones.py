@@ -119,24 +119,6 @@ def keyed_bones(folder: Path) -> None:
             assert apart(turns(frame), matrices) < 1e-6
 
 
-def export_cancelled(folder: Path) -> None:
-    """While bones are baked for another program Blender takes events, and Esc leaves nothing of it."""
-    from types import SimpleNamespace
-
-    from dcc_addon.operators.rig import NEURALOCKS_OT_export_skel
-
-    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
-    scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-    out = folder / "new" / "rig.usdc"
-    steps = NEURALOCKS_OT_export_skel.steps(SimpleNamespace(filepath=str(out)), bpy.context)
-    assert any("Baking" in message for _, _, message in steps) and out.parent.exists()
-    steps.close()
-    assert not out.parent.exists()
-
-
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
 def keyed_anew(folder: Path) -> None:
     """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair bones written for other programs."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import refused
+
+
+def headers_of_two(folder: Path) -> None:
+    """A header is of the character that is shown, under its name, so that it takes no other's place; where the model is
+    another rig's, the example's say, there is none.
+    """
+    scene, folder = bpy.context.scene, folder / "here"
+    folder.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "two.blend"))
+    for name in ("Anna", "Bert*"):
+        scene.neuralocks.armature = rig = scenes.armature(name, bones=scenes.BONES + scenes.TAIL)
+        refused(bpy.ops.neuralocks.export_c, "hair", "Train for This Character")
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / f"{name[0]}.neuralocks"))
+        assert bpy.ops.neuralocks.export_c() == {"FINISHED"}
+    headers = ["Anna_hair.h", "Anna_hair_example.c", "Bert__hair.h", "Bert__hair_example.c"]
+    assert sorted(p.name for p in folder.glob("*_hair*")) == headers, list(folder.iterdir())
+
+
+def told_of_the_export(folder: Path) -> None:
+    """What is to be known of hair bones that were written is told, of the character and in the panel's words."""
+    from dcc_addon.operators.rig import NEURALOCKS_OT_export_skel
+
+    rig, said = scenes.armature(bones=scenes.BONES + scenes.TAIL), []
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    rig.neuralocks_character.loop = True
+    told = SimpleNamespace(filepath=str(folder / "rig.usdc"), report=lambda kind, text: said.append((*kind, text)))
+    for _ in NEURALOCKS_OT_export_skel.steps(told, bpy.context):
+        pass
+    (first, ended), *notes = said
+    assert first == "INFO" and ended.startswith("Rig: hair bones written to"), said
+    assert notes and all(kind == "WARNING" and "--" not in text for kind, text in notes), notes
+    assert any(text.startswith("Rig: joint '") and "a loop ends" in text for _, text in notes), notes
+
+
+def export_cancelled(folder: Path) -> None:
+    """While bones are baked for another program Blender takes events, and Esc leaves nothing of it."""
+    from dcc_addon.operators.rig import NEURALOCKS_OT_export_skel
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    out = folder / "new" / "rig.usdc"
+    steps = NEURALOCKS_OT_export_skel.steps(SimpleNamespace(filepath=str(out)), bpy.context)
+    assert any("Baking" in message for _, _, message in steps) and out.parent.exists()
+    steps.close()
+    assert not out.parent.exists()
