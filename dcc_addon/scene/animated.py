@@ -6,10 +6,12 @@ def animated(data, without=()) -> set[str]:
     """Paths that actions, strips and drivers of some animation data write, but for NLA tracks of the names `without`; none
     where there is no such data.
     """
-    if data is None:
-        return set()
-    played = [curve for user in (data, *strips_of(data, without)) for curve in _curves(user)]
-    return {curve.data_path for curve in [*data.drivers, *played] if not _muted(curve)}
+    return {curve.data_path for curve in _playing(data, without)}
+
+
+def moved(data) -> set[str]:
+    """Those of them that change: that drivers write, or keys of several values."""
+    return {curve.data_path for curve in _playing(data) if not _constant(curve)}
 
 
 def strips_of(data, without=()) -> list:
@@ -18,6 +20,18 @@ def strips_of(data, without=()) -> list:
     for strip in strips:  # grows
         strips.extend(getattr(strip, "strips", ()))
     return strips
+
+
+def _playing(data, without=()) -> list:
+    """F-curves of drivers, actions and strips that are not muted."""
+    if data is None:
+        return []
+    played = [curve for user in (data, *strips_of(data, without)) for curve in _curves(user)]
+    return [curve for curve in [*data.drivers, *played] if not _muted(curve)]
+
+
+def _constant(curve) -> bool:
+    return curve.driver is None and not curve.modifiers and len({key.co[1] for key in curve.keyframe_points}) < 2
 
 
 def _curves(user) -> list:

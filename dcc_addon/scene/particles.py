@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair Curves from a hair particle system, key by key and child by child."""
 
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import bpy
 import numpy as np
@@ -12,6 +12,7 @@ from neuralocks_core.rotation import transformed
 
 from ..services.widths import radii
 from . import curves
+from .animated import moved
 from .armature import matrix
 from .binding import at_rest
 
@@ -50,7 +51,8 @@ def waiting(thing) -> list:
 
 def convert(context, source, system, children: bool = True):
     """A new hair Curves object with the keys of the particle hair of `source`, and its children as they are rendered,
-    parented to it, as they are where the rig is at rest, of the same material and as thick.
+    parented to it, as they are where the rig is at rest and shape keys that move are off, of the same material and as
+    thick.
 
     Blender's own conversion gives the points that are drawn (9 by default), not the keys that were groomed.
 
@@ -64,6 +66,7 @@ def convert(context, source, system, children: bool = True):
     children = children and settings.child_type != "NONE"
     with (
         at_rest(context, source),
+        _shape_at_rest(source),
         _changed(shown, show_viewport=True),
         _changed(system, use_hair_dynamics=False),  # a simulation of its own is no groom
         _changed(settings, **_rendered(settings, children)),
@@ -124,6 +127,20 @@ def _changed(thing, **values):
     finally:
         for name, value in kept.items():
             setattr(thing, name, value)
+
+
+@contextmanager
+def _shape_at_rest(thing):
+    """Meanwhile the shape keys that keys or drivers move are off, whatever they are in this frame; those that are always on
+    belong to the shape.
+    """
+    shapes = getattr(thing.data, "shape_keys", None)
+    moving = moved(shapes.animation_data) if shapes else ()
+    with ExitStack() as changes:
+        for block in shapes.key_blocks if shapes else ():
+            if block.path_from_id("value") in moving:
+                changes.enter_context(_changed(block, mute=True))
+        yield
 
 
 def _keys(evaluated, system: str) -> tuple[np.ndarray, np.ndarray]:

@@ -99,6 +99,38 @@ def simulated_particles(_folder: Path) -> None:
     assert apart(*found) < SAME
 
 
+def particles_under_shapes(_folder: Path) -> None:
+    """Particle hair is the same groom whatever its scalp's shape keys, that keys or drivers move, are in the frame; on those
+    that are always on it lies as they are, be they keyed so.
+    """
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
+    ball, scene = bpy.context.active_object, bpy.context.scene
+    blocks = {name: ball.shape_key_add(name=name) for name in ("Basis", "Brow", "Driven", "Tall", "Wide", "Off")}
+    for name, axis in (("Brow", 2), ("Driven", 2), ("Tall", 2), ("Wide", 1), ("Off", 1)):
+        for point in blocks[name].data:
+            point.co[axis] += 0.03
+    for frame in (1, 10):
+        blocks["Brow"].value, blocks["Wide"].value = frame == 10, 1.0
+        for name in ("Brow", "Wide"):
+            blocks[name].keyframe_insert("value", frame=frame)
+    blocks["Driven"].driver_add("value").driver.expression = "frame / 20"
+    blocks["Tall"].value, blocks["Off"].mute = 1.0, True
+    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = ball.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 20, 0.2
+    found = []
+    for frame in (1, 10):
+        scene.frame_set(frame)
+        shown = [block.value for block in blocks.values()]
+        assert bpy.ops.neuralocks.from_particles(system=ball.particle_systems[0].name) == {"FINISHED"}
+        found.append(scenes.points(scene.neuralocks.hair).reshape(20, -1, 3))
+        assert [name for name, block in blocks.items() if block.mute] == ["Off"]
+        assert [block.value for block in blocks.values()] == shown
+    assert apart(*found) < SAME
+    away = np.linalg.norm(found[0][:, 0] - [0, 0.03, 1.63], axis=1)
+    assert np.abs(away - 0.1).max() < 2e-3, away
+
+
 def particle_looks(_folder: Path) -> None:
     """Converted hair has the material of its slot and is as thick as it was drawn; it belongs to the armature that moves
     what it grows on, whoever is shown, and is found with it.
