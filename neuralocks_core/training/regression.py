@@ -51,6 +51,7 @@ class RegressionOptions:
         swing: weight of the error about its mean over a strand's moments, relative to the strand's own motion.
         settling: weight of the error of frame differences, relative to the strand's own frame difference.
         parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
+        bending: weight of the error of the difference between successive edges, in edge lengths.
         collision: weight of the depth under the target's body plane, in strand lengths.
         mirror: share of the rollouts of a step that are seen in a mirror.
         output: "direction" or "displacement".
@@ -72,6 +73,7 @@ class RegressionOptions:
     swing: float = 0.4
     settling: float = 0.3
     parting: float = 0.3
+    bending: float = 0.0
     collision: float = 45.0
     mirror: float = 0.0
     output: str = "direction"
@@ -201,7 +203,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
     that motion, so that small motion counts as much as large, `settling` the same of one frame difference, so that hair
     comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
-    they do, `collision` how far x lies under the plane of the body next to x*, beyond where x* itself lies or MARGIN,
+    they do, `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies under the plane of the body next to x*, beyond where x* itself lies or MARGIN,
     whichever is nearer the body.
 
     Args:
@@ -227,6 +229,8 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     swing = (_spread(error, 1).mean((1, 3)) / true_swing + 1e-6).sqrt()  # smooth at zero
     true_parting = _spread(batch["moved"], 2).mean((1, 2, 3)) + TOGETHER**2 * squared.mean(1)
     parting = (_spread(error, 2).mean((1, 2, 3)) / true_parting + 1e-6).sqrt()
+    edge = length / (K - 1)
+    bending = _norm(torch.diff(error, n=2, dim=-2) / edge[..., None])
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
     target = (normals * batch["moved"]).sum(-1) - offset
     depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
@@ -237,6 +241,7 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
         "swing": options.swing * swing.mean(),
         "settling": options.settling * settling.mean(),
         "parting": options.parting * parting.mean(),
+        "bending": options.bending * bending.mean(),
         "collision": options.collision * (depth / length).mean(),
     }
 
