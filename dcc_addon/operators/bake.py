@@ -114,6 +114,8 @@ def bake_steps(context, armature, hairs, path: str):
             )
             yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
             baked |= {name: (str(out), prims[name]) for name in names}
+    for out in outs:
+        attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()})
     return baked
 
 

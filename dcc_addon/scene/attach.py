@@ -55,6 +55,17 @@ def players(path: str) -> list:
     ]
 
 
+def renew(path: str, prims: dict[str, str]) -> None:
+    """Show what has just been written to the USD file `path` on the hair that plays it: its prim of `prims`, by its name."""
+    for hair in players(path):
+        modifier = hair.modifiers[MODIFIER]
+        prim = prims.get(hair.name_full, modifier.object_path)
+        if modifier.object_path != prim:
+            modifier.object_path = prim
+        with bpy.context.temp_override(edit_cachefile=modifier.cache_file):
+            bpy.ops.cachefile.reload()
+
+
 def attach(hair, path: str, prim: str, scene) -> None:
     """Let the hair play the groom `prim` of the USD file `path`, whose time codes are frames of this scene."""
     detach(hair)

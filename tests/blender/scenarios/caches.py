@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, make_live, messages, needs_usd, points_at
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at
 
 
 def attached_again(folder: Path) -> None:
@@ -55,6 +55,34 @@ def attached_again(folder: Path) -> None:
     opened()
     assert operators.detach() == {"FINISHED"}
     assert not bpy.data.objects["Hair"].modifiers and not bpy.data.cache_files
+
+
+def baked_over(folder: Path) -> None:
+    """A bake to the file that hair plays is shown at once, as it is when the file is opened again; also where the hair is
+    called otherwise in it.
+    """
+    needs_usd()
+    operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands, out = scenes.hair(rig, 20, name="Hair.L"), str(folder / "hair.usdc")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    make_live(rig, strands)
+    scene.neuralocks.output = out
+    assert operators.bake_attach() == {"FINISHED"}
+    first = points_at(strands, 9)
+    scenes.hair(rig, 10, name="Hair L").neuralocks_hair.model = strands.neuralocks_hair.model
+    for motion in (0.2, 1.0):
+        for hair in (strands, bpy.data.objects["Hair L"]):
+            hair.neuralocks_hair.motion = motion
+        assert operators.bake() == {"FINISHED"}
+        shown = points_at(strands, 9)
+        prim = strands.modifiers["Neuralocks Cache"].object_path
+        assert apart(shown, baked_points(out, prim, 9)) < SAME, "the cache from before is shown"
+        assert (apart(shown, first) > 1e-3) == (motion == 0.2)
+    assert not messages(), messages()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    assert apart(points_at(bpy.data.objects["Hair.L"], 9), shown) < SAME
 
 
 def taken_off(folder: Path) -> None:
