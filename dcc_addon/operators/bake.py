@@ -11,16 +11,18 @@ from bpy.props import StringProperty
 from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
-from ..live_strands import material_words, show_rest, typed
-from ..models import model_path
+from ..live_strands import show_rest
+from ..looks import grouped
 from ..scene import attach
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.muting import on_top
 from ..scene.paths import FILE, absolute
+from ..scene.shown import in_renders
 from ..services.names import identifier
 from ..services.overwriting import check_ours
+from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
@@ -64,11 +66,23 @@ def frame_range(scene) -> tuple[int, int]:
     return settings.frame_start, settings.frame_end
 
 
-def bake_steps(context, armature, hairs, path: str):
-    """Sample, write the shot beside the bake, bake it; yields (done, total, message), returns {hair name: (bake,
-    prim path)}.
+class Baked(NamedTuple):
+    """What was baked.
 
-    The same functions that the command line calls, on a stage that holds the numbers of the live view.
+    Attributes:
+        hair: file and prim path by object name.
+        notes: what an artist should know, in the words of the panel.
+    """
+
+    hair: dict[str, tuple[str, str]]
+    notes: list[str]
+
+
+def bake_steps(context, armature, hairs, path: str, undrawn=()):
+    """Sample, write the shot beside the bake, bake it; yields (done, total, message), returns what was `Baked`.
+
+    The same functions that the command line calls, on a stage that holds the numbers of the live view. Hair with a name
+    among `undrawn` is invisible in the file.
     """
     scene = context.scene
     full = output_path(path)
@@ -77,27 +91,24 @@ def bake_steps(context, armature, hairs, path: str):
         raise NeuralocksError(
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
-    looks: dict[_Look, list[str]] = {}
-    for hair in hairs:
-        looks.setdefault(_look(hair), []).append(hair.name_full)
-    stem = Path(full)
-    outs = [stem if len(looks) == 1 else stem.with_name(f"{stem.stem}_{n + 1}{stem.suffix}") for n in range(len(looks))]
-    groups = [(out, *group) for out, group in zip(outs, sorted(looks.items()))]
-    for out, _, names in groups:
-        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
-            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
+    looks, notes = grouped(hairs, undrawn)
     character, subframes = armature.name_full, scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
     from usd.assets.own_layers import is_own
     from usd.baking.bake import bake
 
+    outs = _outs(Path(full), len(looks))
+    groups = [(out, *group) for out, group in zip(outs, looks)]
+    for out, _, names in groups:
+        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
+            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     check_ours([*outs, *map(shot_beside, outs)], is_own)
     sampled = yield from sampling(context, named(character), share=0.5)
-    baked = {}
+    baked: dict[str, tuple[str, str]] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):
             shot = shot_beside(out)
-            prims = write_shot(shot, named(character), scene, sampled, [named(name) for name in names])
+            prims = write_shot(shot, named(character), scene, sampled, [named(name) for name in names], undrawn)
             job = Threaded(
                 lambda say, shot=shot, out=out, look=look: bake(
                     shot,
@@ -112,25 +123,24 @@ def bake_steps(context, armature, hairs, path: str):
                     progress=say,
                 )
             )
-            yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
+            result = yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
             baked |= {name: (str(out), prims[name]) for name in names}
+            notes += [for_the_panel(with_objects(note, prims)) for note in result.notes]
     for out in outs:
         attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()})
-    return baked
+    return Baked(baked, list(dict.fromkeys(notes)))
 
 
-class _Look(NamedTuple):
-    """What hair that is baked together has in common, as it was when the bake began."""
-
-    material: tuple[str, ...]
-    motion: float
-    resolve: bool
-    model: str
+def _outs(path: Path, count: int) -> list[Path]:
+    """The files of a bake of so many looks."""
+    return [path if count == 1 else path.with_name(f"{path.stem}_{n + 1}{path.suffix}") for n in range(count)]
 
 
-def _look(hair) -> _Look:
-    settings = hair.neuralocks_hair
-    return _Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, model_path(hair))
+def _tell(operator, message: str, notes: list[str]) -> None:
+    """Report how it ended, and then what else is to be known: Blender shows the last line longest."""
+    operator.report({"INFO"}, message)
+    for note in notes:
+        operator.report({"WARNING"}, note)
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
@@ -145,10 +155,12 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
     def steps(self, context):
         armature = shown_armature(context)
         path = self.filepath or context.scene.neuralocks.output
-        baked = yield from bake_steps(context, armature, hairs_of(armature, context.scene), path)
+        hairs = hairs_of(armature, context.scene)
+        undrawn = [hair.name_full for hair in hairs if not in_renders(hair, context.scene)]
+        baked, notes = yield from bake_steps(context, armature, hairs, path, undrawn)
         left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
         more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""
-        return f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}"
+        _tell(self, f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}", notes)
 
 
 class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
@@ -167,11 +179,11 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
         if any(other != hair for other in attach.players(path)):  # the panel's output is the same for all hair
             stem, ending = os.path.splitext(path)
             path = f"{stem}_{identifier(hair.name)}{ending}"
-        baked = yield from bake_steps(context, armature, [hair], path)
+        baked, notes = yield from bake_steps(context, armature, [hair], path)
         hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name], context.scene)
-        return f"{name}: now plays {baked[name][0]}"
+        _tell(self, f"{name}: now plays {baked[name][0]}", notes)
 
 
 class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
@@ -206,7 +218,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         name = hair.name_full
         folder = tempfile.mkdtemp(prefix="neuralocks_")
         try:
-            baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
+            baked, _ = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
             session.cards[name] = yield from _card(baked[name][0])
         finally:
             shutil.rmtree(folder, ignore_errors=True)

@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
 from ..models import SETTING
+from ..scene import curves
 from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import find, identified, identity, named
@@ -92,6 +93,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         armature, scene = shown_armature(context), context.scene
         target = shown_hair(context, armature) if self.kind == "strands" else armature
         check_own(target)  # it is given the model
+        if self.kind == "strands":
+            curves.check(target)
         python, name, wanted = training_python(), armature.name_full, target.name_full
         asking = Threaded(lambda _: _trainers.look(python), "Looking for what training needs", leave=True)
         if problem := (yield from asking.steps()):

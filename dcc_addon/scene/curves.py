@@ -12,6 +12,7 @@ from neuralocks_core import rest_copy
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
+from ..services.rig import check_strands
 from . import unbound
 from .nodes import geometry_nodes
 
@@ -71,6 +72,16 @@ def kind(data) -> str:
             "(in Edit Mode, Curves > Set Curve Type)"
         )
     return found.pop() if len(found) == 1 else "POLY"
+
+
+def check(hair) -> None:
+    """Refuse a hair object that cannot be moved, before anything long is done with it.
+
+    Raises:
+        NeuralocksError: it has no strands, or strands that no network moves.
+    """
+    check_strands(hair.name_full, points(hair.data), counts(hair.data))
+    kind(hair.data)
 
 
 def has_rest(data) -> bool:

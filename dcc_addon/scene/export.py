@@ -16,7 +16,7 @@ BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """What strands of a type are in USD, where they are more than straight lines."""
 
 
-def write_shot(path: Path, armature, scene, sampled, hairs) -> dict[str, str]:
+def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[str, str]:
     """Write the armature's motion, its body and hair at rest.
 
     Args:
@@ -24,18 +24,19 @@ def write_shot(path: Path, armature, scene, sampled, hairs) -> dict[str, str]:
         armature, scene: what to write.
         sampled: its `SampledRig`.
         hairs: hair objects to write, which it carries.
+        undrawn: names of those that are invisible in the file.
 
     Returns:
-        prim path of each hair object, by name.
+        prim path of each object that was written, by name.
 
     Raises:
         NeuralocksError: the file cannot be written, or the USD libraries are missing.
     """
-    from usd.assets.scene_writer import SceneArrays, hair_path, write_scene
+    from usd.assets.scene_writer import RIG, SceneArrays, prim_path, write_scene
 
     motion, rig = sampled.motion, sampled.rig
     bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
-    labels = names.unique([f"Hair_{h.name}" for h in hairs])
+    labels, skins = names.unique([f"Hair_{h.name}" for h in hairs]), _skins(armature, scene, sampled)
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
@@ -52,15 +53,21 @@ def write_shot(path: Path, armature, scene, sampled, hairs) -> dict[str, str]:
             translation=motion.translation,
             rotation=motion.rotation,
             scale=motion.scale,
-            skins=_skins(armature, scene, sampled),
+            skins=list(skins.values()),
             shape=motion.shape,
-            hair=[_hair(hair, label, sampled) for hair, label in zip(hairs, labels, strict=True)],
+            hair=[
+                _hair(hair, label, sampled, hair.name_full not in undrawn)
+                for hair, label in zip(hairs, labels, strict=True)
+            ],
+            name=armature.name_full,
         ),
     )
-    return {hair.name_full: hair_path(label) for hair, label in zip(hairs, labels, strict=True)}
+    prims = {hair.name_full: prim_path(label) for hair, label in zip(hairs, labels, strict=True)}
+    prims |= {body: prim_path(arrays.name) for body, arrays in skins.items()}
+    return prims | {armature.name_full: RIG}
 
 
-def _hair(hair, label: str, sampled):
+def _hair(hair, label: str, sampled, visible: bool):
     """A hair object at rest, as `HairArrays`."""
     from usd.assets.prims import Spline
     from usd.assets.scene_writer import HairArrays
@@ -78,19 +85,21 @@ def _hair(hair, label: str, sampled):
         places=sampled.motion.places[hair.name_full],
         joint=sampled.character.head,
         spline=Spline("cubic", basis, "pinned") if basis else Spline(),
+        visible=visible,
     )
 
 
-def _skins(armature, scene, sampled) -> list:
-    """The bodies that were sampled, as `SkinArrays`; shape names are unique among all of them."""
+def _skins(armature, scene, sampled) -> dict:
+    """The bodies that were sampled, as `SkinArrays` by object name; shape names are unique among all of them."""
     from usd.assets.scene_writer import SkinArrays
 
     bodies = [body for body in bodies_of(armature, scene) if body.name_full in sampled.motion.places]
     arrays = [body_reader.read(body, armature) for body in bodies]
     labels, shape_labels = names.unique([f"Body_{a.name}" for a in arrays]), iter(shape_names(arrays))
-    skins = []
+    skins = {}
     for body, label in zip(arrays, labels, strict=True):
         points, triangles, shapes = skin(body, sampled.bind_places[body.name])
         shapes = {next(shape_labels): offsets for offsets in shapes.values()}
-        skins.append(SkinArrays(label, points, triangles, *joint_weights(body, sampled.rig.bones), shapes))
+        weights = joint_weights(body, sampled.rig.bones)
+        skins[body.name] = SkinArrays(label, points, triangles, *weights, shapes)
     return skins

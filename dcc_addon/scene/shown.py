@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a view layer shows, and so evaluates."""
+"""What a view layer shows, and so evaluates; and what is rendered."""
+
+from .animated import animated
 
 
 def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
@@ -13,6 +15,12 @@ def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
         return True
     off = "hide_render" if mode == "RENDER" else "hide_viewport"
     return not getattr(thing, off) and _within(layer.layer_collection, set(thing.users_collection), off)
+
+
+def in_renders(thing, scene) -> bool:
+    """Whether a render of the scene draws an object in any frame."""
+    drawn = any(enabled(thing, layer, "RENDER") for layer in scene.view_layers if layer.use)
+    return drawn or "hide_render" in animated(thing.animation_data)
 
 
 def _within(branch, collections: set, off: str) -> bool:

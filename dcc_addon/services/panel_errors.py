@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors of the core in the words of the panel: it names what to do as the command line does."""
+"""Errors and notes of the core in the words of the panel: they name things and what to do as the command line does."""
+
+import re
 
 WORDS = (
     (
@@ -16,12 +18,30 @@ WORDS = (
     ("with --chains", "under Chains"),
     ("--chains", "Chains"),
     ("; neuralocks inspect lists all", "; choose a bone of the rig"),
+    (", or name it with --joint", ", or name one so"),
+    ("name it with --joint ", "name the bone "),
+    ("=JOINT", ""),
+    (" (--cuts says where)", ""),
+    ("leave out --loop", "turn Loop off"),
+    ("check the stage's metersPerUnit", "check the scene's Unit Scale"),
+    ("train one with random_materials=True, as the other ways of training do", "train one here"),
 )
 """What the command line says, and the panel; in this order."""
 
 
 def for_the_panel(text: str) -> str:
-    """An error's line, without options and commands of a terminal."""
+    """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
     return text
+
+
+def with_objects(text: str, prims: dict[str, str]) -> str:
+    """A line that names prims, with the objects that they were written from.
+
+    Args:
+        prims: prim path by object name.
+    """
+    names = {prim: name for name, prim in prims.items()}
+    paths = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    return re.sub(rf"({paths})(?!\w)", lambda found: names[found[0]], text) if names else text

@@ -207,6 +207,20 @@ def shape_names(bodies: Sequence[BodyArrays]) -> list[str]:
     return names.unique([name for body in bodies for name in body.shapes])
 
 
+def check_strands(name: str, points: np.ndarray, counts: np.ndarray) -> None:
+    """Refuse hair that cannot move; the arguments are those of `groom`.
+
+    Raises:
+        NeuralocksError: it is empty, of single points or not finite.
+    """
+    if not len(counts) or not len(points):
+        raise NeuralocksError(f"{name}: the hair has no strands; add hair to it or choose another object")
+    if counts.max() < 2:
+        raise NeuralocksError(f"{name}: every strand has one point only; give the strands two points or more")
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{name}: some points are not finite; delete these strands")
+
+
 def groom(
     name: str,
     points: np.ndarray,
@@ -224,12 +238,7 @@ def groom(
         metres: of one unit of the bind pose; see `SampledRig.bind_metres`.
         radius: (P,) in the hair object's space.
     """
-    if not len(counts) or not len(points):
-        raise NeuralocksError(f"{name}: the hair has no strands; add hair to it or choose another object")
-    if counts.max() < 2:
-        raise NeuralocksError(f"{name}: every strand has one point only; give the strands two points or more")
-    if not np.isfinite(points).all():
-        raise NeuralocksError(f"{name}: some points are not finite; delete these strands")
+    check_strands(name, points, counts)
     matrix = to_core(metres) @ place
     size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     widths = None if radius is None or not len(radius) else 2 * np.maximum(radius, 0) * size

@@ -15,6 +15,7 @@ from ..shot.recorded import KEY
 from .prims import Spline, author_curves, author_influences, author_skeleton, bind_rigidly, bind_to
 
 ROOT = "/Character"
+RIG = f"{ROOT}/Rig"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class HairArrays:
         places: its place at every frame, (T, 4, 4).
         joint: index of the joint that carries it.
         spline: how its vertices are interpolated.
+        visible: whether it is drawn.
     """
 
     name: str
@@ -57,6 +59,7 @@ class HairArrays:
     places: np.ndarray
     joint: int
     spline: Spline = Spline()
+    visible: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,7 @@ class SceneArrays:
         translation, rotation, scale: (T, J, 3), (T, J, 4) wxyz, (T, J, 3), local.
         skins: skinned meshes; shape: weights (T, B) of their blend shapes, mesh after mesh.
         hair: grooms.
+        name: what its application calls the character.
     """
 
     metres_per_unit: float
@@ -85,6 +89,7 @@ class SceneArrays:
     skins: list[SkinArrays]
     shape: np.ndarray
     hair: list[HairArrays]
+    name: str = ""
 
 
 def write_scene(path, scene: SceneArrays) -> Path:
@@ -96,8 +101,8 @@ def write_scene(path, scene: SceneArrays) -> Path:
     return write_stage(as_path(path, "path"), lambda stage: _author(stage, scene))
 
 
-def hair_path(name: str) -> str:
-    """Prim path of the groom with this name."""
+def prim_path(name: str) -> str:
+    """Prim path of the groom or mesh with this name."""
     return f"{ROOT}/{name}"
 
 
@@ -110,8 +115,10 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     stage.SetEndTimeCode(float(scene.frames[-1]))
     root = UsdSkel.Root.Define(stage, ROOT)
     root.GetPrim().SetCustomDataByKey(KEY, "shot")  # by which `own_layers` knows it
+    if scene.name:
+        root.GetPrim().SetDisplayName(scene.name)
     stage.SetDefaultPrim(root.GetPrim())
-    skeleton = author_skeleton(stage, f"{ROOT}/Rig", scene.joints, scene.bind, scene.rest)
+    skeleton = author_skeleton(stage, RIG, scene.joints, scene.bind, scene.rest)
     animation = _animation(stage, scene)
     UsdSkel.BindingAPI(skeleton).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     for skin in scene.skins:
@@ -121,7 +128,7 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
 
 
 def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
-    animation = UsdSkel.Animation.Define(stage, f"{ROOT}/Rig/Motion")
+    animation = UsdSkel.Animation.Define(stage, f"{RIG}/Motion")
     animation.CreateJointsAttr(scene.joints)
     translations, rotations, scales = (
         animation.CreateTranslationsAttr(),
@@ -142,7 +149,7 @@ def _animation(stage: Usd.Stage, scene: SceneArrays) -> UsdSkel.Animation:
 
 
 def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> None:
-    mesh = UsdGeom.Mesh.Define(stage, f"{ROOT}/{skin.name}")
+    mesh = UsdGeom.Mesh.Define(stage, prim_path(skin.name))
     mesh.CreatePointsAttr(vectors(skin.points))
     mesh.CreateExtentAttr(vectors([skin.points.min(axis=0), skin.points.max(axis=0)]))
     mesh.CreateFaceVertexCountsAttr(integers(np.full(len(skin.triangles), 3)))
@@ -162,10 +169,12 @@ def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> Non
 
 
 def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdSkel.Skeleton) -> None:
-    curves = author_curves(stage, hair_path(hair.name), hair.points, hair.counts, hair.widths, hair.spline)
+    curves = author_curves(stage, prim_path(hair.name), hair.points, hair.counts, hair.widths, hair.spline)
     op = curves.AddTransformOp(UsdGeom.XformOp.PrecisionDouble)
     op.Set(row_matrix(hair.places[0]))
     if (np.abs(hair.places - hair.places[0]) > 1e-9).any():
         for frame, place in zip(map(float, frames), hair.places, strict=True):
             op.Set(row_matrix(place), frame)
     bind_rigidly(skeleton, curves.GetPrim(), hair.bind_place, hair.joint)
+    if not hair.visible:
+        curves.MakeInvisible()

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which hair is baked, and which of it together: hair of one look is one file."""
+
+from typing import NamedTuple
+
+from neuralocks_core.errors import NeuralocksError
+
+from .live_strands import material_words, typed
+from .models import model_path
+from .scene import curves
+
+
+class Look(NamedTuple):
+    """What hair that is baked together has in common, as it was when the bake began."""
+
+    material: tuple[str, ...]
+    motion: float
+    resolve: bool
+    model: str
+
+
+def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
+    """The names of hair objects that can be baked, by look, and what is to be told of the others.
+
+    Args:
+        hairs: hair objects, one at least.
+        undrawn: names of those that nobody will see.
+
+    Raises:
+        NeuralocksError: one cannot be baked, unless it has no strands or is undrawn; or none can.
+    """
+    looks: dict[Look, list[str]] = {}
+    left_out = []
+    for hair in hairs:
+        try:
+            curves.check(hair)
+            looks.setdefault(_look(hair), []).append(hair.name_full)
+        except NeuralocksError as error:
+            if len(hair.data.points) and hair.name_full not in undrawn:
+                raise
+            left_out.append(str(error))
+    if not looks:
+        raise NeuralocksError(left_out[0])
+    found = {name for names in looks.values() for name in names}
+    told = [
+        f"{name}: it is hidden in renders, and so invisible in the file; if it is to be drawn, show it in renders and bake again"
+        for name in undrawn
+        if name in found
+    ]
+    return sorted(looks.items()), [*(f"{text} (left out)" for text in left_out), *told]
+
+
+def _look(hair) -> Look:
+    settings = hair.neuralocks_hair
+    return Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, model_path(hair))

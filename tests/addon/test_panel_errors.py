@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Notes of a bake as the panel tells them."""
+
+import pytest
+
+from dcc_addon.services.panel_errors import for_the_panel, with_objects
+
+
+def test_prims_become_objects():
+    """Each prim its own object, though its path begins like another one's."""
+    prims = {"前髪": "/Character/Hair___", "Hair.L": "/Character/Hair_L", "Hair L": "/Character/Hair_L_2"}
+    said = with_objects(
+        "/Character/Hair_L_2: as /Character/Hair_L, not /Character/Hair___ or /Character/Hair_Lo", prims
+    )
+    assert said == "Hair L: as Hair.L, not 前髪 or /Character/Hair_Lo"
+    assert with_objects("/Character: as it is", {}) == "/Character: as it is"
+
+
+@pytest.mark.parametrize(
+    "note",
+    [
+        "Rig: no joint found for neck, chest; the next one towards the trunk serves, or name it with --joint",
+        "Rig: no joint found for left_lower_arm, so the arms count as bound in a T-pose; "
+        "name it with --joint left_lower_arm=JOINT",
+        "Rig: its head is put elsewhere at 13; the hair starts anew there (--cuts says where)",
+        "Rig: its head is put elsewhere at 13; a loop has no cuts, so the hair is flung there; leave out --loop, or repair "
+        "the animation",
+        "Hair: the longest strand reaches 30 m; check the stage's metersPerUnit",
+        "the model was trained with one material, so stiffness, weight and damping change nothing; "
+        "train one with random_materials=True, as the other ways of training do",
+    ],
+)
+def test_notes_name_what_the_panel_has(note):
+    said = for_the_panel(note)
+    assert not any(word in said for word in ("--", "JOINT", "metersPerUnit", "random_materials", "()", " ;")), said
+    assert said.startswith(note[:12])
