@@ -20,8 +20,8 @@ from ..scene.lookup import named
 from ..scene.muting import on_top
 from ..scene.paths import FILE, absolute
 from ..scene.shown import in_renders
-from ..services.names import identifier
-from ..services.overwriting import check_ours
+from ..services.names import file_label
+from ..services.overwriting import check_ours, untaken
 from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
@@ -54,6 +54,14 @@ def shot_beside(out: Path) -> Path:
     return out.with_name(f"{out.stem}_shot.usdc")
 
 
+def is_anothers(out: Path, character: str) -> bool:
+    """Whether the bake `out` that is there, if any, is of another character than that of this full name."""
+    from usd.assets.own_layers import character_of
+
+    shot = shot_beside(out)
+    return shot.is_file() and character_of(shot) not in ("", character)
+
+
 def frame_range(scene) -> tuple[int, int]:
     """First and last frame of the bake."""
     settings = scene.neuralocks
@@ -82,7 +90,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
     """Sample, write the shot beside the bake, bake it; yields (done, total, message), returns what was `Baked`.
 
     The same functions that the command line calls, on a stage that holds the numbers of the live view. Hair with a name
-    among `undrawn` is invisible in the file.
+    among `undrawn` is invisible in the file. Where another character's hair is in the file, this one's gets another name.
     """
     scene = context.scene
     full = output_path(path)
@@ -92,12 +100,15 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
     looks, notes = grouped(hairs, undrawn)
-    character, subframes = armature.name_full, scene.neuralocks.subframes
+    character, label, subframes = armature.name_full, file_label(armature.name), scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
     from usd.assets.own_layers import is_own
     from usd.baking.bake import bake
 
-    outs = _outs(Path(full), len(looks))
+    free = untaken(Path(full), label, lambda path: any(is_anothers(out, character) for out in _outs(path, len(looks))))
+    if free != Path(full):
+        notes.append(f"{full}: it is of another character, and kept; this one is written to {free.name}")
+    outs = _outs(free, len(looks))
     groups = [(out, *group) for out, group in zip(outs, looks)]
     for out, _, names in groups:
         if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
@@ -175,11 +186,16 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
         armature = shown_armature(context)
         hair = shown_hair(context, armature)
         attach.check_possible(hair)
-        name, path = hair.name_full, output_path(self.filepath or context.scene.neuralocks.output)
-        if any(other != hair for other in attach.players(path)):  # the panel's output is the same for all hair
-            stem, ending = os.path.splitext(path)
-            path = f"{stem}_{identifier(hair.name)}{ending}"
-        baked, notes = yield from bake_steps(context, armature, [hair], path)
+        name, path = hair.name_full, Path(output_path(self.filepath or context.scene.neuralocks.output))
+        character, label = armature.name_full, file_label(hair.name)
+        yield from loading("usd.assets.own_layers")
+
+        def taken(out: Path) -> bool:  # the panel's output is the same for all hair
+            players = (thing.name_full for thing in attach.players(str(out)))
+            return any(other != name for other in players) or is_anothers(out, character)
+
+        path = untaken(path, label, taken)
+        baked, notes = yield from bake_steps(context, named(character), [named(name)], str(path))
         hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name], context.scene)

@@ -21,12 +21,12 @@ from ..scene.up_to_date import ensure
 from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.names import file_label
-from ..services.overwriting import check_ours
+from ..services.overwriting import check_ours, untaken
 from ..services.panel_errors import for_the_panel
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
-from .bake import frame_range, output_path, shot_beside
+from .bake import frame_range, is_anothers, output_path, shot_beside
 from .base import Hardened, Stepwise, sampling, shown_armature
 
 
@@ -115,11 +115,13 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
-        shot = shot_beside(out)
+        label = file_label(armature.name)
         yield from loading("usd.assets.own_layers", "usd.rig.bake", "usd.assets.scene_writer")
         from usd.assets.own_layers import is_own
         from usd.rig.bake import bake_rig
 
+        out = untaken(out, label, lambda path: is_anothers(path, name))
+        shot = shot_beside(out)
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)
         bind(named(name), sampled)  # says what is wrong before anything is written

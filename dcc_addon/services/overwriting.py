@@ -1,9 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files may be written over only if they were made here: a panel asks nobody before."""
+"""Files may be written over only if they were made here, and for the same: a panel asks nobody before."""
 
+import itertools
 import os
+from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+
+
+def untaken(path: Path, label: str, taken) -> Path:
+    """The file `path`; where that is taken, one of its name and `label`, with a number at need.
+
+    Args:
+        taken: tells of a path whether something else needs the file there.
+    """
+    numbers = ("" if n == 1 else f"_{n}" for n in itertools.count(1))
+    others = (path.with_name(f"{path.stem}_{label}{number}{path.suffix}") for number in numbers)
+    return next(found for found in itertools.chain([path], others) if not taken(found))
 
 
 def check_ours(paths, made_here) -> None:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which USD files were written here, and may be written over."""
+"""Which USD files were written here and may be written over, and of whom they are."""
 
 from pxr import Sdf, Tf
 
 from ..rig.stage import BAKED
 from ..shot.recorded import KEY
+from .scene_writer import ROOT
 
 
 def is_own(path) -> bool:
@@ -19,3 +20,13 @@ def is_own(path) -> bool:
     layer.Traverse(Sdf.Path.absoluteRootPath, found.append)
     prims = (layer.GetPrimAtPath(path) for path in found if path.IsPrimPath())
     return any(KEY in prim.customData or prim.name == BAKED for prim in prims)
+
+
+def character_of(path) -> str:
+    """Whose shot a file is, as its application calls the character; empty where that is not told."""
+    try:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    except Tf.ErrorException:
+        return ""
+    prim = layer.GetPrimAtPath(ROOT) if layer else None
+    return prim.GetInfo("displayName") if prim else ""

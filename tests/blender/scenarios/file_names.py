@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where bakes of several characters, and of several hair objects, go that have one output: none takes another's file."""
+
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, needs_usd, points_at
+
+
+def one_output(folder: Path) -> None:
+    """The bake of a second character gets a file of its own, and goes over that the next time; so does its rig's."""
+    scene, made, hairs = bpy.context.scene, {}, {}
+    scene.neuralocks.output = str(folder / "out.usdc")
+    for name, aside in (("Rig", 0), ("Bob.001", 2)):
+        rig = scenes.armature(name, scenes.BONES + scenes.TAIL)
+        scenes.dance(rig)
+        rig.delta_location.x = aside
+        hairs[name] = scenes.hair(rig, 10, name=f"{name}'s")
+        make_live(rig, hairs[name])
+        rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / f"{name}.neuralocks"))
+    for _ in range(2):
+        for name, hair in hairs.items():
+            scene.neuralocks.armature = bpy.data.objects[name]
+            assert bpy.ops.neuralocks.bake() == {"FINISHED"}
+            assert bpy.ops.neuralocks.export_skel() == {"FINISHED"}
+            made[name] = hair
+    written = {path.name for path in folder.glob("*.usdc")}
+    stems = ("out", "out_rig", "out_Bob_001", "out_rig_Bob_001")
+    assert written == {f"{stem}{part}.usdc" for stem in stems for part in ("", "_shot")}, written
+    for file, name, prim in (("out", "Rig", "Hair_Rig_s"), ("out_Bob_001", "Bob.001", "Hair_Bob_001_s")):
+        baked = baked_points(folder / f"{file}.usdc", f"/Character/{prim}", 9)
+        assert apart(baked, points_at(hairs[name], 9)) < SAME
+
+
+def like_names(folder: Path) -> None:
+    """Hair objects of which a plain name says too little all play files of their own, again when they are baked again."""
+    needs_usd()
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    hairs = [scenes.hair(rig, 8, name=name) for name in ("前髪", "横髪", "後髪", "Hair.L", "Hair_L", "Hair L")]
+    scene.neuralocks.output = str(folder / "out.usdc")
+    for hair in hairs:
+        hair.neuralocks_hair.model = MODEL
+    files = []
+    for hair in (*hairs, *hairs):
+        make_live(rig, hair)
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}, hair.name
+        files.append(hair.modifiers["Neuralocks Cache"].cache_file.filepath)
+    assert len(set(files[:6])) == 6 and files[6:] == files[:6], files
+    assert {Path(file).stem for file in files} == {
+        "out",
+        "out_横髪",
+        "out_後髪",
+        "out_Hair_L",
+        "out_Hair_L_2",
+        "out_Hair_L_3",
+    }
