@@ -56,7 +56,7 @@ def other_strands(folder: Path) -> None:
     for _ in (steps := _Returned(bake_steps(bpy.context, rig, [strands], str(folder / "out.usdc")))):
         pass
     for frame, seen in view.items():
-        assert apart(seen, baked_points(*steps.value["Hair"], frame)) < 1e-5, frame
+        assert apart(seen, baked_points(*steps.value.hair["Hair"], frame)) < 1e-5, frame
     assert not messages(), messages()
 
     bpy.context.scene.collection.objects.unlink(strands)
