@@ -19,6 +19,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
+from .alike import one_of_alike
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, ways
@@ -149,9 +150,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     nearest = min(seat.distance for seat in seats)
     alike = [seat for seat in seats if seat.distance <= nearest + ALIKE]
-    # Bodies that are alike fit equally well, one at the stage's origin any hair that was modelled there.
-    seat = min(alike, key=lambda seat: (-kinship(prim, seat.rig), seat.way, seat.distance))
-    seat, turned = _of_roots(prim, seat, placement)
+    seat, turned = _of_roots(prim, one_of_alike(prim, alike, notes), placement)
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())

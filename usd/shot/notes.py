@@ -19,10 +19,9 @@ from neuralocks_core.strands.arclength import count_pointlike
 from ..border.damage import text_of
 from ..border.units import Border
 from ..skel.source import StageRig
+from .alike import one_person
 from .attach import Attachment, rig_joint
 
-SAME = 0.01
-"""Joints of two skeletons at most so far apart [m] are one."""
 UNIT = UsdGeom.Tokens.metersPerUnit
 FEW = 3
 """Similar lines told one by one."""
@@ -216,27 +215,13 @@ def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
     """The note on a character in several skeletons, head and body or clothes: those that have meshes, and whose head, neck or
     chest is where this one's is.
     """
-    others = [other.path for other in rigs if other.path != rig.path and other.meshes and _one_person(rig, other)]
+    others = [other.path for other in rigs if other.path != rig.path and other.meshes and one_person(rig, other)]
     if not others:
         return []
     return [
         f"{rig.path}: {', '.join(others[:3])} {'is' if len(others) == 1 else 'are'} the same character, whose meshes hair is not "
         "kept out of; bind them to one skeleton if hair touches them"
     ]
-
-
-def _one_person(rig: StageRig, other: StageRig) -> bool:
-    """Whether a joint of the upper body is at the same place in both, when bound and as the first one's motion begins and ends."""
-    mine, its = rig.character, other.character
-    ends = rig.clip.times[[0, -1]]
-    for name in ("head", "neck", "upper_chest", "chest"):
-        if name not in mine.humanoid or name not in its.humanoid:
-            continue
-        a, b = mine.humanoid[name], its.humanoid[name]
-        there = np.concatenate([mine.skeleton.bind[None, a], rig.clip.joints[[0, -1], a]])[:, :3, 3]
-        if np.abs(there[0] - its.skeleton.bind[b, :3, 3]).max() < SAME:
-            return bool(np.abs(there[1:] - other.clip.at(ends)[:, b, :3, 3]).max() < SAME)
-    return False
 
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
