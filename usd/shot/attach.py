@@ -22,7 +22,7 @@ from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .alike import one_of_alike
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
-from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, ways
+from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
 from .seat_notes import lies_off_skin, moved_away, not_pinned, upside_down
 
 REACH = 1.0
@@ -154,7 +154,8 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
-    notes += (turned or _spread(rig, path, joint, shares)) + moved_away(path, rig, seat.roots)
+    notes += turned or _spread(rig, path, joint, shares)
+    notes += moved_away(path, rig, seat.roots) + unsure(prim, seat, placement)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
     return Attachment(rig, _carried_by(rig, joint), seat.to_bind, how, False, at_default)

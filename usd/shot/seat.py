@@ -31,6 +31,11 @@ skin may come a little nearer to it by a wrong one, as by one that counts a pare
 SOME_ROOTS, SOME_TIMES = 1000, 16
 """How many of a groom's roots and of a prim's samples are looked at, about: all are too many."""
 
+STEADY = 1e-4
+"""A prim that drifts no more than this against something is moved by it."""
+APART = 5e-3
+"""Places of a groom that are so far from each other [m] are not the same to the eye."""
+
 
 @dataclass(frozen=True)
 class Seat:
@@ -137,14 +142,33 @@ def ways(
         return still if likely else []
     if when is not None:  # it is seen where it is then
         return [_posed(rig, placement, when)] if likely else still
-    if not placement.samples or _steady(placement, rig.source.placement.at):
+    with_skeleton, with_head = _drifts(rig, placement)
+    if with_skeleton <= STEADY:
         # Or it was made where the character stands when its motion begins, or the shot.
         return still if likely else [_posed(rig, placement, code) for code in beginnings(rig)]
     # A prim that is moved along by its parents: where it stood against the head when that motion began.
     posed = [_posed(rig, placement, placement.samples[0])]
-    if _steady(placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core):
+    if with_head <= STEADY:
         return posed if likely else still
-    return posed + still if likely else []
+    # A set moves along what stands and walks in it; only what nearly keeps to the head was made on that.
+    both = posed + still if CLEARLY * with_head < with_skeleton else still + posed
+    return both if likely else []
+
+
+def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
+    """The note on a groom that moves with neither skeleton nor head, if another of its likely places is on the skin, too."""
+    if moment(prim) is not None or not seat.rig.source.animated or min(_drifts(seat.rig, placement)) <= STEADY:
+        return []
+    back = np.linalg.inv(seat.to_bind)
+    places = [transformed(seat.roots, way @ back) for way in ways(seat.rig, seat.mesh, placement)]
+    near = [roots for roots in places if np.median(seat.tree.query(roots)[0]) <= NEAR]
+    apart = max((float(np.median(np.linalg.norm(roots - seat.roots, axis=1))) for roots in near), default=0.0)
+    if apart < APART:
+        return []
+    return [
+        f"{prim.GetPath()}: its motion is neither that of {seat.rig.path} nor of the head, and it is guessed where it lies at rest, "
+        f"maybe wrong by {1000 * apart:.2g} mm; bind it to the skeleton"
+    ]
 
 
 def beginnings(rig: StageRig) -> list[float]:
@@ -183,11 +207,23 @@ def _carried(rig: StageRig, when: float) -> np.ndarray:
     return rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
 
 
-def _steady(placement: Placement, against: Callable[[float], np.ndarray]) -> bool:
-    """Whether a moving prim stands still against something else in stage space, which then is what moves it."""
+def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
+    """How much a prim moves against an animated skeleton, and against its head; (0, 0) where it stands still."""
+    if not placement.samples:
+        return 0.0, 0.0
+    with_skeleton = _drift(placement, rig.source.placement.at)
+    if with_skeleton <= STEADY:  # against the head is not asked
+        return with_skeleton, np.inf
+    return with_skeleton, _drift(
+        placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core
+    )
+
+
+def _drift(placement: Placement, against: Callable[[float], np.ndarray]) -> float:
+    """How much a moving prim moves against something else in stage space, as a share: 0 if that is what moves it."""
     times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
     places = np.stack([placement.at(time) for time in times])
     relative = np.stack([np.linalg.inv(against(time)) for time in times]) @ places
     turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
     reach = max(1.0, np.abs(places[..., 3]).max(), np.abs(relative[..., 3]).max())
-    return bool(turned <= 1e-4 * np.abs(relative[0, :3, :3]).max() and moved <= 1e-4 * reach)
+    return float(max(turned / np.abs(relative[0, :3, :3]).max(), moved / reach))

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
@@ -21,11 +21,11 @@ START = 4
 """Time code at which a character that turns its head from the first frame on is seen first."""
 
 
-def _turned(tmp_path, bound) -> tuple[Usd.Stage, np.ndarray]:
+def _turned(tmp_path, bound, nesting="/Hero") -> tuple[Usd.Stage, np.ndarray]:
     """A shot in which the head is turned when the motion begins, and where it is at each frame against its bind pose."""
-    path = write_shot(tmp_path, Recipe(bound=bound))
+    path = write_shot(tmp_path, Recipe(bound=bound, nesting=nesting))
     stage = Usd.Stage.Open(str(path))
-    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath(f"{nesting}/Rig/Motion"))
     for attribute in (motion.GetTranslationsAttr(), motion.GetRotationsAttr()):
         for code in range(1, START):
             attribute.ClearAtTime(code)
@@ -81,6 +81,42 @@ def test_hair_below_a_moving_root_is_at_rest_however_the_head_is_turned_when_it_
         walk.Set(Gf.Vec3d(0.1 * code - 0.1 * START, 0, 0), code)
     stage.Save()
     np.testing.assert_allclose(read_shot(stage.GetRootLayer().realPath).grooms[0].groom.points, before, atol=1e-6)
+
+
+def test_hair_of_an_animated_set_in_which_the_character_walks_is_not_taken_from_the_head(tmp_path):
+    stage, _ = _turned(tmp_path, "mesh", "/Train/Hero")
+    layer = stage.GetRootLayer()
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Train/Hero/Hair")).GetPointsAttr()
+    # Where it hovers over skin, one place is hardly nearer to that than another.
+    rest = np.asarray(points.Get()) + [0, 0.015, 0]
+    points.Set(_rigid(rest, np.eye(4)))
+    Sdf.CopySpec(layer, "/Train/Hero/Hair", layer, "/Train/Hair")
+    stage.RemovePrim("/Train/Hero/Hair")
+    train, walk = (UsdGeom.Xformable(stage.GetPrimAtPath(path)) for path in ("/Train", "/Train/Hero"))
+    ride, steps = train.AddTransformOp(), walk.AddTranslateOp()
+    for code in range(START, 10):
+        turn = Gf.Matrix4d().SetRotate(Gf.Rotation((0, 1, 0), 3.0 * code))
+        ride.Set(turn * Gf.Matrix4d().SetTranslate((20, 0, 0.5 * code)), code)
+        steps.Set((0, 0, 0.1 * (code - START)), code)
+    stage.Save()
+    shot = read_shot(layer.realPath)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, rest, atol=1e-5)
+    (note,) = (note for note in shot.notes if note.startswith("/Train/Hair: "))
+    assert "is neither that of /Train/Hero/Rig nor of the head" in note and "bind it" in note
+
+
+def test_hair_that_only_nearly_keeps_to_the_head_was_made_on_that(tmp_path):
+    stage, head = _turned(tmp_path, "mesh")
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    op = curves.AddTransformOp()
+    for code in range(START, 10):
+        matrix = head[code].copy()
+        matrix[0, 3] += 1e-3 * (code % 2)
+        op.Set(Gf.Matrix4d(matrix.T.tolist()), code)
+    rest = curves.GetPointsAttr().Get()
+    stage.Save()
+    (item,) = read_shot(stage.GetRootLayer().realPath).grooms
+    np.testing.assert_allclose(item.groom.points, rest, atol=2e-3)
 
 
 def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_path):
