@@ -11,9 +11,10 @@ class Stencils:
     """Which samples of a groom the velocity at each time code is made of.
 
     Central differences over one and two frames to both sides, right to fourth order: at 24 frames a second within 2 %
-    for hair that swings three times a second. Outside of its samples the animation stands still, and at a cut the
-    character is put elsewhere: there the differences are taken to the side that moves, to second order. The velocity at
-    a time code depends on that time code only, not on which others are baked.
+    for hair that swings three times a second. Where the animation begins and ends, and at a cut, where the character is
+    put elsewhere, the differences are taken to one side, to second order: before its first sample hair is at rest,
+    after its last one the body stands and hair swings on. The velocity at a time code depends on that time code only,
+    not on which others are baked.
 
     Args:
         item: the groom.
@@ -46,6 +47,8 @@ class Stencils:
         part = int(np.searchsorted(self._after - slack, code, side="right"))
         first = self._after[part - 1] if part else self._first
         last = self._before[part] if part < len(self._before) else self._last
+        if code > self._last + slack:
+            first, last = self._last, np.inf
         room = (code - first) / step + slack, (last - code) / step + slack
         if min(room) >= 2:
             weights = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}

@@ -10,6 +10,8 @@ from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, write_shot
 
+NAMES = ("points", "velocities")
+
 
 def test_velocities_are_those_of_the_points(tmp_path, model):
     shot = write_shot(tmp_path, Recipe(unit=0.01))
@@ -60,3 +62,26 @@ def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
     stage = Usd.Stage.Open(str(again.path))
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
     assert curves.GetPointsAttr().GetTimeSamples() == [5] and not curves.GetVelocitiesAttr().HasValue()
+
+
+def test_hair_that_swings_on_after_the_last_sample_has_the_velocities_of_its_points(tmp_path, model):
+    """While the body stands, and whichever of these frames are baked."""
+    shot = write_shot(tmp_path)
+    path = bake(shot, tmp_path / "bake.usdc", model, frames="7:15").path
+    at, moving = ({code: samples(path, name, at=code).astype(float) for code in range(7, 16)} for name in NAMES)
+    assert np.abs(at[12] - at[11]).max() * 24 > 0.02
+    assert np.allclose(moving[9], (3 * at[9] - 4 * at[8] + at[7]) * 12, atol=1e-3)
+    assert np.allclose(moving[10], (at[11] - at[9]) * 12, atol=1e-3)
+    for code in (11, 12, 13):
+        expected = (8 * (at[code + 1] - at[code - 1]) - (at[code + 2] - at[code - 2])) * 24 / 12
+        assert np.allclose(moving[code], expected, atol=1e-3)
+    few = bake(shot, tmp_path / "few.usdc", model, frames=[9.5, 12, 15]).path
+    for code in (12, 15):
+        np.testing.assert_array_equal(samples(few, "velocities", at=code), moving[code])
+    assert np.abs(samples(few, "velocities", at=9.5)).max() > 0.02
+
+
+def test_before_the_first_sample_hair_is_at_rest(tmp_path, model):
+    path = bake(write_shot(tmp_path), tmp_path / "bake.usdc", model, frames="-2:1").path
+    for code in (-2, -1, 0):
+        assert not samples(path, "velocities", at=code).any()
