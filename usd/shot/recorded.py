@@ -18,18 +18,26 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 
 def recorded(prim: Usd.Prim) -> dict:
-    """What `record` wrote, arrays as lists; empty where nothing did."""
+    """What `record` wrote, with time codes as a list of those of the stage; empty where nothing did."""
     # The strongest layer's alone: composed, a bake over another one would tell a mixture of both.
-    told = (spec.customData[KEY] for spec in prim.GetPrimStack() if KEY in spec.customData)
-    facts = next(told, None)
+    stack = prim.GetPrimStackWithLayerOffsets()
+    told = ((spec.customData[KEY], offset) for spec, offset in stack if KEY in spec.customData)
+    facts, offset = next(told, (None, None))
     if not isinstance(facts, dict):
         return {}
-    return {name: list(value) if isinstance(value, Vt.DoubleArray) else value for name, value in facts.items()}
+
+    def as_stage_has_it(value):
+        if not isinstance(value, Sdf.TimeCodeArray | Vt.DoubleArray):
+            return value
+        return [round(offset * float(code), 9) for code in value]
+
+    return {name: as_stage_has_it(value) for name, value in facts.items()}
 
 
 def given_facts(cuts: list[float] | None, joints: dict[str, str] | None) -> dict:
     """The record of the cuts, by time code, and of the joints that the user gave; empty where they were found."""
-    told = {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
+    # Of this type, so that USD, too, moves them along with the samples, where it flattens layers with offsets.
+    told = {} if cuts is None else {"cuts": Sdf.TimeCodeArray(cuts)}
     return told | ({"joints": dict(joints)} if joints else {})
 
 

@@ -12,7 +12,7 @@ from usd.cli.app import app
 from usd.cli.options import cut_codes
 from usd.review.baked import read_baked
 from usd.review.inspect import inspect
-from usd.shot.recorded import recorded
+from usd.shot.recorded import record, recorded
 
 from ..shots import Recipe, samples, write_loop, write_shot
 
@@ -76,6 +76,37 @@ def test_a_bake_tells_the_cuts_that_were_given(bakes):
         assert len(item.attachment.rig.clip.cuts) == len(cuts)
     found = read_baked(bakes["found"].path).shot.grooms[0]
     assert "cuts" not in recorded(found.prim) and len(found.attachment.rig.clip.cuts) == 1
+
+
+@pytest.mark.parametrize("way", ["reference", "sublayer", "flattened", "doubles"])
+def test_cuts_of_a_bake_are_moved_with_its_samples(bakes, tmp_path, way):
+    """By the offsets and rates of the layers and references above it; also those recorded as plain numbers."""
+    path, above = bakes["given"].path, tmp_path / "above.usda"
+    if way == "doubles":
+        given = Sdf.Layer.FindOrOpen(str(path))
+        path = path.with_name("doubles.usdc")
+        given.Export(str(path))
+        plain = Sdf.Layer.FindOrOpen(str(path))
+        record(plain.GetPrimAtPath("/Hero/Hair"), {"cuts": Vt.DoubleArray([CUT])})
+        plain.Save()
+    layer = Sdf.Layer.CreateNew(str(above))
+    layer.timeCodesPerSecond = 48
+    for name, value in (("metersPerUnit", 1.0), ("upAxis", "Y")):
+        layer.pseudoRoot.SetInfo(name, value)
+    if way == "sublayer":
+        layer.subLayerPaths.append(str(path))
+        layer.subLayerOffsets[0] = Sdf.LayerOffset(100)
+    else:
+        hero = Sdf.CreatePrimInLayer(layer, "/Hero")
+        hero.referenceList.Prepend(Sdf.Reference(str(path), "/Hero", Sdf.LayerOffset(100)))
+    layer.Save()
+    if way == "flattened":
+        above = tmp_path / "flat.usdc"
+        Usd.Stage.Open(layer).Export(str(above))
+    (item,) = read_baked(above).shot.grooms
+    rig, (cut,) = item.attachment.rig, item.attachment.rig.clip.cuts
+    assert recorded(item.prim)["cuts"] == [100 + 2 * CUT]
+    assert rig.time_codes[np.searchsorted(rig.clip.times, cut - 1e-9)] == 100 + 2 * CUT
 
 
 def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
