@@ -155,7 +155,7 @@ def _in_effect(prim: Usd.Prim, name: str) -> Usd.Attribute | None:
     while above and not above.IsPseudoRoot():
         attribute = above.GetAttribute(name)
         if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
-            if rest_value(attribute) is not None:
+            if attribute.HasAuthoredValue() and rest_value(attribute) is not None:
                 return attribute
         above = above.GetParent()
     return None
@@ -210,6 +210,12 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | 
     if inside_out(points, triangles):
         notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to be rid of this")
         triangles = triangles[:, ::-1]
+    method = _in_effect(prim, "primvars:skel:skinningMethod")
+    if method and rest_value(method) == UsdSkel.Tokens.dualQuaternion:
+        notes.append(
+            f"{path}: its skinningMethod is dualQuaternion; hair is kept out of it as classicLinear poses it, which is thinner "
+            "where joints twist or bend; check the hair there"
+        )
     indices, weights = joint_influences(prim, len(points), source)
     shapes = read_blend_shapes(prim, len(points), notes)
     return StageMesh(

@@ -2,9 +2,11 @@
 """Bindings and bodies as UsdSkel has them, wherever they are authored."""
 
 import numpy as np
+import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
+from usd.review.inspect import inspect
 from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel.surface import bound_skeleton
@@ -64,3 +66,16 @@ def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
     mesh.Set("invisible", 5)
     stage.Save()
     assert read_rigs(path)[0].character.body is None
+
+
+@pytest.mark.parametrize("above", [False, True])
+@pytest.mark.parametrize("method", ["dualQuaternion", "classicLinear"])
+def test_a_body_that_is_not_posed_as_its_mesh_asks_is_told(tmp_path, method, above):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    prim = stage.GetPrimAtPath("/Hero" if above else "/Hero/Skin")
+    UsdSkel.BindingAPI.Apply(prim).CreateSkinningMethodAttr(method)
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        told = [note for note in notes if note.startswith("/Hero/Skin: its skinningMethod is dualQuaternion")]
+        assert len(told) == (method == "dualQuaternion")
