@@ -175,18 +175,35 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
     return tuple(found)
 
 
-def _read_primvars(prim: Usd.Prim, groom: Groom) -> tuple["Primvar", ...]:
-    """Those that go on with the curves, as far as they fit them."""
+def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple["Primvar", ...]:
+    """Those that go on with the curves, as far as they fit them; with a note on the others."""
     found = []
+    sizes = {
+        "uniform": {groom.strand_count},
+        "vertex": {len(groom.points)},
+        "varying": _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points)),
+    }
     for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
         name, scope, each = primvar.GetPrimvarName(), str(primvar.GetInterpolation()), primvar.GetElementSize()
         if name in OWN or not (str(name).startswith("groom_") or name in KEPT):
             continue
         value = rest_primvar(primvar)
-        many = {"uniform": groom.strand_count, "vertex": len(groom.points)}.get(scope)
-        if value is not None and (scope == "constant" or many and np.shape(value)[:1] == (many * each,)):
+        fits = np.shape(value)[:1] in [(many * each,) for many in sizes.get(scope, ())]
+        if value is not None and (scope == "constant" or fits):
             found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
+        else:
+            notes.append(
+                f"{prim.GetPath()}: primvars:{name} ({scope}) does not fit {groom.strand_count} strands of "
+                f"{len(groom.points)} points; left out"
+            )
     return tuple(found)
+
+
+def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
+    """How many varying values curves of so many points in all may have: one for each end of a segment."""
+    sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
+    # Pinned curves are drawn through their first and last points, too; not all tools count segments there.
+    return sizes | ({points} if curves.GetWrapAttr().Get() == UsdGeom.Tokens.pinned else set())
 
 
 @names_damage
@@ -201,7 +218,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
-        found.append(Authored(groom, Spline(*tokens), _read_primvars(prim, groom)))
+        found.append(Authored(groom, Spline(*tokens), _read_primvars(prim, groom, notes)))
     if not found:
         raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
     return found, notes

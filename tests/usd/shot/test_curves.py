@@ -145,12 +145,15 @@ def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
         "groom_id": (names.IntArray, "uniform", 1, [70, 71, 72, 73, 74]),
         "groom_closest_guides": (names.IntArray, "uniform", 3, list(range(15))),
         "groom_color": (names.Float3Array, "vertex", 1, [(0.1, 0.2, 0.3 + i) for i in range(20)]),
+        "groom_sway": (names.FloatArray, "varying", 1, [0.5 + i for i in range(20)]),
+        "displayColor": (names.Color3fArray, "varying", 1, [(0.1, 0.2, 0.01 * i) for i in range(20)]),
         "groom_unfit": (names.IntArray, "uniform", 1, [1, 2]),
     }
     for name, (kind, scope, size, value) in told.items():
         api.CreatePrimvar(name, kind, scope, size).Set(value)
     stage.GetRootLayer().Save()
-    import_groom(source, tmp_path / "groom.usda")
+    _, notes = import_groom(source, tmp_path / "groom.usda")
+    assert notes == ["/Hero/Hair: primvars:groom_unfit (uniform) does not fit 5 strands of 20 points; left out"]
     groom = Usd.Stage.Open(str(tmp_path / "groom.usda"))
     written = UsdGeom.PrimvarsAPI(groom.GetPrimAtPath("/Groom/Hair"))
     told.pop("groom_unfit")
@@ -162,6 +165,27 @@ def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
     uv = np.array(written.GetPrimvar("groom_root_uv").Get())
     assert uv.shape == (5, 2) and len(np.unique(uv, axis=0)) == 5 and 0 <= uv.min() and uv.max() <= 1
     assert written.GetPrimvar("groom_width").Get()[0] == pytest.approx(0.01), "0.1 mm, in centimetres"
+
+
+@pytest.mark.parametrize(
+    ("basis", "each", "fits"),
+    [("bezier", 3, True), ("catmullRom", 5, True), ("catmullRom", 7, True), ("bspline", 4, False)],
+)
+def test_varying_values_go_on_with_their_spline(tmp_path, basis, each, fits):
+    """One for each end of a segment; of pinned curves, also as many as points."""
+    source = write_shot(tmp_path, Recipe(bound="none", strands=4, vertices=7, basis=basis), "source")
+    stage = Usd.Stage.Open(str(source))
+    values = [0.5 * i for i in range(4 * each)]
+    api = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Hero/Hair"))
+    api.CreatePrimvar("groom_sway", Sdf.ValueTypeNames.FloatArray, "varying").Set(values)
+    stage.Save()
+    _, notes = import_groom(source, tmp_path / "groom.usda")
+    groom = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+    primvar = UsdGeom.PrimvarsAPI(groom.GetPrimAtPath("/Groom/Hair")).GetPrimvar("groom_sway")
+    if fits:
+        assert (primvar.GetInterpolation(), list(primvar.Get())) == ("varying", values) and not notes
+    else:
+        assert not primvar and "groom_sway (varying) does not fit" in notes[0]
 
 
 @pytest.mark.parametrize(("rows", "scope"), [(1, "constant"), (12, "vertex")])
