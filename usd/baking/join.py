@@ -201,7 +201,9 @@ def _copy_prim(prim: Sdf.PrimSpec, target: Sdf.Layer) -> None:
     over = Sdf.CreatePrimInLayer(target, prim.path)
     _copy_info(prim, over)
     for relation in prim.relationships:
-        Sdf.RelationshipSpec(over, relation.name, relation.custom).targetPathList.ClearEditsAndMakeExplicit()
+        copied = Sdf.RelationshipSpec(over, relation.name, relation.custom)
+        copied.targetPathList.ClearEditsAndMakeExplicit()
+        copied.targetPathList.explicitItems = list(relation.targetPathList.explicitItems)
     for spec in prim.attributes:
         copied = Sdf.AttributeSpec(over, spec.name, spec.typeName, spec.variability, spec.custom)
         _copy_info(spec, copied, ("typeName", "variability", "custom", "timeSamples"))

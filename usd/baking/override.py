@@ -17,6 +17,7 @@ from ..border.stopping import check
 from ..shot.curves import rest_points, widest_sample
 from ..shot.recorded import record
 from ..shot.stage import Shot, StageGroom
+from ..skel.surface import FORMER
 from .header import apply_binding, over_prim, write_header
 from .sample_layer import SampleLayer
 from .spool import Spool
@@ -53,6 +54,8 @@ class OverrideWriter:
             apply_binding(over, item.prim)
             relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
             relation.targetPathList.ClearEditsAndMakeExplicit()
+            former = Sdf.RelationshipSpec(over, FORMER, custom=True)
+            former.targetPathList.explicitItems = [item.attachment.rig.path]
         names = Sdf.ValueTypeNames
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
         points = Sdf.AttributeSpec(over, "points", names.Point3fArray)

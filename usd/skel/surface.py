@@ -48,6 +48,8 @@ class StageMesh:
         return transformed(self.points, matrix), self.triangles[:, ::-1] if mirrored else self.triangles
 
 
+FORMER = "neuralocks:skeleton"
+"""A relationship to the skeleton from which a bake unbound a prim: of flattened layers, all that is left to tell it."""
 Skins = dict[str, list[Usd.Prim]]
 """Path of a skeleton -> the Mesh prims that it skins, in stage order."""
 
@@ -92,6 +94,9 @@ def bound_skeleton(prim: Usd.Prim) -> str | None:
     # A layer that unbinds and moves the points is a bake; the binding that it ended may be of a prim above.
     if any(spec.layer.GetNumTimeSamplesForPath(spec.path.ReplaceName("points")) for spec in specs):
         skeleton = UsdSkel.BindingAPI(prim.GetParent()).GetInheritedSkeleton()
+    if not skeleton and (former := prim.GetRelationship(FORMER)):
+        targets = (prim.GetStage().GetPrimAtPath(path) for path in former.GetTargets())
+        skeleton = next(filter(None, map(UsdSkel.Skeleton, targets)), None)
     return str(skeleton.GetPath()) if skeleton else None
 
 

@@ -6,6 +6,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
+from usd.review.baked import read_baked
 from usd.review.inspect import inspect
 from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
@@ -50,6 +51,33 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_mo
     hair.GetPrim().GetRelationship("skel:skeleton").SetTargets([])
     stage.Save()
     assert bound_skeleton(read_shot(path, ["/Hero/Groom"]).grooms[0].prim) is None
+
+
+@pytest.mark.parametrize("way", ["flattened", "referenced", "rebaked"])
+def test_a_bake_that_is_flattened_or_referenced_still_tells_the_binding_of_its_hair(tmp_path, still_model, way):
+    """That leads to the bind pose another way than the place in the stage."""
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    place = Gf.Matrix4d().SetRotate(Gf.Rotation((1, 2, 3), 40)) * Gf.Matrix4d().SetTranslate((3, 1, 2))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    points.Set([Gf.Vec3f(place.GetInverse().Transform(Gf.Vec3d(point))) for point in points.Get()])
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair")).GetGeomBindTransformAttr().Set(place)
+    stage.Save()
+    (before,) = read_shot(path).grooms
+    made = bake(path, tmp_path / "hair.usdc", still_model, frames="1:3").path
+    copy = tmp_path / "copy.usda"
+    if way == "referenced":
+        above = Usd.Stage.CreateNew(str(copy))
+        UsdGeom.SetStageMetersPerUnit(above, 1)
+        UsdGeom.SetStageUpAxis(above, "Y")
+        above.DefinePrim("/Cast/Her").GetReferences().AddReference(str(made))
+        above.Save()
+    else:
+        Usd.Stage.Open(str(made)).Export(str(copy))
+        copy = bake(copy, tmp_path / "again.usdc", still_model, frames="1:3").path if way == "rebaked" else copy
+    (item,) = read_baked(copy).shot.grooms
+    assert (item.joint, item.attachment.skinned) == (before.joint, True)
+    np.testing.assert_allclose(item.groom.points, before.groom.points, atol=1e-6)
 
 
 def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
