@@ -27,17 +27,15 @@ def recorded(prim: Usd.Prim) -> dict:
         return {}
 
     def as_stage_has_it(value):
-        if not isinstance(value, Sdf.TimeCodeArray | Vt.DoubleArray):
-            return value
-        return [round(offset * float(code), 9) for code in value]
+        return [round(offset * code, 9) for code in value] if isinstance(value, Vt.DoubleArray) else value
 
     return {name: as_stage_has_it(value) for name, value in facts.items()}
 
 
 def given_facts(cuts: list[float] | None, joints: dict[str, str] | None) -> dict:
     """The record of the cuts, by time code, and of the joints that the user gave; empty where they were found."""
-    # Of this type, so that USD, too, moves them along with the samples, where it flattens layers with offsets.
-    told = {} if cuts is None else {"cuts": Sdf.TimeCodeArray(cuts)}
+    # Not as USD's type for time codes, for which it upgrades its files with a warning.
+    told = {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
     return told | ({"joints": dict(joints)} if joints else {})
 
 
