@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pxr import Usd
 
-from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -20,6 +19,7 @@ from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .alike import one_of_alike
+from .carrying import carried_by, carrying_joint, head_by_name, joint_shares, spread_over
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
@@ -29,8 +29,6 @@ REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
 ALIKE = 2e-3
 """Bodies are alike if hair sits on them equally well up to this [m]."""
-MOST = 0.75
-"""Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +80,10 @@ def attach(
     if rig is not None:
         to_bind = rig.to_bind @ geom_bind(prim)
         joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
-        notes += turned or _spread(rig, path, joint, shares)
+        notes += turned or spread_over(rig, path, joint, shares)
         found = Attachment(
             rig=rig,
-            character=_carried_by(rig, joint),
+            character=carried_by(rig, joint),
             to_bind=to_bind,
             how=f"{why} (its own skel binding)",
             skinned=True,
@@ -143,7 +141,7 @@ def rig_joint(found: Attachment) -> str:
 def off_head(found: Attachment) -> bool:
     """Whether the carrying joint takes the part of a head that the rig has elsewhere, as it does for fur on a chest."""
     own = found.rig.character.humanoid.get("head")
-    return own not in (None, found.character.head) and found.character.head != _head_by_name(found.rig)
+    return own not in (None, found.character.head) and found.character.head != head_by_name(found.rig)
 
 
 def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
@@ -154,11 +152,11 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
-    notes += turned or _spread(rig, path, joint, shares)
+    notes += turned or spread_over(rig, path, joint, shares)
     notes += moved_away(path, rig, seat.roots) + unsure(prim, seat, placement)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
-    return Attachment(rig, _carried_by(rig, joint), seat.to_bind, how, False, at_default)
+    return Attachment(rig, carried_by(rig, joint), seat.to_bind, how, False, at_default)
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -222,8 +220,8 @@ def _by_own_binding(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> tuple
     indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
     turned = upside_down(prim, rig, to_bind)
     roots = ends(prim, last=bool(turned))
-    shares = _shares(rig, indices[roots], weights[roots])
-    return *_carrier(rig, shares, exact=True), shares, turned
+    shares = joint_shares(rig, indices[roots], weights[roots])
+    return *carrying_joint(rig, shares, exact=True), shares, turned
 
 
 def _of_roots(prim: Usd.Prim, seat: Seat, placement: Placement) -> tuple[Seat, list[str]]:
@@ -236,76 +234,5 @@ def _of_roots(prim: Usd.Prim, seat: Seat, placement: Placement) -> tuple[Seat, l
 
 def _by_seat(seat: Seat) -> tuple[int, str, np.ndarray]:
     """The joint, why and the shares for a groom that sits on a mesh, by the skin under its roots."""
-    shares = _shares(seat.rig, seat.mesh.indices[seat.points], seat.mesh.weights[seat.points])
-    return *_carrier(seat.rig, shares), shares
-
-
-def _shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Share (J,) of each joint in these influences."""
-    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
-    return shares / max(shares.sum(), 1e-12)
-
-
-def _spread(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
-    """The note on hair that one joint cannot carry: fur all over a body."""
-    names = [leaf(name) for name in rig.source.names]
-    # What hangs below a head is its face; what hangs below a spine is everything.
-    own = (
-        rig.character.skeleton.below(joint)
-        if joint == rig.character.humanoid.get("head")
-        else np.arange(len(names)) == joint
-    )
-    share = shares[own].sum()
-    if share >= MOST:
-        return []
-    rest = np.where(own, 0, shares)
-    others = [names[other] for other in np.argsort(-rest, kind="stable")[:3] if rest[other] > 0.02]
-    return [
-        f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
-        f"({', '.join(others)}) will leave the skin: split the groom by joint"
-    ]
-
-
-def _carrier(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
-    """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
-    names = rig.source.names
-    best = int(shares.argmax())
-    head = rig.character.humanoid.get("head")
-    if head is not None and best != head:
-        below = rig.character.skeleton.below(head)
-        single = shares[best] > (0.95 if exact else 0.8)
-        if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
-            return head, f"joint '{names[head]}'"
-    return best, f"joint '{names[best]}'"
-
-
-def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
-    """Whether a joint below the head never moves against it."""
-    joints = rig.clip.joints
-    relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
-    return bool(np.abs(relative - relative[0]).max() < 1e-4)
-
-
-def _carried_by(rig: StageRig, joint: int) -> Character:
-    head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
-    if head == joint:
-        return rig.character
-    below = head is not None and skeleton.below(head)[joint]
-    # A neck that the user calls the head does not make a part of it of the head that names find.
-    if below and not ("head" in rig.by_hand and joint == _head_by_name(rig)):
-        return replace(rig.character, carrier=joint)
-    return replace(rig.character, humanoid=_humanoid(rig, head=skeleton.names[joint]))
-
-
-def _head_by_name(rig: StageRig) -> int | None:
-    """The head, whatever was given by hand."""
-    try:
-        return _humanoid(rig)["head"]
-    except NoHead:
-        return None
-
-
-def _humanoid(rig: StageRig, **head: str) -> Humanoid:
-    skeleton = rig.character.skeleton
-    by_hand = {name: joint for name, joint in rig.by_hand.items() if name != "head"} | head
-    return find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
+    shares = joint_shares(seat.rig, seat.mesh.indices[seat.points], seat.mesh.weights[seat.points])
+    return *carrying_joint(seat.rig, shares), shares

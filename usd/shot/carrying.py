@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which joint of a rig carries hair, by the joints that the skin under it follows, and the character with that joint."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
+
+from ..skel.source import StageRig
+
+MOST = 0.75
+"""Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
+
+
+def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
+    """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
+    names = rig.source.names
+    best = int(shares.argmax())
+    head = rig.character.humanoid.get("head")
+    if head is not None and best != head:
+        below = rig.character.skeleton.below(head)
+        single = shares[best] > (0.95 if exact else 0.8)
+        if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
+            return head, f"joint '{names[head]}'"
+    return best, f"joint '{names[best]}'"
+
+
+def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Share (J,) of each joint in these influences."""
+    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
+    return shares / max(shares.sum(), 1e-12)
+
+
+def carried_by(rig: StageRig, joint: int) -> Character:
+    """The rig's character with the joint that carries a groom: its head, one below it, or else one that takes its part."""
+    head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
+    if head == joint:
+        return rig.character
+    below = head is not None and skeleton.below(head)[joint]
+    # A neck that the user calls the head does not make a part of it of the head that names find.
+    if below and not ("head" in rig.by_hand and joint == head_by_name(rig)):
+        return replace(rig.character, carrier=joint)
+    return replace(rig.character, humanoid=_humanoid(rig, head=skeleton.names[joint]))
+
+
+def spread_over(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
+    """The note on hair that one joint cannot carry: fur all over a body."""
+    names = [leaf(name) for name in rig.source.names]
+    # What hangs below a head is its face; what hangs below a spine is everything.
+    own = (
+        rig.character.skeleton.below(joint)
+        if joint == rig.character.humanoid.get("head")
+        else np.arange(len(names)) == joint
+    )
+    share = shares[own].sum()
+    if share >= MOST:
+        return []
+    rest = np.where(own, 0, shares)
+    others = [names[other] for other in np.argsort(-rest, kind="stable")[:3] if rest[other] > 0.02]
+    return [
+        f"{path}: only {share:.0%} of its roots move with joint '{names[joint]}', which carries all of it; the others "
+        f"({', '.join(others)}) will leave the skin: split the groom by joint"
+    ]
+
+
+def head_by_name(rig: StageRig) -> int | None:
+    """The head, whatever was given by hand."""
+    try:
+        return _humanoid(rig)["head"]
+    except NoHead:
+        return None
+
+
+def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
+    """Whether a joint below the head never moves against it."""
+    joints = rig.clip.joints
+    relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
+    return bool(np.abs(relative - relative[0]).max() < 1e-4)
+
+
+def _humanoid(rig: StageRig, **head: str) -> Humanoid:
+    skeleton = rig.character.skeleton
+    by_hand = {name: joint for name, joint in rig.by_hand.items() if name != "head"} | head
+    return find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
