@@ -57,6 +57,9 @@ def _turns(motion: Motion, source: Character, character: Character) -> dict[int,
     for name in TRUNK:
         if name in source.humanoid:
             found[name] = moved[:, source.humanoid[name]]
+    if motion.guessed:
+        for name, ends in _trunk_bones(source, character):
+            found[name] = found[name] @ _alignment(source, character, ends)
     found = _trunk_between(found)
     for side in ("left", "right"):
         for part, ends in LIMBS.items():
@@ -69,6 +72,12 @@ def _turns(motion: Motion, source: Character, character: Character) -> dict[int,
         if name in character.humanoid and name in found:
             result.setdefault(character.humanoid[name], found[name])
     return result
+
+
+def _trunk_bones(source: Character, character: Character) -> list[tuple[str, list[str]]]:
+    """Joints between hips and head, each with the ends of its bone: a rest pose found in a motion has a straight trunk."""
+    shared = [name for name in TRUNK if name in source.humanoid and name in character.humanoid]
+    return [(below, [below, above]) for below, above in zip(shared[1:], shared[2:])]
 
 
 def _trunk_between(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

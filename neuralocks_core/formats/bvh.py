@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
+from neuralocks_core.anatomy.upright import AXES, FEET, standing_axis, upright
 from neuralocks_core.character import Skeleton
 from neuralocks_core.formats.bvh_words import LARGEST, Words
 from neuralocks_core.motion import LARGEST_CLIP, Clip
@@ -29,15 +31,20 @@ class Motion:
 
     Attributes:
         name: the file's stem.
-        skeleton: joints; the bind pose is the one with all rotations zero, its root where the file's offset says.
-        clip: world transforms of these joints.
+        skeleton: joints; the bind pose is the one with all rotations zero, turned so that it stands along Y, its root
+            where the file's offset says; or a T-pose found in the motion where that one stands along no axis.
+        clip: world transforms of these joints, Y up.
         unit: metres per unit of the file, as used.
+        up: 'Y' or 'Z', the file's axis that is taken as up.
+        guessed: whether the bind pose is one found in the motion.
     """
 
     name: str
     skeleton: Skeleton
     clip: Clip
     unit: float
+    up: str = "Y"
+    guessed: bool = False
 
 
 def read_bvh(path: str | Path) -> Motion:
@@ -55,11 +62,22 @@ def read_bvh(path: str | Path) -> Motion:
     joints = _hierarchy(words)
     frames, step = _motion_header(words, joints)
     values = _values(words, frames, sum(len(joint.channels) for joint in joints))
-    unit = _likely_unit(joints)
-    skeleton, world = _forward(joints, values, unit)
-    first = _first_of_motion(world)
-    clip = Clip(np.arange(frames - first) * step, world[first:])
-    return Motion(path.stem, skeleton, clip, unit)
+    paths, parents, rest = _paths(joints), [joint.parent for joint in joints], _rest(joints)
+    try:
+        humanoid = find_humanoid(paths, parents, rest)
+    except NoHead:
+        humanoid = None
+    unit = _likely_unit(joints, rest, humanoid)
+    world = _forward(joints, values, unit)
+    world = world[_first_of_motion(world) :]
+    bind = np.tile(np.eye(4), (len(joints), 1, 1))
+    bind[:, :3, 3] = rest * unit
+    up, guessed = "Y", False
+    if humanoid is not None:
+        found = upright(bind, world, parents, humanoid)
+        bind, world, up, guessed = found.rest, found.world, found.up, found.guessed
+    clip = Clip(np.arange(len(world)) * step, world)
+    return Motion(path.stem, Skeleton(paths, parents, bind), clip, unit, up, guessed)
 
 
 @dataclass
@@ -155,18 +173,21 @@ def _values(words: Words, frames: int, width: int) -> np.ndarray:
     return values
 
 
-def _likely_unit(joints: list[_Joint]) -> float:
+def _likely_unit(joints: list[_Joint], rest: np.ndarray, humanoid: Humanoid | None) -> float:
     """The unit in which the skeleton, legs and trunk stretched out, is as high as a person."""
-    rest = _rest(joints)
+    stands = AXES["Y"] if humanoid is None else standing_axis(rest, humanoid)
     # From the lowest end of any chain to the highest, along the bones: bent or spread rest poses count in full.
-    length = np.zeros(len(joints))
-    up, down = [], []
+    length, reach = np.zeros(len(joints)), np.zeros(len(joints))
     for i, joint in enumerate(joints):
         if joint.parent >= 0:
             length[i] = length[joint.parent] + np.linalg.norm(joint.offset)
-        reach = length[i] + (0 if joint.end is None else np.linalg.norm(joint.end))
-        (up if rest[i, 1] >= rest[0, 1] else down).append(reach)
-    height = max(up, default=0) + max(down, default=0)
+        reach[i] = length[i] + (0 if joint.end is None else np.linalg.norm(joint.end))
+    if stands is None:
+        ends = [humanoid[name] for name in ("head", *FEET) if name in humanoid]
+        height = reach[ends[0]] + max(reach[ends[1:]], default=0) - 2 * length[humanoid["hips"]]
+    else:
+        up = (rest - rest[0]) @ stands >= 0
+        height = max(reach[up], default=0) + max(reach[~up], default=0)
     if not height > 0:
         return 1.0
     usual = [unit for unit in UNITS if 1.2 < 0.95 * height * unit < 2.4]
@@ -180,11 +201,18 @@ def _rest(joints: list[_Joint]) -> np.ndarray:
     return rest
 
 
-def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> tuple[Skeleton, np.ndarray]:
-    """Skeleton, and world transforms (T, J, 4, 4) [m]."""
+def _paths(joints: list[_Joint]) -> list[str]:
+    paths: list[str] = []
+    for i, joint in enumerate(joints):
+        path = joint.name if joint.parent < 0 else f"{paths[joint.parent]}/{joint.name}"
+        paths.append(path if path not in paths else f"{path}_{i}")
+    return paths
+
+
+def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> np.ndarray:
+    """World transforms (T, J, 4, 4) [m]."""
     world = np.tile(np.eye(4), (len(values), len(joints), 1, 1))
     column = 0
-    paths: list[str] = []
     for i, joint in enumerate(joints):
         channels = values[:, column : column + len(joint.channels)]
         column += len(joint.channels)
@@ -199,14 +227,9 @@ def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> tuple[Ske
         local = np.tile(np.eye(4), (len(values), 1, 1))
         local[:, :3, 3] = place * unit
         if axes:
-            turn = np.stack(angles, axis=-1) if len(axes) > 1 else angles[0]
-            local[:, :3, :3] = Rotation.from_euler(axes, turn, degrees=True).as_matrix()
+            local[:, :3, :3] = Rotation.from_euler(axes, np.stack(angles, axis=-1), degrees=True).as_matrix()
         world[:, i] = local if joint.parent < 0 else world[:, joint.parent] @ local
-        path = joint.name if joint.parent < 0 else f"{paths[joint.parent]}/{joint.name}"
-        paths.append(path if path not in paths else f"{path}_{i}")
-    bind = np.tile(np.eye(4), (len(joints), 1, 1))
-    bind[:, :3, 3] = _rest(joints) * unit
-    return Skeleton(paths, [joint.parent for joint in joints], bind), world
+    return world
 
 
 def _first_of_motion(world: np.ndarray) -> int:

@@ -10,8 +10,8 @@ import pytest
 from neuralocks_core.animation.retarget import retarget
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.formats.bvh import read_bvh
-from neuralocks_core.rotation import from_vector
-from tests.core.animation.written_bvh import NAMINGS, write_bvh
+from neuralocks_core.rotation import angle_between, from_vector
+from tests.core.animation.written_bvh import NAMINGS, Z_UP, along_x, along_x_mirrored, write_bvh
 from tests.shared_data import SHARED
 
 REAL = SHARED / "motion"
@@ -158,3 +158,56 @@ def test_written_steps_are_as_long_as_her_legs(woman, tmp_path):
     hers = np.linalg.norm(shin - thigh) + np.linalg.norm(foot - shin)
     hips = place(clip, woman, "hips")
     assert np.allclose(hips[1:] - hips[0], [[0, 0, 2 * hers], [0, hers / 4, 2 * hers]], atol=1e-6)
+
+
+BENT = {
+    "hips": (0, 0, -20),
+    **{f"{side}_shin": (0, 30, 0) for side in ("left", "right")},
+    "left_forearm": (0, 0, -60),
+    "right_forearm": (0, 0, 50),
+    "right_arm": (50, 0, 0),
+}
+"""What tells the hinges of all elbows and knees."""
+
+
+@pytest.mark.parametrize("up", ["Y", "Z"])
+@pytest.mark.parametrize("axes", [along_x, along_x_mirrored])
+def test_a_person_whose_zero_pose_is_no_pose_stands(woman, tmp_path, axes, up):
+    """Bones may all go along one axis of their joints: turned by nothing, head and feet are at one end then."""
+    frames = [{}, POSE, BENT, {}]
+    expected = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", frames)), woman)
+    path = write_bvh(tmp_path / "odd.bvh", frames, axes=axes, turn=Z_UP if up == "Z" else None)
+    motion = read_bvh(path)
+    assert (motion.unit, motion.up, motion.guessed) == (0.01, up, True)
+    clip = retarget(motion, woman)
+    limbs = [f"{s}_{p}" for s in ("left", "right") for p in ("upper_arm", "lower_arm", "upper_leg", "lower_leg")]
+    joints = [woman.humanoid[name] for name in ("hips", "head", *limbs)]
+    turns, same = (woman.relative_rotations(c.joints, joints) for c in (clip, expected))
+    assert np.degrees(angle_between(turns, same)).max() < 1e-3
+    hips = place(clip, woman, "hips")
+    assert np.allclose(hips, place(expected, woman, "hips"), atol=1e-3)
+    # The trunk's bones go where the source's go.
+    for child, joint, chain in (
+        ("neck", "upper_chest", ["hips", "chest"]),
+        ("head", "neck", ["hips", "chest", "neck"]),
+    ):
+        way = (place(clip, woman, child) - place(clip, woman, joint))[1]
+        bone = np.linalg.multi_dot([*(turned(*POSE[part]) for part in chain), [0, 9, 1 if child == "head" else 0]])
+        assert np.allclose(way / np.linalg.norm(way), bone / np.linalg.norm(bone), atol=1e-3)
+
+
+@pytest.mark.parametrize("zero", ["Y", "Z", "-Y"])
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_a_person_may_stand_along_another_axis(woman, tmp_path, up, zero):
+    """In the file, or before a turn of the root only."""
+    frames = [{}, POSE, BENT]
+    expected = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", frames)), woman)
+    turns = {"Y": np.eye(3), "Z": Z_UP, "-Y": np.diag([-1.0, -1, 1])}
+    path = write_bvh(tmp_path / "turned.bvh", frames, axes=lambda part: turns[zero].T, turn=turns[up])
+    motion = read_bvh(path)
+    if (zero, up) == ("Y", "Z"):
+        assert motion.up == "Y", "it may lie on its back: a zero pose that stands is believed"
+        return
+    assert (motion.unit, motion.up, motion.guessed) == (0.01, up, False)
+    clip = retarget(motion, woman)
+    assert np.allclose(clip.joints, expected.joints, atol=1e-6)

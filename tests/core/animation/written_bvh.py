@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion capture files written by tests: a person of twenty joints whose turns are known."""
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 BONES = {  # part: parent, offset from it in a T-pose [cm]; to the person's left is +X, to the front +Z
     "hips": (None, (0, 95, 0)),
@@ -54,6 +58,34 @@ POSER = {
     "foot": "{s}Foot",
 }
 NAMINGS = {"Mixamo": MIXAMO, "MotionBuilder": MOTION_BUILDER, "Poser": POSER}
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""Turns the person to stand along Z, looking along -Y, as Blender exports."""
+_NEXT = {"hips": "spine", "spine": "chest", "chest": "neck", "arm": "forearm", "forearm": "hand"} | {
+    "shoulder": "arm",
+    "thigh": "shin",
+    "shin": "foot",
+    "hand": "hand",
+}
+
+
+def along_x(part: str) -> np.ndarray:
+    """Axes (3, 3), columns, of a joint whose bone goes along its X; so all bones do where no joint is turned."""
+    side, _, limb = part.rpartition("_")
+    end = _NEXT.get(limb)
+    bone = np.array(BONES[f"{side}_{end}" if side else end][1] if end else (0, 1, 0), float)
+    if limb == "foot":
+        bone = np.array([0, 0, 1.0])
+    x = np.round(bone / np.abs(bone).max())
+    y = np.array([0, 0, 1.0]) if limb != "foot" else np.array([0, 1.0, 0])
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def along_x_mirrored(part: str) -> np.ndarray:
+    """The same, with bones of the right side along -X, and trunk and hips a quarter turn apart."""
+    axes = along_x(part)
+    if part == "hips":
+        return axes[:, [0, 2, 1]] * [1, 1, -1]
+    return axes * [-1, -1, 1] if part.startswith("right") else axes
 
 
 def write_bvh(
@@ -61,6 +93,8 @@ def write_bvh(
     frames: Sequence[Mapping[str, tuple[float, float, float]]],
     naming: str = "Mixamo",
     places: Sequence[tuple[float, float, float]] | None = None,
+    axes: Callable[[str], np.ndarray] | None = None,
+    turn: np.ndarray | None = None,
 ) -> Path:
     """A file of the person.
 
@@ -69,7 +103,13 @@ def write_bvh(
         frames: of each frame, turns about Z, X and Y [degrees], in this order, of parts that turn.
         naming: one of NAMINGS.
         places: of the hips in each frame [cm]; where they are at rest if left out.
+        axes: what each part's joint has as axes (3, 3), columns, in the T-pose; the world's if left out.
+        turn: of the whole take (3, 3).
     """
+    if axes or turn is not None:
+        axes, turn = axes or (lambda part: np.eye(3)), np.eye(3) if turn is None else turn
+        places = [turn @ place for place in places or [BONES["hips"][1]] * len(frames)]
+        frames = [_in_axes(frame, axes, turn) for frame in frames]
     order: list[str] = []
 
     def block(part: str, indent: str) -> list[str]:
@@ -81,7 +121,9 @@ def write_bvh(
         lines = [
             f"{'ROOT' if root else 'JOINT'} {name}",
             "{",
-            "  OFFSET {} {} {}".format(*BONES[part][1]),
+            "  OFFSET {} {} {}".format(
+                *(BONES[part][1] if root or not axes else axes(BONES[part][0]).T @ BONES[part][1])
+            ),
             f"  CHANNELS {'6 Xposition Yposition Zposition' if root else '3'} Zrotation Xrotation Yrotation",
             *(line for child in below for line in block(child, "  ")),
             *([] if below else ["  End Site", "  {", "    OFFSET 0 0 8", "  }"]),
@@ -96,3 +138,17 @@ def write_bvh(
         )
     path.write_text("\n".join(text) + "\n")
     return path
+
+
+def _in_axes(frame: Mapping, axes: Callable[[str], np.ndarray], turn: np.ndarray) -> dict:
+    """A frame's turns [degrees], in the T-pose's axes, as those of joints that have others."""
+    world, found = {}, {}
+    for part, (parent, _) in BONES.items():
+        local = Rotation.from_euler("ZXY", frame.get(part, (0, 0, 0)), degrees=True).as_matrix()
+        world[part] = (turn if parent is None else world[parent]) @ local
+        here = world[part] @ axes(part)
+        above = np.eye(3) if parent is None else world[parent] @ axes(parent)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of two angles whose sum alone is known, one is zero
+            found[part] = tuple(Rotation.from_matrix(above.T @ here).as_euler("ZXY", degrees=True))
+    return found

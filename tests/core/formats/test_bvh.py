@@ -61,6 +61,12 @@ def test_channels_turn_in_the_order_in_which_they_stand(tmp_path):
     assert np.allclose(motion.clip.joints[1, 1, :3, 3], [0.1 - 0.8, 0.9, 0])
 
 
+def test_a_joint_may_turn_about_one_axis_only(tmp_path):
+    text = TEXT.replace("CHANNELS 3 Zrotation Xrotation Yrotation\n  }", "CHANNELS 1 Xrotation\n  }")
+    turn = read_bvh(written(tmp_path, text.replace("  0 0 0\n", "  90\n"))).clip.joints[:, 2, :3, :3]
+    assert np.allclose(turn[0] @ [0, 1, 0], [0, 0, 1])
+
+
 def test_somebody_stands_a_twentieth_less_high_than_stretched_out(tmp_path):
     """2.5 m along the bones are 2.4 m of a person in centimetres, who may be a giant."""
     assert read_bvh(written(tmp_path, TEXT.replace("OFFSET 0 80 0", "OFFSET 0 140 0"))).unit == 0.01

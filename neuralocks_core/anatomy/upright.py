@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A captured skeleton and its motion, turned so that Y is up and the rest pose stands."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neuralocks_core import rotation
+from neuralocks_core.anatomy.humanoid import Humanoid
+from neuralocks_core.anatomy.rest_from_motion import rest_from_motion
+from neuralocks_core.anatomy.standing import FEET
+
+AXES = {"Y": np.array([0.0, 1, 0]), "Z": np.array([0.0, 0, 1])}
+"""The directions that files have up."""
+UPRIGHT = np.cos(np.radians(60))
+"""A trunk along Y is one that is less off it, as limbs may lie anyhow at rest; but legs that go up stand nowhere."""
+ALONG = np.cos(np.radians(30))
+"""Along other axes, legs and trunk both."""
+MOSTLY = np.cos(np.radians(45))
+"""A motion has an axis up if the middle one of its poses is less off it, from feet to head."""
+POSES = 200
+"""Poses of a motion that are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Upright:
+    """What `upright` found.
+
+    Attributes:
+        rest: world transforms (J, 4, 4) of a standing pose, Y up.
+        world: those of the motion (T, J, 4, 4), Y up.
+        up: 'Y' or 'Z', which of the file's axes was up.
+        guessed: whether `rest` is taken from the motion, because the file's own rest pose does not stand.
+    """
+
+    rest: np.ndarray
+    world: np.ndarray
+    up: str
+    guessed: bool
+
+
+def upright(rest: np.ndarray, world: np.ndarray, parents, humanoid: Humanoid) -> Upright:
+    """Turn a rest pose (J, 4, 4) and a motion (T, J, 4, 4); both come back as they are where the rest pose stands along Y.
+
+    Args:
+        rest: world transforms of the rest pose.
+        world: those of the motion, not empty.
+        parents: (J,) parent indices, -1 for roots.
+        humanoid: which joints are which.
+    """
+    stands = standing_axis(rest[:, :3, 3], humanoid)
+    if stands is not None and stands[1] == 1:
+        return Upright(rest, world, "Y", False)
+    up = _up_in_motion(world, humanoid, stands)
+    if up != "Y":
+        world = _turned(world, AXES[up])
+    if stands is not None:
+        return Upright(_turned(rest, stands), world, up, False)
+    some = world[np.linspace(0, len(world) - 1, min(POSES, len(world))).astype(int)]
+    found = rest_from_motion(some, parents, humanoid)
+    return Upright(rest if found is None else found, world, up, True)
+
+
+def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
+    """The axis (3,) along which a rest pose, places (J, 3), stands; None where it stands along none."""
+    trunk = _direction(places[humanoid["head"]] - places[humanoid["hips"]])
+    feet = [humanoid[name] for name in FEET if name in humanoid]
+    legs = _direction(places[humanoid["hips"]] - places[feet])  # each, as one may go up and the other down
+    if trunk[1] > UPRIGHT and (legs[:, 1] > -UPRIGHT).all():
+        return AXES["Y"]
+    for axis in np.concatenate([np.eye(3), -np.eye(3)]):
+        if feet and trunk @ axis > ALONG and (legs @ axis > ALONG).all():
+            return axis
+    return None
+
+
+def _up_in_motion(world: np.ndarray, humanoid: Humanoid, stands: np.ndarray | None) -> str:
+    """The axis that is up: along which most poses stand, or else the rest pose does, or else Y."""
+    places = world[:, :, :3, 3]
+    feet = [places[:, humanoid[name]] for name in FEET if name in humanoid]
+    low = np.mean(feet, axis=0) if feet else places[:, humanoid["hips"]]
+    middle = np.median(_direction(places[:, humanoid["head"]] - low), axis=0)
+    for name, axis in AXES.items():
+        if middle @ axis > MOSTLY:
+            return name
+    return "Z" if stands is not None and stands[2] == 1 else "Y"
+
+
+def _turned(transforms: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """World transforms (..., 4, 4) turned as a whole by quarters, so that an axis (3,) of theirs is Y."""
+    turn = np.eye(4)
+    turn[:3, :3] = rotation.between(up, AXES["Y"]).round()
+    return turn @ transforms
+
+
+def _direction(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
