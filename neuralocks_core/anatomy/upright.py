@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.anatomy.rest_from_motion import rest_from_motion
-from neuralocks_core.anatomy.standing import FEET
+from neuralocks_core.anatomy.standing import FEET, lies
 
 AXES = {"Y": np.array([0.0, 1, 0]), "Z": np.array([0.0, 0, 1])}
 """The directions that files have up."""
@@ -17,7 +17,9 @@ UPRIGHT = np.cos(np.radians(60))
 ALONG = np.cos(np.radians(30))
 """Along other axes, legs and trunk both."""
 MOSTLY = np.cos(np.radians(45))
-"""A motion has an axis up if the middle one of its poses is less off it, from feet to head."""
+"""A pose stands along an axis if it is less off it, from feet to head."""
+SELDOM = 0.02
+"""The share of poses that may be so by chance."""
 POSES = 200
 """Poses of a motion that are looked at."""
 
@@ -61,6 +63,12 @@ def upright(rest: np.ndarray, world: np.ndarray, parents, humanoid: Humanoid) ->
     return Upright(rest if found is None else found, world, up, True)
 
 
+def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
+    """Whether a motion, world transforms (T, J, 4, 4), Y up, shows a body that lies in more than half of its poses."""
+    some = world[np.linspace(0, len(world) - 1, min(POSES, len(world))).astype(int), :, :3, 3]
+    return bool(np.mean([lies(places, humanoid, AXES["Y"])[0] for places in some]) > 0.5)
+
+
 def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
     """The axis (3,) along which a rest pose, places (J, 3), stands; None where it stands along none."""
     trunk = _direction(places[humanoid["head"]] - places[humanoid["hips"]])
@@ -75,15 +83,15 @@ def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
 
 
 def _up_in_motion(world: np.ndarray, humanoid: Humanoid, stands: np.ndarray | None) -> str:
-    """The axis that is up: along which most poses stand, or else the rest pose does, or else Y."""
+    """The axis that is up: that of the rest pose if the body ever stands along it, else along which it mostly does, else Y."""
     places = world[:, :, :3, 3]
     feet = [places[:, humanoid[name]] for name in FEET if name in humanoid]
     low = np.mean(feet, axis=0) if feet else places[:, humanoid["hips"]]
-    middle = np.median(_direction(places[:, humanoid["head"]] - low), axis=0)
-    for name, axis in AXES.items():
-        if middle @ axis > MOSTLY:
-            return name
-    return "Z" if stands is not None and stands[2] == 1 else "Y"
+    body = _direction(places[:, humanoid["head"]] - low)
+    if stands is not None and stands[2] == 1 and (body[:, 2] > MOSTLY).mean() > SELDOM:
+        return "Z"
+    middle = np.median(body, axis=0)
+    return next((name for name, axis in AXES.items() if middle @ axis > MOSTLY), "Y")
 
 
 def _turned(transforms: np.ndarray, up: np.ndarray) -> np.ndarray:

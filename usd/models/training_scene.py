@@ -26,6 +26,7 @@ from ..shot.attach import attach
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.lacking import nothing_found
+from ..shot.motion_notes import motion_notes
 from ..shot.notes import first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
 from ..shot.stage import StageRig, read_rigs
@@ -91,7 +92,7 @@ def training_scene(
             found += _library(rig.character, seed, variations, progress or silent)
         else:
             found += _file(source, rig, head, notes)
-    clips = tuple(read_clip(path, rig.character) for path in motion)
+    clips = tuple(read_clip(path, rig.character, notes) for path in motion)
     if tell:
         tell(list(dict.fromkeys(notes)))
     return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
@@ -130,8 +131,13 @@ def _strands(groom: Groom, character: Character) -> StrandSet:
 
 
 @names_damage
-def read_clip(path: str, character: Character) -> Clip:
+def read_clip(path: str, character: Character, notes: list[str] | None = None) -> Clip:
     """Motion of a file on a character: BVH is retargeted, a skeleton of USD must have the same joints.
+
+    Args:
+        path: the file.
+        character: who shall move.
+        notes: to which what a user should know of BVH is added.
 
     Raises:
         NeuralocksError: it holds no such motion.
@@ -140,7 +146,11 @@ def read_clip(path: str, character: Character) -> Clip:
         from neuralocks_core.animation.retarget import retarget
         from neuralocks_core.formats.bvh import read_bvh
 
-        return retarget(read_bvh(path), character)
+        captured = read_bvh(path)
+        clip = retarget(captured, character)
+        if notes is not None:
+            notes += motion_notes(captured, clip.joints, character.humanoid)
+        return clip
     stage, names = open_stage(path), character.skeleton.names
     prims = find_skeletons(stage)
     if not prims:

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdGeom
 
+from neuralocks_core.anatomy.humanoid import NoHead
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
@@ -30,6 +32,7 @@ from ..shot.curves import find_curves
 from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
+from ..shot.motion_notes import motion_notes
 from ..shot.notes import (
     another_head,
     composition_notes,
@@ -252,8 +255,14 @@ def _motion(path: Path) -> dict:
         "frames": len(clip.times),
         "seconds": round(clip.end - clip.start, 3),
         "unit [m]": motion.unit,
+        "up axis": motion.up,
     }
-    return facts | {"stops": [], "spoils": []}
+    try:
+        humanoid = Character(motion.skeleton).humanoid
+    except NoHead:
+        lacking = f"{path.name}: no joint is named like a head, so it moves no character; rename its joints"
+        return facts | {"stops": [], "spoils": [lacking]}
+    return facts | {"stops": [], "spoils": motion_notes(motion, clip.joints, humanoid)}
 
 
 def as_text(facts: dict, indent: int = 0) -> str:
