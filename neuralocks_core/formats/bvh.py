@@ -17,6 +17,8 @@ from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import angle_between
 
 MOST_JOINTS = 2048
+LONGEST_STEP = 0.2
+"""[s] Of a longer frame time nobody moves; it is the rate, say."""
 LONGEST_NAME = 200
 """Characters of a joint's name that are kept."""
 MOST_NAMES = 2**24
@@ -145,20 +147,22 @@ def _name(words: Words) -> str:
 
 
 def _motion_header(words: Words, joints: list[_Joint]) -> tuple[int, float]:
-    words.expect("Frames:")
+    words.label("Frames")
     width = sum(len(joint.channels) for joint in joints)
     if not width:
         raise words.error("no joint has a channel")
     frames = words.count(int(LARGEST), "frames")
-    words.expect("Frame")
-    words.expect("Time:")
+    words.label("Frame Time")
     step = words.number()
     if not frames:
         raise words.error("holds no frame", "export the animated range")
     if frames * len(joints) > LARGEST_CLIP:
         raise words.error(f"{frames} frames of {len(joints)} joints are too many to hold", "cut the take")
-    if not 1e-5 < step < 100:
-        raise words.error(f"has a frame time of {step:g} s", "export it with the right rate")
+    if not 1e-5 < step <= LONGEST_STEP:
+        remedy = f"export it with the right rate, at most {LONGEST_STEP:g} s a frame"
+        if 1 <= step <= 1000:
+            remedy = f"write {1 / step:.6g} if that is frames a second, {step / 1000:.6g} if it is milliseconds"
+        raise words.error(f"has a frame time of {step:g} s", remedy)
     return frames, step
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The words of a BVH file, one after the other, and its frames as numbers."""
 
+import codecs
 import re
 from pathlib import Path
 
@@ -14,13 +15,16 @@ LARGEST = 1e6
 """No length in a file, in its own unit, is larger."""
 LONGEST_NUMBER = 64
 """Characters; an array of words is as wide as its longest one."""
-PIECE = 1 << 16
-"""Bytes of the frames that are made numbers at a time."""
-_WORD, _BREAK = re.compile(rb"\S+"), re.compile(rb"\s")
+PIECE = 1 << 15
+"""Bytes of the frames that are made numbers at a time, up to the end of the line, or twice as many."""
+_COMMENT = re.compile(rb"(?<![^\r\n])[ \t]*(?:#|//)[^\r\n]*")
+_WORD, _BREAK, _LINE = re.compile(_COMMENT.pattern + rb"|(\S+)"), re.compile(rb"\s"), re.compile(rb"[\r\n]")
+_UTF16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"H\0": "utf-16-le", b"\0H": "utf-16-be"}
+"""What a file in it begins with -> its name."""
 
 
 class Words:
-    """The file's words one by one, with errors that name it."""
+    """The file's words one by one, without lines of comment (`#`, `//`), with errors that name the file."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -29,17 +33,23 @@ class Words:
                 raise self.error("no such file", "check the path")
             if path.stat().st_size > LARGEST_FILE:
                 raise self.error(f"larger than {LARGEST_FILE} bytes", "cut the take")
-            self._content = path.read_bytes()
+            self._content = path.read_bytes().removeprefix(codecs.BOM_UTF8)
         except OSError as error:
             raise self.error(f"cannot be read ({error.strerror})", "check its permissions") from None
+        if wide := _UTF16.get(self._content[:2]):
+            self._content = self._content.decode(wide, "replace").encode()
         # One after the other: the words of a hostile file never become millions of Python objects.
         self._found, self._place = _WORD.finditer(self._content), 0
+        self._rest = ""
 
     def error(self, fact: str, remedy: str = "export it again as BVH") -> NeuralocksError:
         return NeuralocksError(f"{self.path}: {fact}; {remedy}")
 
     def next(self) -> str:
-        word = next(self._found, None)
+        if self._rest:
+            word, self._rest = self._rest, ""
+            return word
+        word = next((found for found in self._found if found[1]), None)
         if word is None:
             raise self.error("ends in the middle")
         self._place = word.end()
@@ -54,6 +64,15 @@ class Words:
         found = self.next()
         if found.lower() != word.lower():
             raise self.error(f"'{found[:40]}' stands where '{word}' should")
+
+    def label(self, label: str) -> None:
+        """Expect words and a colon, which may stand apart from them and right before what follows."""
+        found = self.next()
+        while ":" not in found and label.lower().startswith(found.lower()):
+            found += f" {self.next()}"
+        before, _, self._rest = found.partition(":")
+        if before.strip().lower() != label.lower():
+            raise self.error(f"'{found[:40]}' stands where '{label}:' should")
 
     def number(self) -> float:
         word = self.next()
@@ -75,9 +94,13 @@ class Words:
         """All that follows as numbers (n,), or so many of them where there are more."""
         values, start = [np.zeros(0)], self._place
         while most and start < len(self._content):
-            gap = _BREAK.search(self._content, start + PIECE)
+            gap = _LINE.search(self._content, start + PIECE, start + 2 * PIECE)
+            gap = gap or _BREAK.search(self._content, start + 2 * PIECE)
             end = gap.start() if gap else len(self._content)
-            block = self._content[start:end].split()[:most]
+            block = self._content[start:end]
+            if b"#" in block or b"//" in block:
+                block = _COMMENT.sub(b"", block)
+            block = block.split()[:most]
             if max(map(len, block), default=0) > LONGEST_NUMBER:
                 raise self.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
             try:

@@ -85,6 +85,12 @@ def test_somebody_stands_a_twentieth_less_high_than_stretched_out(tmp_path):
         ("OFFSET 0 80 0", "OFFSET 0 nan 0", "number"),
         ("OFFSET 0 80 0", "OFFSET 0 1e300 0", "number"),
         ("0.04", "0", "frame time"),
+        ("0.04", "0.5", "frame time of 0.5 s; export it with the right rate, at most 0.2 s"),
+        ("0.04", "30", "30 s; write 0.0333333 if that is frames a second, 0.03 if it is milliseconds"),
+        ("0.04", "33.333", "33.333 s; write 0.0300003 if .*, 0.033333 if it is milliseconds"),
+        ("Frames: 2", "Frames 2", "'Frames 2.* stands where 'Frames:' should"),
+        ("Frame Time: 0.04", "Frame Rate: 25", "'Frame.* stands where 'Frame Time:' should"),
+        ("10 90 0", "10 # 90 0", "no number"),
         ("10 90 0", "10 x 0", "no number"),
         ("10 90 0", "10 inf 0", "frame 1"),
         ("HIERARCHY", "MOTION", "HIERARCHY"),
@@ -96,6 +102,42 @@ def test_what_cannot_be_meant_is_said_in_one_line(tmp_path, old, new, fact):
     with pytest.raises(NeuralocksError, match=fact) as caught:
         read_bvh(written(tmp_path, TEXT.replace(old, new, 1)))
     assert "take.bvh" in str(caught.value) and "\n" not in str(caught.value) and ";" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("Frames: 2", "Frames:2"),
+        ("Frames: 2", "frames : 2"),
+        ("Frame Time: 0.04", "Frame Time:0.04"),
+        ("Frame Time: 0.04", "Frame Time : 0.04"),
+        ("HIERARCHY", "# made by hand\n  // { OFFSET\n#\n\nHIERARCHY"),
+        ("MOTION", "//the motion\r\nMOTION"),
+        ("10 90 0", "# here it turns\n10 90 0"),
+        ("10 90 0", " // here it turns\r\n10 90 0"),
+    ],
+)
+def test_what_other_programs_write_is_read(tmp_path, old, new):
+    assert old in TEXT
+    expected, found = (read_bvh(written(tmp_path, text)) for text in (TEXT, TEXT.replace(old, new, 1)))
+    assert np.array_equal(found.clip.joints, expected.clip.joints)
+    assert np.array_equal(found.clip.times, expected.clip.times)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_text_in_other_encodings_is_read(tmp_path, encoding):
+    expected = read_bvh(written(tmp_path)).clip.joints
+    (tmp_path / "take.bvh").write_bytes(TEXT.encode(encoding))
+    assert np.array_equal(read_bvh(tmp_path / "take.bvh").clip.joints, expected)
+
+
+def test_long_takes_may_hold_comments_anywhere(tmp_path):
+    lines = [f"{i} 90 0  0 0 0  0 0 0  0 0 0" for i in range(6000)]
+    text = TEXT[: TEXT.index("0 90 0  0 0 0")].replace("Frames: 2", "Frames: 6000")
+    assert sum(map(len, lines)) > 4 * PIECE
+    expected = read_bvh(written(tmp_path, text + "\n".join(lines))).clip.joints
+    found = read_bvh(written(tmp_path, text + "\n# a 1 2 comment 3\n".join(lines))).clip.joints
+    assert np.array_equal(found, expected)
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
