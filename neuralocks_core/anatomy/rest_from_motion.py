@@ -8,6 +8,7 @@ the hinge about which elbows and knees bend.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid
 
 NEAR = 30.0
@@ -88,8 +89,7 @@ def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray
     # Elbows bend to the front, knees to the back.
     across = np.cross(along, _FRONT if along[1] == 0 else -_FRONT)
     if np.linalg.norm(_in_joint(turns[:, upper], hinge)) < BENT:
-        swing = [Rotation.align_vectors(way[None], along[None])[0] for way in first + 1e-12 * along]
-        hinge = np.array([turn.apply(across) for turn in swing])
+        hinge = rotation.between(along, first + 1e-12 * along) @ across
     return {
         joint: _axes(turns[:, joint], bone, hinge, along, across)
         for joint, bone in ((upper, first), (lower, second), (end, second))

@@ -160,8 +160,9 @@ def _motion_header(words: Words, joints: list[_Joint]) -> tuple[int, float]:
         raise words.error(f"{frames} frames of {len(joints)} joints are too many to hold", "cut the take")
     if not 1e-5 < step <= LONGEST_STEP:
         remedy = f"export it with the right rate, at most {LONGEST_STEP:g} s a frame"
-        if 1 <= step <= 1000:
-            remedy = f"write {1 / step:.6g} if that is frames a second, {step / 1000:.6g} if it is milliseconds"
+        if 1 / LONGEST_STEP <= step <= 1000:
+            remedy = f"write {1 / step:.6g} if that is frames a second"
+            remedy += f", {step / 1000:.6g} if it is milliseconds" if step / 1000 <= LONGEST_STEP else ""
         raise words.error(f"has a frame time of {step:g} s", remedy)
     return frames, step
 

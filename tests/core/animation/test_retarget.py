@@ -196,6 +196,14 @@ def test_a_person_whose_zero_pose_is_no_pose_stands(woman, tmp_path, axes, up):
         assert np.allclose(way / np.linalg.norm(way), bone / np.linalg.norm(bone), atol=1e-3)
 
 
+def test_limbs_that_never_bend_are_not_twisted(woman, tmp_path):
+    frames = [{}, {"left_arm": (30, 0, 0)}, {"right_thigh": (0, -20, 0)}]
+    clips = [retarget(read_bvh(write_bvh(tmp_path / "take.bvh", frames, axes=axes)), woman) for axes in (None, along_x)]
+    joints = [woman.humanoid[f"{side}_{part}"] for side in ("left", "right") for part in ("lower_arm", "lower_leg")]
+    same, turns = (woman.relative_rotations(clip.joints, joints) for clip in clips)
+    assert np.degrees(angle_between(turns, same)).max() < 1e-3
+
+
 @pytest.mark.parametrize("zero", ["Y", "Z", "-Y"])
 @pytest.mark.parametrize("up", ["Y", "Z"])
 def test_a_person_may_stand_along_another_axis(woman, tmp_path, up, zero):

@@ -86,6 +86,7 @@ def test_somebody_stands_a_twentieth_less_high_than_stretched_out(tmp_path):
         ("OFFSET 0 80 0", "OFFSET 0 1e300 0", "number"),
         ("0.04", "0", "frame time"),
         ("0.04", "0.5", "frame time of 0.5 s; export it with the right rate, at most 0.2 s"),
+        ("0.04", "240", "240 s; write 0.00416667 if that is frames a second$"),
         ("0.04", "30", "30 s; write 0.0333333 if that is frames a second, 0.03 if it is milliseconds"),
         ("0.04", "33.333", "33.333 s; write 0.0300003 if .*, 0.033333 if it is milliseconds"),
         ("Frames: 2", "Frames 2", "'Frames 2.* stands where 'Frames:' should"),
