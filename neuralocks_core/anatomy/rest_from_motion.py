@@ -11,8 +11,12 @@ from scipy.spatial.transform import Rotation
 from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid
 
-NEAR = 30.0
+NEAR = 40.0
 """Where the body's axes are this near to those of a joint [degrees], they are meant to be the same."""
+SHORT = 0.05
+"""Bones that are shorter than this share of the trunk tell no direction."""
+INSTEP = np.radians(20)
+"""By how much the way from ankle to toes goes down where soles lie flat."""
 BENT = 0.05
 """Elbows and knees that bend less on average (sine) do not tell their hinge."""
 _LEFT, _UP, _FRONT = np.eye(3)
@@ -32,10 +36,10 @@ def rest_from_motion(world: np.ndarray, parents, humanoid: Humanoid) -> np.ndarr
         return None
     body = _trunk(turns, places, humanoid, *across)
     for side, sign in (("left", 1), ("right", -1)):
-        body |= _limb(
-            turns, places, humanoid, [f"{side}_{p}" for p in ("upper_arm", "lower_arm", "hand")], sign * _LEFT
-        )
-        body |= _limb(turns, places, humanoid, [f"{side}_{p}" for p in ("upper_leg", "lower_leg", "foot")], -_UP)
+        arm = [f"{side}_{part}" for part in ("upper_arm", "lower_arm", "hand")]
+        leg = [f"{side}_{part}" for part in ("upper_leg", "lower_leg", "foot")]
+        body |= _limb(turns, places, humanoid, arm, sign * _LEFT)
+        body |= _limb(turns, places, humanoid, leg, -_UP, _toes(places, parents, humanoid.get(leg[-1])))
         body |= _collar(turns, places, humanoid, side, sign * _LEFT)
     rest = np.tile(np.eye(4), (len(parents), 1, 1))
     for joint, parent in enumerate(parents):
@@ -67,19 +71,23 @@ def _across(places: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray, np.ndar
 def _trunk(turns, places, humanoid: Humanoid, low: np.ndarray, high: np.ndarray) -> dict[int, np.ndarray]:
     """Joint -> the body's axes (3, 3) in the joint's own, as columns: left, up, front."""
     names = [name for name in TRUNK if name in humanoid]
-    way = list(dict.fromkeys(humanoid[name] for name in names))
+    trunk = list(dict.fromkeys(humanoid[name] for name in names))
+    way = places[:, trunk]
+    least = SHORT * np.linalg.norm(way[:, -1] - way[:, 0], axis=1).mean()
     body = {}
     for name in reversed(names):  # the lowest name of a joint that has several counts
-        joint, rank = humanoid[name], way.index(humanoid[name])
-        below, above = (rank, rank + 1) if rank + 1 < len(way) else (rank - 1, rank)
+        joint = humanoid[name]
         across = low if name == "hips" else low + high if name in ("spine", "chest") else high
-        bone = places[:, way[above]] - places[:, way[below]]
+        rank = trunk.index(joint)
+        ways = [*(way[:, i] - way[:, rank] for i in range(rank + 1, len(trunk)))]
+        ways += [way[:, rank] - way[:, i] for i in reversed(range(rank))]
+        bone = next((each for each in ways if np.linalg.norm(each, axis=1).mean() > least), ways[0])
         body[joint] = _axes(turns[:, joint], bone, across, _UP, _LEFT)
     return body
 
 
-def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray) -> dict[int, np.ndarray]:
-    """The same for the joints of an arm or a leg, which in a T-pose lies along a direction (3,)."""
+def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray, toes=None) -> dict[int, np.ndarray]:
+    """The same for the joints of an arm or a leg, which in a T-pose lies along a direction (3,); `toes` is a joint of these."""
     if any(name not in humanoid for name in names):
         return {}
     upper, lower, end = (humanoid[name] for name in names)
@@ -90,10 +98,29 @@ def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray
     across = np.cross(along, _FRONT if along[1] == 0 else -_FRONT)
     if np.linalg.norm(_in_joint(turns[:, upper], hinge)) < BENT:
         hinge = rotation.between(along, first + 1e-12 * along) @ across
-    return {
-        joint: _axes(turns[:, joint], bone, hinge, along, across)
-        for joint, bone in ((upper, first), (lower, second), (end, second))
-    }
+    body = {upper: _axes(turns[:, upper], first, hinge, along, across)}
+    above, bone_above = upper, first
+    for joint in (lower, end):
+        here, there = _in_joint(turns[:, joint], second), _in_joint(turns[:, above], bone_above)
+        if joint == end and toes is not None:
+            way = places[:, toes] - places[:, end]
+            down = np.cos(INSTEP) * _FRONT - np.sin(INSTEP) * _UP
+            body[joint] = _between(turns[:, joint], way, turns[:, lower] @ body[lower] @ across, down, across)
+        elif _angle(here, there) < NEAR:
+            # The same axes lie along both bones, so others across them do, too: forearms turn about themselves.
+            body[joint] = body[above]
+        else:
+            body[joint] = _axes(turns[:, joint], second, hinge, along, across)
+        above, bone_above = joint, second
+    return body
+
+
+def _toes(places: np.ndarray, parents, foot: int | None) -> int | None:
+    """The joint below a foot that is farthest from it, if any is away from it."""
+    below = [joint for joint, parent in enumerate(parents) if parent == foot]
+    far = {joint: np.linalg.norm(places[:, joint] - places[:, foot], axis=1).min() for joint in below}
+    toes = max(far, key=far.get, default=None)
+    return toes if toes is not None and far[toes] > 1e-6 else None
 
 
 def _collar(turns, places, humanoid: Humanoid, side: str, along: np.ndarray) -> dict[int, np.ndarray]:
@@ -105,19 +132,26 @@ def _collar(turns, places, humanoid: Humanoid, side: str, along: np.ndarray) -> 
 
 
 def _axes(turns, bone, across, body_bone, body_across) -> np.ndarray:
-    """The body's axes in a joint's own (3, 3), columns, from two directions in the world (T, 3) and what they are in a T-pose;
-    the nearest axes of the joint where these are near.
-    """
-    here = _frame(_in_joint(turns, bone), _in_joint(turns, across))
-    axes = here @ _frame(body_bone, body_across).T
+    """The same as `_between`, or the nearest axes of the joint where these are near."""
+    axes = _between(turns, bone, across, body_bone, body_across)
     quarters = Rotation.create_group("O")
     off = np.degrees((quarters.inv() * Rotation.from_matrix(axes)).magnitude())
     return quarters[int(off.argmin())].as_matrix().round() if off.min() < NEAR else axes
 
 
+def _between(turns, bone, across, body_bone, body_across) -> np.ndarray:
+    """The body's axes in a joint's own (3, 3), columns, from two directions in the world (T, 3) and what they are in a T-pose."""
+    return _frame(_in_joint(turns, bone), _in_joint(turns, across)) @ _frame(body_bone, body_across).T
+
+
 def _in_joint(turns: np.ndarray, ways: np.ndarray) -> np.ndarray:
     """The mean (3,) of directions (T, 3) as seen from a joint that turns by (T, 3, 3)."""
     return np.einsum("tij,ti->j", turns, ways) / len(turns)
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    """Angle [degrees] between two directions (3,)."""
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
 def _frame(first: np.ndarray, second: np.ndarray) -> np.ndarray:
