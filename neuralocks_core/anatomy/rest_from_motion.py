@@ -79,7 +79,7 @@ def _trunk(turns, places, humanoid: Humanoid, low: np.ndarray, high: np.ndarray)
         joint = humanoid[name]
         across = low if name == "hips" else low + high if name in ("spine", "chest") else high
         rank = trunk.index(joint)
-        ways = [*(way[:, i] - way[:, rank] for i in range(rank + 1, len(trunk)))]
+        ways = [way[:, i] - way[:, rank] for i in range(rank + 1, len(trunk))]
         ways += [way[:, rank] - way[:, i] for i in reversed(range(rank))]
         bone = next((each for each in ways if np.linalg.norm(each, axis=1).mean() > least), ways[0])
         body[joint] = _axes(turns[:, joint], bone, across, _UP, _LEFT)

@@ -70,11 +70,11 @@ def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
 
 
 def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
-    """The axis (3,) along which a rest pose, places (J, 3), stands; None where it stands along none."""
+    """The axis (3,) along which a rest pose, places (J, 3), stands, Y for a head alone; None where it stands along none."""
     trunk = _direction(places[humanoid["head"]] - places[humanoid["hips"]])
     feet = [humanoid[name] for name in FEET if name in humanoid]
     legs = _direction(places[humanoid["hips"]] - places[feet])  # each, as one may go up and the other down
-    if trunk[1] > UPRIGHT and (legs[:, 1] > -UPRIGHT).all():
+    if not trunk.any() or trunk[1] > UPRIGHT and (legs[:, 1] > -UPRIGHT).all():
         return AXES["Y"]
     for axis in np.concatenate([np.eye(3), -np.eye(3)]):
         if feet and trunk @ axis > ALONG and (legs @ axis > ALONG).all():

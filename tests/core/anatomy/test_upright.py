@@ -46,3 +46,9 @@ def test_one_leg_up_and_one_down_is_no_stand():
     places[2, 1] = 0.2
     assert np.array_equal(standing_axis(places, humanoid), [0, 1, 0])
     assert np.array_equal(standing_axis(places[:, [1, 0, 2]] * [-1, 1, 1], humanoid), [-1, 0, 0])
+
+
+def test_a_head_alone_stands():
+    places = np.array([[0, 1, 0], [0.1, 0.9, 0], [-0.1, 0.9, 0]])
+    humanoid = {"hips": 0, "head": 0, "left_upper_arm": 1, "right_upper_arm": 2}
+    assert np.array_equal(standing_axis(places, humanoid), [0, 1, 0])
