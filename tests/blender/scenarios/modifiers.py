@@ -90,12 +90,11 @@ def left_out_of_the_file(folder: Path) -> None:
     make_live(rig, strands)
 
     def said() -> str:
-        steps = NEURALOCKS_OT_bake.steps(SimpleNamespace(filepath=str(folder / "bake.usdc")), bpy.context)
-        try:
-            while True:
-                next(steps)
-        except StopIteration as end:
-            return end.value
+        told: list[str] = []
+        operator = SimpleNamespace(filepath=str(folder / "bake.usdc"), report=lambda kind, line: told.append(line))
+        for _ in NEURALOCKS_OT_bake.steps(operator, bpy.context):
+            pass
+        return told[0]
 
     scenes.surface_deform(strands)
     assert said() == f"Baked to {folder / 'bake.usdc'}"

@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from dcc_addon.scene import curves
+from dcc_addon.services.trainers import Trainers
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused
 
@@ -32,7 +33,7 @@ def too_little_hair(folder: Path) -> None:
                 refused(begin, hair.name, fact)
         with (
             patch("dcc_addon.operators.training.sampling", side_effect=AssertionError("it was sampled")),
-            patch("dcc_addon.operators.training.problem", return_value=""),
+            patch("dcc_addon.operators.training._trainers", Trainers(lambda python: "")),
         ):
             refused(operators.train, hair.name, fact)
         assert not list(folder.glob("*.usdc")) and not hair.modifiers
