@@ -8,6 +8,7 @@ import pytest
 from pxr import Sdf, Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.network import RigSampler
 from usd.rig.bake import bake_rig
 from usd.rig.stage import BAKED, read_rigged_hair
 
@@ -43,5 +44,9 @@ def test_the_documents_show_how_python_turns_one_or_many():
     (example,) = re.findall(r"```python\n(from neuralocks_core\.rig.*?)```", text, re.S)
     names = {}
     exec(example.replace('"examples/mesh_hair', f'"{EXAMPLE.as_posix()}'), names)
-    assert names["turns"].shape == (3, *names["one"].shape) and names["one"].shape == (32, 4)
-    np.testing.assert_allclose(names["turns"][0], names["one"], atol=1e-6)
+    who, model = names["who"], names["model"]
+    rows = RigSampler(model.spec, who.character, who.clip).features([0.5, 1.0, 1.5])
+    for times in (rows, rows[:1]):  # no hat is in it
+        turns = model.evaluate(times)
+        assert turns.shape == (len(times), 32, 4)
+        np.testing.assert_allclose(names["turns"][: len(times)], turns, atol=1e-6)
