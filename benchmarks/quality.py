@@ -158,7 +158,7 @@ def main() -> None:
         for style in bench.styles:
             rows.append(measured(bench, style, kind, clip, times, models, sessions, arguments.floor))
     if arguments.json:
-        print(json.dumps(rows, indent=1))
+        print(json.dumps(rows, indent=1, default=float))
         return
     for by in ("kind", "style"):
         table(rows, by)
