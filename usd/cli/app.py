@@ -104,7 +104,8 @@ def inspect_command(
     as_json: AsJson = False,
 ) -> None:
     """Say what a file holds, and what would stop or spoil a bake of it."""
-    from ..review.inspect import as_text, inspect
+    from ..review.facts_text import as_text
+    from ..review.inspect import inspect
 
     facts = inspect(file, head, pairs(joint, "--joint"))
     if as_json:

@@ -7,7 +7,6 @@ import numpy as np
 from pxr import UsdGeom
 
 from neuralocks_core.anatomy.humanoid import NoHead
-from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import POSE_JOINTS
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -263,37 +262,3 @@ def _motion(path: Path) -> dict:
         lacking = f"{path.name}: no joint is named like a head, so it moves no character; rename its joints"
         return facts | {"stops": [], "spoils": [lacking]}
     return facts | {"stops": [], "spoils": motion_notes(motion, clip.joints, humanoid)}
-
-
-def as_text(facts: dict, indent: int = 0) -> str:
-    """The facts for a person to read."""
-    lines = []
-    pad = "  " * indent
-    for name, value in facts.items():
-        if name in ("stops", "spoils"):
-            continue
-        if isinstance(value, dict):
-            lines += [f"{pad}{name}:", as_text(value, indent + 1)]
-        elif name == "curve":  # of a long training: thousands of lines
-            lines.append(f"{pad}curve: {len(value)} points, in --json")
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
-            if len(value[0]) <= 3:
-                lines.append(f"{pad}{name}:")
-            for entry in value:
-                if len(entry) <= 3:  # a line each
-                    first, *others = entry.items()
-                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
-                    continue
-                lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
-        elif name == "joint names":
-            lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
-        elif isinstance(value, list):
-            lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
-        else:
-            lines.append(
-                f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
-            )
-    if indent == 0:
-        lines += [f"would stop a bake: {line}" for line in facts.get("stops", [])]
-        lines += [f"note: {line}" for line in facts.get("spoils", [])]
-    return "\n".join(line for line in lines if line)

@@ -6,7 +6,8 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from usd.review.inspect import as_text, inspect
+from usd.review.facts_text import as_text
+from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair, weight_notes
 

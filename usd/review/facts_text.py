@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The facts that `inspect` finds, as lines for a person."""
+
+from neuralocks_core.anatomy.joint_names import leaf
+
+
+def as_text(facts: dict, indent: int = 0) -> str:
+    """The facts for a person to read."""
+    lines = []
+    pad = "  " * indent
+    for name, value in facts.items():
+        if name in ("stops", "spoils"):
+            continue
+        if name == "curve":  # of a long training: thousands of lines
+            lines.append(f"{pad}curve: {len(value)} points, in --json")
+        elif name == "began with":  # each training tells the one that it went on from
+            lines.append(f"{pad}trainings before this one: {_trainings(value)}, in --json")
+        elif isinstance(value, dict):
+            lines += [f"{pad}{name}:", as_text(value, indent + 1)]
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            if len(value[0]) <= 3:
+                lines.append(f"{pad}{name}:")
+            for entry in value:
+                if len(entry) <= 3:  # a line each
+                    first, *others = entry.items()
+                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
+                    continue
+                lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
+        elif name == "joint names":
+            lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
+        elif isinstance(value, list):
+            lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
+        else:
+            lines.append(
+                f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
+            )
+    if indent == 0:
+        lines += [f"would stop a bake: {line}" for line in facts.get("stops", [])]
+        lines += [f"note: {line}" for line in facts.get("spoils", [])]
+    return "\n".join(line for line in lines if line)
+
+
+def _trainings(card) -> int:
+    """How many trainings a card tells of: its own, and those that it began with."""
+    count = 0
+    while isinstance(card, dict):
+        card, count = card.get("began with"), count + 1
+    return count
