@@ -7,6 +7,7 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.carrier import Carrier, Placing
 from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
@@ -35,6 +36,7 @@ class LiveHair:
         self._session = StrandSession(model, self._strands)
         say(1.0)
         self._resolver: Resolver | None = None
+        self._skin: RootSkin | None = None
         self._sampler: BoundarySampler | None = None
         self._boundary: SampledBoundary | None = None
         self._clip: Clip | None = None
@@ -47,6 +49,8 @@ class LiveHair:
     def follow(self, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
         if clip is not self._clip:
+            if self._clip is None or not np.array_equal(clip.shape, self._clip.shape):
+                self._skin = RootSkin(self.character, [self._strands], clip)
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
             self._boundary = SampledBoundary(self._sampler)
             self._held, self._shown = b"", b""
@@ -80,7 +84,8 @@ class LiveHair:
             self._session.anchor(self._sampler.held_bind(material))
             self._held = held
         matrix = to_local @ self.character.carrying(joints)
-        wanted = vector.tobytes(), matrix.tobytes(), joints.tobytes() if resolve else b""
+        shape = self._clip.shape_at([time])[0]
+        wanted = vector.tobytes(), matrix.tobytes(), shape.tobytes(), joints.tobytes() if resolve else b""
         if wanted == self._shown:
             return self._points
         self._shown = b""  # until it is done
@@ -90,19 +95,24 @@ class LiveHair:
             out = self._points[self._ends[strands.start] : self._ends[strands.stop]]
             self._carrier.carry(displacement, out, strands, placing)
 
-        if resolve and self.character.body is not None:
-            free = self._free(vector, joints, self._clip.shape_at([time])[0])
-            for strands in chunks(len(free)):
-                place(strands, free[strands])
+        resolve = resolve and self.character.body is not None
+        if resolve or self._skin.moves:
+            moved = self._moved(vector, joints, shape, resolve)
+            for strands in chunks(len(moved)):
+                place(strands, moved[strands])
         else:
             self._session.each(vector, place)
         self._shown = wanted
         return self._points
 
-    def _free(self, vector: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> np.ndarray:
-        """Displacement (S, 24, 3) [m] of the network, pushed out of the body."""
-        if self._resolver is None:
-            self._resolver = Resolver(self.character, self._strands, self._clip)
+    def _moved(self, vector: np.ndarray, joints: np.ndarray, shape: np.ndarray, resolve: bool) -> np.ndarray:
+        """Displacement (S, 24, 3) [m] of the network, on the skin that blend shapes move and pushed out of the body."""
         result = self._session.displacement(vector)
-        self._resolver.apply(result, joints, shape, self.model.map)
+        if resolve and self._resolver is None:
+            self._resolver = Resolver(self.character, self._skin.begun(self._strands), self._clip)
+
+        def push(moved: np.ndarray) -> None:
+            self._resolver.apply(moved, joints, shape, self.model.map)
+
+        self._skin.carry(result, shape, push if resolve else None)
         return result

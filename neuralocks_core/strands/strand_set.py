@@ -69,6 +69,10 @@ class StrandSet:
             facing=self.facing,
         )
 
+    def carried(self, offset: np.ndarray) -> StrandSet:
+        """The same strands, each moved as a whole by `offset` (S, 1, 3) [m], canonical; what a network reads of them stays."""
+        return replace(self, rest=self.rest + offset)
+
     @classmethod
     def joined(cls, sets: list[StrandSet]) -> StrandSet:
         """Strand sets of one head, one after the other; each keeps its own locks."""

@@ -53,3 +53,21 @@ def test_live_hair_leaves_an_arm_that_the_network_does_not_read():
     for resolve in (False, True):
         beside, within = (live.points(0.0, pose, np.eye(4), resolve=resolve).copy() for pose in poses)
         assert (np.abs(within - beside).max() > 0.01) == resolve
+
+
+def test_live_hair_rides_on_skin_that_blend_shapes_move():
+    """As a bake's does; what shapes the shot begins with is told by the clip that is followed."""
+    who, ball = character(), trimesh.creation.icosphere(3, 0.1)
+    joints, way = np.full((len(ball.vertices), 1), who.head), np.array([0.0, 0.03, 0.01])
+    shapes = {"up": np.tile(way, (len(ball.vertices), 1))}
+    who = replace(who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), shapes))
+    root = np.array([0.1, 1.68, 0])
+    points = (root + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])).astype(np.float32)
+    poses = np.tile(who.skeleton.bind, (2, 1, 1, 1))
+    live = LiveHair(Groom("hair", points, np.array([24]), None), who, StrandModel.load())
+    for resolve in (False, True):
+        live.follow(Clip([0.0, 1.0], poses, np.array([[0.0], [1.0]])))
+        begun, half, end = (live.points(t, poses[0], np.eye(4), resolve=resolve)[0].copy() for t in (0.0, 0.5, 1.0))
+        assert [half - begun, end - begun] == [pytest.approx(way / 2, abs=1e-6), pytest.approx(way, abs=1e-6)]
+        live.follow(Clip([0.0, 1.0], poses, np.zeros((2, 1))))
+        assert live.points(1.0, poses[0], np.eye(4), resolve=resolve)[0] == pytest.approx(begun, abs=1e-6)

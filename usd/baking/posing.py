@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.deformation.resolve import Resolver, reach
+from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel, chunks
@@ -52,9 +53,11 @@ class GroomPoser:
             ends = np.cumsum([0, *(len(each.rest) for each in sets)])
             self._rows = [slice(first, end) for first, end in zip(ends, ends[1:])]  # of each groom among all strands
             self._session.anchor(self._sampler.held_bind(self._material))
+            self._skin = RootSkin(character, sets, self._rig.clip)
+            begun = self._skin.begun(self.strands)
             if resolve and character.body is not None:
                 self._resolvers = [
-                    (rows, Resolver(character, self.strands.subset(rows), self._rig.clip)) for rows in self._alike()
+                    (rows, Resolver(character, begun.subset(rows), self._rig.clip)) for rows in self._alike()
                 ]
                 for _, resolver in self._resolvers:
                     resolver.prepare()
@@ -67,7 +70,7 @@ class GroomPoser:
     def points(self, time_code: float) -> np.ndarray:
         """Points (P, 3) float32 at a time code of all grooms, one after the other, each in its prim's own space and units."""
         joints, (first, *others) = self._rig.joints_at(time_code), self._placers
-        if not self._resolvers and not others:
+        if not (self._resolvers or self._skin.moves or others):
             placed = first.at(time_code, joints)
             self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
@@ -88,16 +91,19 @@ class GroomPoser:
 
     def _displacement(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         moved = self._session.displacement(self._vector(time_code, joints))
-        if self._resolvers:
-            shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
-            for rows, resolver in self._resolvers:
-                part = moved[rows]
-                resolver.apply(part, joints, shape, self._model.map)
-                if not isinstance(rows, slice):  # else it is a view
-                    moved[rows] = part
-            if moved.nbytes > LARGE:
-                give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
+        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+        self._skin.carry(moved, shape, lambda moved: self._push(moved, joints, shape))
+        if self._resolvers and moved.nbytes > LARGE:
+            give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
         return moved
+
+    def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
+        """Push displaced strands out of the body, in place."""
+        for rows, resolver in self._resolvers:
+            part = moved[rows]
+            resolver.apply(part, joints, shape, self._model.map)
+            if not isinstance(rows, slice):  # else it is a view
+                moved[rows] = part
 
     def _alike(self) -> list[slice | np.ndarray]:
         """Strands of grooms with the same part of the body in their reach: each groom is moved as if it were alone."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import RUN_IN, simulated
 from neuralocks_core.files import as_path
@@ -105,27 +106,31 @@ class _SimulatedPoser:
         times = np.unique([clip.start - RUN_IN * loop, *wanted])
         self._row = dict(zip(codes, np.searchsorted(times, wanted), strict=True))
         character = item.attachment.character
+        self._skin = RootSkin(character, [every], clip)
+        begun = self._skin.begun(every)
         self._moved = simulated(
-            character, every.subset(chosen), clip, times, material, volume=volume, progress=progress
+            character, begun.subset(chosen), clip, times, material, volume=volume, progress=progress
         )
         mean = every.rest.mean(axis=1)
         self._chosen = chosen
         self._others = np.setdiff1d(np.arange(len(mean)), chosen)
         self._nearest = cKDTree(mean[chosen]).query(mean[self._others])[1]
-        self._resolver = Resolver(character, every.subset(self._others), clip)
+        self._resolver = Resolver(character, begun.subset(self._others), clip)
 
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32, in the prim's own space and units."""
         joints, row = self._rig.joints_at(time_code), self._moved[self._row[time_code]]
+        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
         moved = np.empty((len(self._chosen) + len(self._others), *row.shape[1:]), np.float32)
-        moved[self._chosen], moved[self._others] = row, self._resolved(row[self._nearest], time_code, joints)
+        moved[self._chosen], moved[self._others] = row, row[self._nearest]
+        self._skin.carry(moved, shape, lambda moved: self._push(moved, joints, shape))
         return self._placer.points(time_code, joints, lambda strands: moved[strands])
 
-    def _resolved(self, followed: np.ndarray, time_code: float, joints: np.ndarray) -> np.ndarray:
-        """Displacement (n, 24, 3) of the strands that follow, kept out of the body: they lie elsewhere than those that they
-        follow, which the solver kept out of it.
+    def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
+        """Keep the strands that follow out of the body, in place: they lie elsewhere than those that they follow, which the
+        solver kept out of it.
         """
-        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+        followed = moved[self._others]
         with ThreadPoolExecutor(cores()) as pool:
             self._resolver.apply(followed, joints, shape, pool.map)
-        return followed
+        moved[self._others] = followed

@@ -10,6 +10,7 @@ import numpy as np
 
 from neuralocks_core import metrics
 from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation import comparison
@@ -96,9 +97,13 @@ class _Subject:
         self.baked, self.item, self.say = baked, item, say
         self.character, groom = item.attachment.character, item.groom
         every = strands_on(self.character, groom)
+        clip = item.attachment.rig.clip
+        skin, shapes = RootSkin(self.character, [every], clip), clip.shape_at(baked.times)
+        begun = skin.begun(every)
         # The strands that a solver moved are the first choice of seed 0: those that follow them must be met, too.
         self.chosen = whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
+        self._begun = begun.subset(self.chosen)
         self.valid = int(every.valid.sum())
         arc, length = arc_lengths(groom)
         self._within(groom, arc, length)
@@ -106,7 +111,7 @@ class _Subject:
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
         self.moved = np.zeros((total, count, K, 3), np.float32)
-        self.own_rest = rest[self._own]
+        self.own_rest = rest[self._own] + (begun.rest[:, 0] - every.rest[:, 0])[groom.strand_of_point[self._own]]
         self.own = np.zeros((total, len(self._own), 3), np.float32)
         self.bends = OwnBends(groom, self.chosen, arc, rest, total)
         sums, taut = [], []
@@ -117,6 +122,8 @@ class _Subject:
             taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
             self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
+            if skin.moves:  # what hair does is measured against the skin that it is on
+                self.moved[frame] -= skin.moved(shapes[frame])[self.chosen]
             self.own[frame] = points[self._own]
             self.bends.read(frame, offset)
             say(frame + 1, total, f"reading {item.path}")
@@ -231,7 +238,7 @@ class _Subject:
         """Rows and tip curves beside the reference."""
         strands, times = self.strands, self.baked.times
         few = whole_locks(strands, REFERENCE_STRANDS)
-        some = strands.subset(few)
+        some = self._begun.subset(few)
         clip = self._clip
         # The network knows what came before the first frame baked, so the reference must, too.
         begun = times[0] - comparison.RUN_IN
@@ -268,4 +275,4 @@ class _Subject:
 
     @cached_property
     def _resolver(self) -> Resolver:
-        return Resolver(self.character, self.strands, self.item.attachment.rig.clip)
+        return Resolver(self.character, self._begun, self.item.attachment.rig.clip)

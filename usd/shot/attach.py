@@ -23,7 +23,7 @@ from .carrying import carried_by, carrying_joint, head_by_name, joint_shares, sp
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
-from .seat_notes import lies_off_skin, moved_away, not_pinned, upside_down
+from .seat_notes import lies_off_skin, not_pinned, upside_down
 
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
@@ -153,7 +153,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     joint, why, shares = _by_seat(seat)
     path = str(prim.GetPath())
     notes += turned or spread_over(rig, path, joint, shares)
-    notes += moved_away(path, rig, seat.roots) + unsure(prim, seat, placement)
+    notes += unsure(prim, seat, placement)
     how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
     return Attachment(rig, carried_by(rig, joint), seat.to_bind, how, False, at_default)

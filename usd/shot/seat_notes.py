@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on how a groom sits on skin: off it, upside down, drawn from above it, or on a face that moves away below it."""
+"""Notes on how a groom sits on skin: off it, upside down, or drawn from above it."""
 
 import numpy as np
 from pxr import Usd
@@ -12,8 +12,6 @@ from ..skel.source import StageRig
 from .curve_ends import Beyond
 from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends
 
-MOVES = 0.002
-"""Skin that blend shapes move by less [m] stays with its roots."""
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
 LEVEL = 0.001
@@ -82,23 +80,4 @@ def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool, beyond: Beyond | None
     return [
         f"{prim.GetPath()}: its curves are not pinned, so they are drawn from their second points on, but the first ones lie "
         "on the skin and are taken for the roots; set their wrap to pinned"
-    ]
-
-
-def moved_away(path: str, rig: StageRig, roots: np.ndarray) -> list[str]:
-    """The note on a groom whose skin a blend shape moves during the shot; its roots (n, 3) in bind world [m]."""
-    body, spans = rig.character.body, np.ptp(rig.clip.shape, axis=0)
-    if body is None or not spans.any():
-        return []
-    below = cKDTree(body.points).query(roots)[1]
-    ways = {
-        name: span * float(np.percentile(np.linalg.norm(offsets[below], axis=1), 90))
-        for (name, offsets), span in zip(body.shapes.items(), spans, strict=True)
-    }
-    name = max(ways, key=ways.get)
-    if ways[name] < MOVES:
-        return []
-    return [
-        f"{path}: blend shape '{name}' moves the skin below it by up to {1000 * ways[name]:.2g} mm; its roots stay with the "
-        "joint that carries them"
     ]

@@ -13,7 +13,7 @@ from dcc_addon.services.axes import to_core
 from dcc_addon.session import session
 from neuralocks_core.rotation import transformed
 from tests.blender import scenes
-from tests.blender.checks import make_live, refused
+from tests.blender.checks import SAME, apart, baked_points, make_live, points_at, refused
 
 
 def body_as_drawn(_folder: Path) -> None:
@@ -214,3 +214,33 @@ def drawn_elsewhere(_folder: Path) -> None:
     some.add([v.index for v in body.data.vertices], 0.3, "REPLACE")
     body.modifiers[0].vertex_group = "some"
     assert f"Vertex Group of '{body.modifiers[0].name}'" in said()
+
+
+def hair_on_a_face(folder: Path) -> None:
+    """Hair rides on skin that a shape key moves, by as much in the viewport as in a bake; without the key it is as it was."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    body, strands = scenes.body(rig), scenes.hair(rig, 20)
+    body.shape_key_add(name="Basis")
+    frown = body.shape_key_add(name="Frown")
+    head = body.vertex_groups["head"].index
+    for vertex, point in zip(body.data.vertices, frown.data):
+        if any(group.group == head for group in vertex.groups):
+            point.co.z -= 0.02
+    for frame in (1, 24):
+        frown.value = (frame - 1) / 23
+        frown.keyframe_insert("value", frame=frame)
+    make_live(rig, strands)
+    moved = {frame: points_at(strands, frame) for frame in (1, 12, 24)}
+    values = {}
+    for frame in moved:
+        bpy.context.scene.frame_set(frame)
+        values[frame] = frown.value
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "face.usdc")) == {"FINISHED"}
+    for frame, points in moved.items():
+        assert apart(baked_points(folder / "face.usdc", "/Character/Hair_Hair", frame), points) < SAME, frame
+    frown.mute = True
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for frame, points in moved.items():
+        roots = np.linalg.norm((points - points_at(strands, frame)).reshape(20, -1, 3)[:, 0], axis=1)
+        assert np.allclose(roots.max(), 0.02 * values[frame], atol=1e-5), (frame, roots)
