@@ -40,8 +40,15 @@ class FolderLock:
             raise cannot_write(subject, error) from None
         raise NeuralocksError(f"{subject}: {busy}")
 
+    @property
+    def held(self) -> bool:
+        """Whether the folder is still held."""
+        return not self._lock.closed
+
     def release(self) -> None:
-        """Let go of the folder, and remove it if nothing else is in it."""
+        """Let go of the folder, and remove it if nothing else is in it; nothing happens where that was done before."""
+        if not self.held:
+            return
         if os.name == "nt":
             self._lock.close()  # Windows removes no open file
         with suppress(OSError):  # another process has it, or something is kept in it

@@ -119,7 +119,11 @@ class Spool:
             self.discard()
 
     def discard(self) -> None:
-        """Remove what is ours, and the folder and those made for an output that was not written if nothing else is in them."""
+        """Remove what is ours, and the folder and those made for an output that was not written if nothing else is in them; once
+        the folder is let go of, what is in it may be another bake's, and stays.
+        """
+        if not self._lock.held:
+            return
         # Before the lock is given up: another process that takes it would lose what is its own.
         for path in list(self.folder.glob("*")):
             if re.fullmatch(rf"{_FRAME}|{_PART}|inputs", path.name):

@@ -121,6 +121,19 @@ def test_the_folder_is_locked_until_it_is_gone(tmp_path, monkeypatch):
     assert len(removed) == 2 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("ending", ["close", "discard"])
+def test_a_bake_that_fails_once_it_let_go_of_the_folder_leaves_it_to_the_next(tmp_path, ending):
+    done = Spool(tmp_path / "bake.usdc", "a")
+    done.layer_path.write_bytes(b"layer")
+    done.finish()
+    following = Spool(tmp_path / "bake.usdc", "a")
+    following.write(0, 1.0, np.ones((2, 3)))
+    getattr(done, ending)()
+    assert following.read(0, 1.0, slice(0, 2)).all() and (following.folder / "lock").exists()
+    following.discard()
+    assert [path.name for path in tmp_path.iterdir()] == ["bake.usdc"]
+
+
 @pytest.mark.parametrize("ending", ["finish", "close", "discard"])
 def test_what_a_user_put_into_the_folder_stays(tmp_path, ending):
     folder = tmp_path / ".bake.usdc.baking"
