@@ -10,10 +10,7 @@ from .scene_writer import ROOT
 
 def is_own(path) -> bool:
     """Whether a file is a bake, of strands or bones, or a shot that `scene_writer` wrote."""
-    try:
-        layer = Sdf.Layer.OpenAsAnonymous(str(path))
-    except Tf.ErrorException:  # no USD file, or a damaged one
-        return False
+    layer = _layer(path)
     if layer is None:
         return False
     found: list[Sdf.Path] = []
@@ -24,9 +21,13 @@ def is_own(path) -> bool:
 
 def character_of(path) -> str:
     """Whose shot a file is, as its application calls the character; empty where that is not told."""
-    try:
-        layer = Sdf.Layer.OpenAsAnonymous(str(path))
-    except Tf.ErrorException:
-        return ""
+    layer = _layer(path)
     prim = layer.GetPrimAtPath(ROOT) if layer else None
     return prim.GetInfo("displayName") if prim else ""
+
+
+def _layer(path) -> Sdf.Layer | None:
+    try:
+        return Sdf.Layer.OpenAsAnonymous(str(path))
+    except Tf.ErrorException:  # no USD file, or a damaged one
+        return None
