@@ -97,6 +97,7 @@ def _find_seat(
     roots: np.ndarray, when: float | None, rig: StageRig, placement: Placement, within: float
 ) -> Seat | None:
     best = None
+    drifts = None if when is not None or not rig.meshes else _drifts(rig, placement)  # the same for all meshes
 
     def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
@@ -109,7 +110,7 @@ def _find_seat(
 
     for likely in (True, False):
         for mesh, tree in zip(rig.meshes, rig.skins, strict=True):
-            for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely)):
+            for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
                 best = nearest(best, mesh, tree, (not likely, place), to_bind)
         if best is not None and best.distance <= NEAR:
             break
@@ -123,6 +124,7 @@ def ways(
     when: float | None = None,
     *,
     likely: bool = True,
+    drifts: tuple[float, float] | None = None,
 ) -> list[np.ndarray]:
     """Candidates (4, 4) for the way from the groom's own space to bind world, the likeliest first.
 
@@ -132,6 +134,7 @@ def ways(
         placement: where the groom's prim stands.
         when: time code at which the groom has the points it is read with, if they are no points at rest.
         likely: those that serve unless skin says otherwise, or the others.
+        drifts: as `_drifts` has them, where that was asked before.
     """
     groom = placement.reference
     still = []
@@ -142,7 +145,7 @@ def ways(
         return still if likely else []
     if when is not None:  # it is seen where it is then
         return [_posed(rig, placement, when)] if likely else still
-    with_skeleton, with_head = _drifts(rig, placement)
+    with_skeleton, with_head = drifts or _drifts(rig, placement)
     if with_skeleton <= STEADY:
         # Or it was made where the character stands when its motion begins, or the shot.
         return still if likely else [_posed(rig, placement, code) for code in beginnings(rig)]
@@ -157,10 +160,11 @@ def ways(
 
 def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
     """The note on a groom that moves with neither skeleton nor head, if another of its likely places is on the skin, too."""
-    if moment(prim) is not None or not seat.rig.source.animated or min(_drifts(seat.rig, placement)) <= STEADY:
+    drifts = _drifts(seat.rig, placement)
+    if moment(prim) is not None or min(drifts) <= STEADY:
         return []
     back = np.linalg.inv(seat.to_bind)
-    places = [transformed(seat.roots, way @ back) for way in ways(seat.rig, seat.mesh, placement)]
+    places = [transformed(seat.roots, way @ back) for way in ways(seat.rig, seat.mesh, placement, drifts=drifts)]
     near = [roots for roots in places if np.median(seat.tree.query(roots)[0]) <= NEAR]
     apart = max((float(np.median(np.linalg.norm(roots - seat.roots, axis=1))) for roots in near), default=0.0)
     if apart < APART:
@@ -208,11 +212,13 @@ def _carried(rig: StageRig, when: float) -> np.ndarray:
 
 
 def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
-    """How much a prim moves against an animated skeleton, and against its head; (0, 0) where it stands still."""
-    if not placement.samples:
+    """How much a prim moves against a skeleton, and against its head; (0, 0) where either stands still, infinity for the head
+    where the skeleton's place moves the prim.
+    """
+    if not placement.samples or not rig.source.animated:
         return 0.0, 0.0
     with_skeleton = _drift(placement, rig.source.placement.at)
-    if with_skeleton <= STEADY:  # against the head is not asked
+    if with_skeleton <= STEADY:
         return with_skeleton, np.inf
     return with_skeleton, _drift(
         placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core
