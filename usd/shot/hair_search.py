@@ -88,7 +88,8 @@ class HairSearch:
         self._notes += [too_far(prim, found, named=True)] if found.far else []
         carrying = replace(found.rig, character=found.character)
         away, joint = off_head(found), leaf(rig_joint(found))
-        if away and not any(f"{joint}'" in note for note in self._notes[told:]):
+        # A note on the joint itself; a blend shape may have its name.
+        if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
             self._off_head.append(f"{path}: rides on '{joint}', not on a head")
         measured = [] if away else untrained(carrying)  # a chest has not a head's measures
         self._notes += moved_as_open(prim) + left_as_they_are(prim) + measured + unevenly_scaled(carrying)
