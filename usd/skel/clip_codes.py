@@ -66,11 +66,11 @@ def _after_steps(samples: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndar
     """Ascending samples (n,) without those on the earlier sides of steps, and where the steps are then (m,)."""
     gaps = np.diff(samples, prepend=-np.inf, append=np.inf)
     first = np.flatnonzero(gaps[:-1] >= STEP * frame)  # of each run of close samples
+    if len(first) == 1:
+        return samples, samples[:0]  # this is all the motion there is
     last = np.append(first[1:], len(samples)) - 1
     span = samples[last] - samples[first]
     step = (first < last) & (span < STEP * frame) & (ALONE * span < np.minimum(gaps[first], gaps[last + 1]))
-    if len(first) == 1:
-        return samples, samples[:0]  # this is all the motion there is
     kept = np.ones(len(samples), bool)
     for i, j in zip(first[step], last[step]):
         kept[i:j] = False
