@@ -66,11 +66,11 @@ def leaf(path: str) -> str:
 
 def carrier(head: str, *paths: str) -> str:
     """The own name of the joint from which the head and some other joints hang, all given by their paths; where they share
-    none, that of the root above the first of the others.
+    none, that of the root above the first of the others. None hangs from itself: the head's carrier is the joint above it.
     """
-    own = [path.strip("/").split("/") for path in paths]
-    shared = commonprefix([head.strip("/").split("/"), *own])
-    return shared[-1] if shared else own[0][0]
+    others = [path.strip("/").split("/") for path in paths]
+    shared = commonprefix([head.strip("/").split("/"), *(names[:-1] for names in others)])
+    return shared[-1] if shared else others[0][0]
 
 
 def without_namespace(name: str) -> str:

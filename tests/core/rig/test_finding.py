@@ -144,7 +144,8 @@ def test_joint_orients_and_facing_cancel():
         ([], None, "no hair chains"),
         (tail("hair", 3, step=(0, 0, 0)), None, "has no length"),
         (tail("hair", 2), ["nothing*"], "no joint has such a name"),
-        (tail("hair", 2), ["chest"], "does not hang below"),
+        (tail("hair", 2), ["chest"], "'chest' does not hang below the head joint 'head', but from 'hips'"),
+        (tail("hair", 2), ["head"], "but from 'neck': name that with --head neck"),
     ],
 )
 def test_bad_rigs_are_refused(extra, patterns, words):
