@@ -45,12 +45,12 @@ def find_chains(
         others = ", ".join(leaf(skeleton.names[j]) for j in skeleton.children[head][:8]) or "nothing"
         remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
         elsewhere = [j for j in np.flatnonzero(~skeleton.below(head)) if says_hair(skeleton.names[j])]
-        carrier = skeleton.parents[elsewhere[0]] if elsewhere else -1
+        holder = skeleton.parents[elsewhere[0]] if elsewhere else -1
         bare = [j for j in np.flatnonzero(skeleton.below(head)) if j != head and says_hair(skeleton.names[j])]
         if meshes and bare:
             remedy = f"'{leaf(skeleton.names[bare[0]])}' drives no vertex of a mesh: bind the hair's mesh to it"
-        if carrier >= 0:
-            first, above = leaf(skeleton.names[elsewhere[0]]), leaf(skeleton.names[carrier])
+        if holder >= 0:
+            first, above = leaf(skeleton.names[elsewhere[0]]), leaf(skeleton.names[holder])
             remedy = f"'{first}' hangs from '{above}': name that with --head {above}"
         raise NoHairChains(
             f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); {remedy}"
