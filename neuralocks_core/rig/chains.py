@@ -129,8 +129,8 @@ class HairChains:
         return replace(self, names=renamed) if renamed else self
 
     def match(self, names, below: np.ndarray) -> np.ndarray:
-        """Indices (N,) of these joints among `names`, joint paths or their last parts, those for which `below` (J,) says
-        that they hang from the head: what a tail or a coat calls its joints is its own matter.
+        """Indices (N,) of these joints among `names`, joint paths, those for which `below` (J,) says that they hang from the
+        head: what a tail or a coat calls its joints is its own matter.
 
         Raises:
             NeuralocksError: one is missing or ambiguous, that is, the model was trained for other chains.
