@@ -203,8 +203,8 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
     that motion, so that small motion counts as much as large, `settling` the same of one frame difference, so that hair
     comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
-    they do, `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies under the plane of the body next to x*, beyond where x* itself lies or MARGIN,
-    whichever is nearer the body.
+    they do, `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies
+    under the plane of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
 
     Args:
         net: the network.
