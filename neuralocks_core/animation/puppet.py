@@ -115,6 +115,11 @@ def pulse(times: np.ndarray, start: float, attack: float, hold: float, release: 
     return ease(times, start, attack) - ease(times, start + attack + hold, release)
 
 
+def travelled(times: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """How far a speed (T,) has led since the first sample, by trapezoids; (T,)."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(times))])
+
+
 def swing(times: np.ndarray, start: float, cycles: float, rate: float) -> np.ndarray:
     """A sine of `cycles` at `rate` [Hz] from `start` [s] on, whose first and last half cycle fade in and out; (T,)."""
     end = start + cycles / rate

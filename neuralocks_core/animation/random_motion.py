@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing
+from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing, travelled
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip, G
@@ -183,7 +183,7 @@ def _walk(puppet: Puppet, dice: _Dice) -> None:
     begin = dice.start(0.2)
     going = ease(times, begin, 0.8) - ease(times, times[0] + dice.seconds * dice.between(0.6, 1.2), 0.7)
     phase = np.pi * steps * (times - begin)
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (going[1:] + going[:-1]) * np.diff(times))]) * speed
+    way = speed * travelled(times, going)
     bob = dice.between(0.015, 0.05) * (steps / 2) ** 2
     puppet.position += way[:, None] * FRONT + (going * bob * np.cos(2 * phase) - going * bob)[:, None] * UP
     puppet.position += (going * 0.02 * np.sin(phase))[:, None] * SIDE
@@ -220,8 +220,7 @@ def _spin(puppet: Puppet, dice: _Dice) -> None:
     """Some revolutions of the whole body, as in a pirouette."""
     attack, hold, release = dice.between(0.15, 0.5), dice.between(0.2, 1.8), dice.between(0.15, 0.6)
     rate = dice.sign() * dice.between(4.0, 14.0) * pulse(puppet.times, dice.start(0.3), attack, hold, release)
-    turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(puppet.times))])
-    puppet.turn("root", turned[:, None] * UP)
+    puppet.turn("root", travelled(puppet.times, rate)[:, None] * UP)
 
 
 def _tumble(puppet: Puppet, dice: _Dice) -> None:
