@@ -58,15 +58,13 @@ def upright(rest: np.ndarray, world: np.ndarray, parents, humanoid: Humanoid) ->
         world = _turned(world, AXES[up])
     if stands is not None:
         return Upright(_turned(rest, stands), world, up, False)
-    some = world[np.linspace(0, len(world) - 1, min(POSES, len(world))).astype(int)]
-    found = rest_from_motion(some, parents, humanoid)
+    found = rest_from_motion(_some(world), parents, humanoid)
     return Upright(rest if found is None else found, world, up, True)
 
 
 def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
     """Whether a motion, world transforms (T, J, 4, 4), Y up, shows a body that lies in more than half of its poses."""
-    some = world[np.linspace(0, len(world) - 1, min(POSES, len(world))).astype(int), :, :3, 3]
-    return bool(np.mean([lies(places, humanoid, AXES["Y"])[0] for places in some]) > 0.5)
+    return bool(np.mean([lies(pose[:, :3, 3], humanoid, AXES["Y"])[0] for pose in _some(world)]) > 0.5)
 
 
 def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
@@ -92,6 +90,11 @@ def _up_in_motion(world: np.ndarray, humanoid: Humanoid, stands: np.ndarray | No
         return "Z"
     middle = np.median(body, axis=0)
     return next((name for name, axis in AXES.items() if middle @ axis > MOSTLY), "Y")
+
+
+def _some(world: np.ndarray) -> np.ndarray:
+    """At most POSES of a motion's poses, evenly spread over it."""
+    return world[np.linspace(0, len(world) - 1, min(POSES, len(world))).astype(int)]
 
 
 def _turned(transforms: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
-from neuralocks_core.anatomy.upright import AXES, FEET, standing_axis, upright
+from neuralocks_core.anatomy.standing import FEET
+from neuralocks_core.anatomy.upright import AXES, standing_axis, upright
 from neuralocks_core.character import Skeleton
 from neuralocks_core.formats.bvh_words import LARGEST, Words
 from neuralocks_core.motion import LARGEST_CLIP, Clip
