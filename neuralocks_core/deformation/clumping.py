@@ -9,8 +9,9 @@ import numpy as np
 
 from neuralocks_core.materials import RANGES, Material, constants
 from neuralocks_core.motion import GRAVITY
+from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
-from neuralocks_core.strands.strand_set import CLAMPED, K, StrandSet, root_frames
+from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
 """Where clumping lies among a vector's material."""
@@ -48,7 +49,7 @@ class Locks:
         mates = lock_mates(strands.rest, strands.lock)
         own = tied_together(mates)
         means = lock_means(flat, own, strands.valid)
-        rest, uv, normal = means[:, : 3 * K].reshape(-1, K, 3), means[:, 3 * K : -3], means[:, -3:]
+        rest, uv, normal = means[:, :SHAPE].reshape(-1, K, 3), means[:, SHAPE:-3], means[:, -3:]
         normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         lock = StrandSet(
             rest=rest,

@@ -10,9 +10,10 @@ from threading import Lock
 import numpy as np
 
 from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_codes
-from neuralocks_core.strands.strand_set import K, StrandSet, scalp_local
+from neuralocks_core.strands.strand_set import StrandSet, scalp_local
 
 
 class StrandSession:
@@ -29,8 +30,8 @@ class StrandSession:
         count = len(strands.rest)
         shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
         inputs = strand_inputs(strands, self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32))
-        self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), 256)
-        self.anchor_offsets = np.zeros((count, 3 * K), np.float32)
+        self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), HIDDEN)
+        self.anchor_offsets = np.zeros((count, SHAPE), np.float32)
         self._anchored_at: np.ndarray | None = None
         # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
         self._turn = Lock()
@@ -94,7 +95,7 @@ class StrandSession:
                     gather(found, chunk)
             return found
 
-        return self._by_chunk(values, 3 * K)
+        return self._by_chunk(values, SHAPE)
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just

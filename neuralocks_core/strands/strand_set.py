@@ -23,7 +23,7 @@ CLAMPED = 2
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""
 
-__all__ = ["K", "StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "strands_on"]
+__all__ = ["StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "strands_on"]
 
 
 @dataclass(frozen=True, eq=False)

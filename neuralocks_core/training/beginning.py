@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError, about
+from neuralocks_core.network_sizes import K
 from neuralocks_core.onnx_graph import OnnxWeights
-from neuralocks_core.strands.strand_set import K
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet, smoothing

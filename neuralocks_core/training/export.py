@@ -7,8 +7,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.onnx_graph import OnnxGraph
-from neuralocks_core.strands.strand_set import CLAMPED, K
+from neuralocks_core.strands.strand_set import CLAMPED
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet, smoothing
 
@@ -91,7 +92,7 @@ def _encoder_graph(layers, into) -> bytes:
         graph.mlp("shape", layers, "code")
     else:
         graph.node("Add", [graph.linear("shape", into, "flat"), graph.mlp("shape", layers, "bent")], "code")
-    return graph.finish({"shape": ("S", 3 * K)}, {"code": ("S", len(_weights(layers[-1])[1]))})
+    return graph.finish({"shape": ("S", SHAPE)}, {"code": ("S", len(_weights(layers[-1])[1]))})
 
 
 def _strand_graph(layer) -> bytes:

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core.network_sizes import CODE, HIDDEN, STRAND
-from neuralocks_core.strands.strand_set import CLAMPED, K
+from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
+from neuralocks_core.strands.strand_set import CLAMPED
 
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
@@ -78,10 +78,10 @@ class StrandNet(nn.Module):
                 nn.Linear(DEEP, 3 * HIDDEN + sum(RANKS) if motion == "modulated" else HIDDEN),
             )
         self.middle = nn.Linear(HIDDEN, HIDDEN)
-        self.out = nn.Linear(HIDDEN, 3 * K)
+        self.out = nn.Linear(HIDDEN, SHAPE)
         if motion == "modulated":
             self.middle_change = LowRank(HIDDEN, RANKS[0], HIDDEN)
-            self.out_change = LowRank(HIDDEN, RANKS[1], 3 * K)
+            self.out_change = LowRank(HIDDEN, RANKS[1], SHAPE)
         with torch.no_grad():
             # Hair starts at rest: zero offsets are both the groom and a direction that exists.
             self.out.weight.mul_(0.1)

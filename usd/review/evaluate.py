@@ -18,11 +18,12 @@ from neuralocks_core.evaluation.pose_energies import energies, stretch_energy
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY, Clip, G
+from neuralocks_core.network_sizes import K
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.locks import whole_locks
-from neuralocks_core.strands.strand_set import CLAMPED, K, StrandSet, strands_on
+from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
 
 from ..border.damage import names_damage
 from ..shot.recorded import recorded, recorded_material, recorded_volume

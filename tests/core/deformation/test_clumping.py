@@ -7,7 +7,8 @@ from scipy.optimize import brentq
 
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.materials import RANGES, Material
-from neuralocks_core.strands.strand_set import K, StrandSet
+from neuralocks_core.network_sizes import K
+from neuralocks_core.strands.strand_set import StrandSet
 
 LENGTHS = np.array([0.02, 0.1, 0.3, 0.6])
 EACH = 6

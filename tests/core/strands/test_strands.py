@@ -9,9 +9,10 @@ from neuralocks_core.deformation.carrier import Carrier
 from neuralocks_core.deformation.lengths import keep_lengths_of_any
 from neuralocks_core.deformation.spans import LEFT_OVER, weights
 from neuralocks_core.groom import Groom
+from neuralocks_core.network_sizes import K
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.centreline import centre_lines
-from neuralocks_core.strands.strand_set import K, root_frames, root_uv, scalp_local, strand_set
+from neuralocks_core.strands.strand_set import root_frames, root_uv, scalp_local, strand_set
 
 ORIGIN = np.array([0.0, 1.5, 0.02])
 CENTRE = np.array([0.0, 0.1, 0.0])

@@ -6,7 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from neuralocks_core.strands.strand_set import K
+from neuralocks_core.network_sizes import K
 from neuralocks_core.training.regression import RegressionOptions, regression_losses
 
 EDGE, KINK = 0.01, 0.6
