@@ -10,7 +10,7 @@ def animated(data, without=()) -> set[str]:
 
 
 def moved(data) -> set[str]:
-    """Those of them that change: that drivers write, or keys of several values."""
+    """Those of them that change: that drivers write, or keys or samples of several values."""
     return {curve.data_path for curve in _playing(data) if not _constant(curve)}
 
 
@@ -31,7 +31,8 @@ def _playing(data, without=()) -> list:
 
 
 def _constant(curve) -> bool:
-    return curve.driver is None and not curve.modifiers and len({key.co[1] for key in curve.keyframe_points}) < 2
+    points = (*curve.keyframe_points, *curve.sampled_points)  # sound is baked to samples
+    return curve.driver is None and not curve.modifiers and len({point.co[1] for point in points}) < 2
 
 
 def _curves(user) -> list:

@@ -105,14 +105,18 @@ def particles_under_shapes(_folder: Path) -> None:
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
     ball, scene = bpy.context.active_object, bpy.context.scene
-    blocks = {name: ball.shape_key_add(name=name) for name in ("Basis", "Brow", "Driven", "Tall", "Wide", "Off")}
-    for name, axis in (("Brow", 2), ("Driven", 2), ("Tall", 2), ("Wide", 1), ("Off", 1)):
+    blocks = {
+        name: ball.shape_key_add(name=name) for name in ("Basis", "Brow", "Sung", "Driven", "Tall", "Wide", "Off")
+    }
+    for name, axis in (("Brow", 2), ("Sung", 2), ("Driven", 2), ("Tall", 2), ("Wide", 1), ("Off", 1)):
         for point in blocks[name].data:
             point.co[axis] += 0.03
     for frame in (1, 10):
-        blocks["Brow"].value, blocks["Wide"].value = frame == 10, 1.0
-        for name in ("Brow", "Wide"):
+        blocks["Brow"].value, blocks["Sung"].value, blocks["Wide"].value = frame == 10, frame == 10, 1.0
+        for name in ("Brow", "Sung", "Wide"):
             blocks[name].keyframe_insert("value", frame=frame)
+    curves = scenes.fcurves(ball.data.shape_keys)
+    next(c for c in curves if "Sung" in c.data_path).convert_to_samples(1, 10)  # as sound is baked
     blocks["Driven"].driver_add("value").driver.expression = "frame / 20"
     blocks["Tall"].value, blocks["Off"].mute = 1.0, True
     ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
