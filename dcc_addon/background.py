@@ -88,11 +88,10 @@ def _todo(scenes: list) -> tuple | None:
     """The next (scene, armature) to sample; an armature that is in several scenes moves as in the first of them."""
     seen = set()
     for scene in scenes:
-        own = set(carriers(scene)) - seen
         for armature in needs_sampling(scene):
-            if armature in own and armature.name_full not in session.failed:
+            if armature not in seen and armature.name_full not in session.failed:
                 return scene, armature
-        seen |= own
+        seen |= set(carriers(scene))
     return None
 
 
