@@ -26,7 +26,7 @@ from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
-from .base import Stepwise, sampling, shown_armature, shown_hair
+from .base import Stepwise, sampling, shown_armature, shown_hair, tell
 
 
 def output_path(path: str) -> str:
@@ -147,13 +147,6 @@ def _outs(path: Path, count: int) -> list[Path]:
     return [path if count == 1 else path.with_name(f"{path.stem}_{n + 1}{path.suffix}") for n in range(count)]
 
 
-def _tell(operator, message: str, notes: list[str]) -> None:
-    """Report how it ended, and then what else is to be known: Blender shows the last line longest."""
-    operator.report({"INFO"}, message)
-    for note in notes:
-        operator.report({"WARNING"}, note)
-
-
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
     """Bake this character's moving hair to a USD layer, equal to the live view without modifiers. Its shot is written beside it as NAME_shot.usdc"""
 
@@ -171,7 +164,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
         baked, notes = yield from bake_steps(context, armature, hairs, path, undrawn)
         left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
         more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""
-        _tell(self, f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}", notes)
+        tell(self, f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}", notes)
 
 
 class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
@@ -199,7 +192,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
         hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name], context.scene)
-        _tell(self, f"{name}: now plays {baked[name][0]}", notes)
+        tell(self, f"{name}: now plays {baked[name][0]}", notes)
 
 
 class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):

@@ -155,6 +155,13 @@ def sampling(context, armature, share: float = 1.0):
     return session.rigs[name]
 
 
+def tell(operator, message: str, notes: list[str]) -> None:
+    """Report how it ended, and then what else is to be known: Blender shows the last line longest."""
+    operator.report({"INFO"}, message)
+    for note in notes:
+        operator.report({"WARNING"}, note)
+
+
 def shown_armature(context):
     """The armature that the panel shows.
 

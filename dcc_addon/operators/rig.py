@@ -22,12 +22,12 @@ from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.names import file_label
 from ..services.overwriting import check_ours, untaken
-from ..services.panel_errors import for_the_panel
+from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range, is_anothers, output_path, shot_beside
-from .base import Hardened, Stepwise, sampling, shown_armature
+from .base import Hardened, Stepwise, sampling, shown_armature, tell
 
 
 class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
@@ -127,15 +127,14 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         bind(named(name), sampled)  # says what is wrong before anything is written
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
-            write_shot(shot, named(name), scene, sampled, [])
+            prims = write_shot(shot, named(name), scene, sampled, [])
             job = Threaded(
                 lambda say: bake_rig(shot, out, model, head=head, strength=strength, loop=loop, progress=say),
                 "Baking the hair bones",
             )
             result = yield from job.steps(0.5)
-        self.report({"INFO"}, f"{name}: hair bones written to {out}")
-        for note in result.notes:  # last, for Blender shows the last line longest
-            self.report({"WARNING"}, for_the_panel(note.replace(result.skeleton, name)))
+        notes = [for_the_panel(with_objects(note, prims)) for note in result.notes]
+        tell(self, f"{name}: hair bones written to {out}", notes)
 
 
 class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):

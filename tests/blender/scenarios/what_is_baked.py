@@ -106,7 +106,7 @@ def told_of_a_bake(folder: Path) -> None:
 
 def _told(operator, **options) -> list[str]:
     """What an operator of a bake tells besides that it is done."""
-    with patch("dcc_addon.operators.bake._tell") as tell:
+    with patch("dcc_addon.operators.bake.tell") as tell:
         assert operator(**options) == {"FINISHED"}
     return tell.call_args.args[2]
 
