@@ -25,6 +25,10 @@ def test_prims_become_objects():
         "Rig: its head is put elsewhere at 13; the hair starts anew there (--cuts says where)",
         "Rig: its head is put elsewhere at 13; a loop has no cuts, so the hair is flung there; leave out --loop, or repair "
         "the animation",
+        "Rig: 'curl' and 3 more hang from 'neck' and are not moved; to move all, train and bake with --head neck",
+        "Rig: 'curl' hangs from 'head_2', not from 'head_1', so it is not moved; take that head with --head head_2",
+        "Rig: joint 'neck' is head and neck at once; check --joint and --head",
+        "frames: more than 1000000 samples; give fewer with --frames FIRST:LAST:STEP",
         "Hair: the longest strand reaches 30 m; check the stage's metersPerUnit",
         "the model was trained with one material, so stiffness, weight and damping change nothing; "
         "train one with random_materials=True, as the other ways of training do",
@@ -32,5 +36,7 @@ def test_prims_become_objects():
 )
 def test_notes_name_what_the_panel_has(note):
     said = for_the_panel(note)
-    assert not any(word in said for word in ("--", "JOINT", "metersPerUnit", "random_materials", "()", " ;")), said
+    assert not any(
+        word in said for word in ("--", "JOINT", "FIRST", "metersPerUnit", "random_materials", "()", " ;")
+    ), said
     assert said.startswith(note[:12])
