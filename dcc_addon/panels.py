@@ -260,7 +260,7 @@ def progress(layout, done: float, text: str) -> None:
 
 
 def words(layout, text: str, icon: str) -> None:
-    """A text of any length, broken into lines that fit the sidebar."""
+    """A text of any length, broken into lines that fit the region."""
     region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale
     width = max(20, int((region.width / scale - 60) / 6)) if region else 40
     column = layout.column(align=True)

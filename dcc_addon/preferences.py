@@ -5,6 +5,7 @@ import bpy
 from bpy.props import StringProperty
 
 from .operators.training import known_problem
+from .panels import words
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -25,7 +26,7 @@ class Preferences(bpy.types.AddonPreferences):
         if problem is None:
             column.label(text="Looking for what training needs", icon="TIME")
         else:
-            column.label(text=problem or "Ready to train", icon="INFO" if problem else "CHECKMARK")
+            words(column, problem or "Ready to train", "INFO" if problem else "CHECKMARK")
 
 
 CLASSES = (Preferences,)

@@ -3,6 +3,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock, patch
 
 import bpy
 
@@ -132,3 +133,14 @@ def words(_folder: Path) -> None:
                 assert "--" not in prop.description, prop.identifier
                 if prop.type == "ENUM":
                     assert all(item.description for item in prop.enum_items), prop.identifier
+
+
+def remedy_in_full(_folder: Path) -> None:
+    """The preferences break what training lacks into lines: one label would be cut off before the command to run."""
+    from dcc_addon.preferences import Preferences
+
+    layout, said = MagicMock(), " ".join(["Training needs a Python with torch"] * 6)
+    with patch("dcc_addon.preferences.known_problem", return_value=said):
+        Preferences.draw(SimpleNamespace(layout=layout), None)
+    lines = [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith(".label")]
+    assert " ".join(lines) == said and max(map(len, lines)) <= 40, lines
