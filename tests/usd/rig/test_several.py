@@ -45,6 +45,7 @@ def test_the_documents_show_how_python_turns_one_or_many():
     names = {}
     exec(example.replace('"examples/mesh_hair', f'"{EXAMPLE.as_posix()}'), names)
     who, model = names["who"], names["model"]
+    assert names["turns"].shape == (3, 32, 4)
     rows = RigSampler(model.spec, who.character, who.clip).features([0.5, 1.0, 1.5])
     for times in (rows, rows[:1]):  # no hat is in it
         turns = model.evaluate(times)
