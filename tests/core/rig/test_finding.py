@@ -192,6 +192,9 @@ def test_a_rig_with_another_joint_called_as_a_chain_is_refused_before_it_is_trai
     """No bake could tell which one the model moves."""
     rig = character([*tail("lock", 2), ("jaw", "head", (0, 1.5, 0.1)), ("tip", "jaw", (0, 1.5, 0.2))]).skeleton
     assert find_chains(Character(rig)).names == ("lock_1",)
+    longer = character([*tail("lock", 3), ("jaw", "head", (0, 1.5, 0.1)), ("tip", "jaw", (0, 1.5, 0.2))]).skeleton
+    alike = Character(replace(longer, names=[name.replace("/tip", "/lock_2") for name in longer.names]))
+    assert find_chains(alike).names == ("lock_1", "lock_2"), "what it hangs from tells the second joint"
     who = Character(replace(rig, names=[name.replace("/tip", "/lock_1") for name in rig.names]))
     with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', as a hair chain; rename"):
         find_chains(who)
