@@ -137,7 +137,7 @@ def test_long_takes_may_hold_comments_anywhere(tmp_path):
     text = TEXT[: TEXT.index("0 90 0  0 0 0")].replace("Frames: 2", "Frames: 6000")
     assert sum(map(len, lines)) > 4 * PIECE
     expected = read_bvh(written(tmp_path, text + "\n".join(lines))).clip.joints
-    found = read_bvh(written(tmp_path, text + "\n# a 1 2 comment 3\n".join(lines))).clip.joints
+    found = read_bvh(written(tmp_path, text + f"\n#{' a 1 2 comment 3' * 20}\n".join(lines))).clip.joints
     assert np.array_equal(found, expected)
 
 
