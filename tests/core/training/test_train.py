@@ -171,9 +171,13 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     shorter = tuple(replace(groom, rest=0.9 * groom.rest) for groom in scene.grooms)
     joints = scene.character.humanoid.joints
     renamed = replace(scene.character, humanoid=Humanoid({**joints, "upper_chest": joints["hips"]}))
+    skeleton = scene.character.skeleton
+    hung = replace(scene.character, skeleton=replace(skeleton, parents=[*skeleton.parents[:-1], 0]))
+    assert skeleton.parents[-1] != 0
     for other, fact in (
         (replace(scene, seed=7), f"begun with --seed {scene.seed}; resume with that"),
         (replace(scene, character=renamed), "begun with another character"),
+        (replace(scene, character=hung), "begun with another character"),
         (replace(scene, character=replace(scene.character, carrier=2)), "begun with another character"),
         (replace(scene, grooms=shorter), "begun with another groom; resume with the same, or train without"),
     ):
