@@ -95,3 +95,8 @@ def test_a_shot_on_twos_keeps_a_sample_a_step(tmp_path):
 def test_motion_that_is_sampled_finely_keeps_its_samples(tmp_path, end):
     samples = np.arange(1, end + 1e-6, 0.1 if end == 40 else 0.05)
     assert np.isin(samples, stepped(tmp_path, samples, end=end).time_codes).all()
+
+
+def test_pairs_of_samples_that_are_near_the_next_ones_are_no_steps(tmp_path):
+    samples = np.sort([*np.arange(1, 40, 0.6), *np.arange(1.2, 40, 0.6)])
+    assert np.isin(samples, stepped(tmp_path, samples).time_codes).all()
