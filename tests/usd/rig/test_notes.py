@@ -239,6 +239,12 @@ def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, 
         assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
 
 
+def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
+    head = "hips/neck/head"
+    shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{head}/hair_0/end", "hips/neck/pony"))
+    assert not any(" not moved; " in note for note in rigged_notes(read_rigged_hair(shot).source))
+
+
 @pytest.mark.parametrize("locks", [["pony"], ["hair_0", "pony"]])
 def test_a_model_of_hair_on_the_neck_needs_the_head_that_it_was_trained_with(edited, tmp_path, locks):
     shot = edited(_named("neck", "neck/head", "neck/head/hair_0", "neck/head/hair_0/end", "neck/pony", "neck/pony/end"))
