@@ -135,15 +135,16 @@ def test_a_head_larger_than_a_network_has_seen_is_told(tmp_path, size, told):
         )
 
 
-def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path):
-    """Whose size and neck are looked for at the joint that carries the fur."""
+@pytest.mark.parametrize("wider", [1.0, 2.5])
+def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path, wider):
+    """Whose size and neck are looked for at the joint that carries the fur: a chest may be too large for a head, or no head's."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     hair = read_shot(path).notes
     stage = Usd.Stage.Open(str(path))
     skin = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr()
     points = np.array(skin.Get())
     chest = points[:, 1] < 1.5
-    points[chest, 0] *= 2.5
+    points[chest, 0] *= wider
     skin.Set(Vt.Vec3fArray.FromNumpy(points.astype(np.float32)))
     low = points[chest & (points[:, 1] < 1.3)]
     add_curves(stage, "/Hero/Fur", np.stack([low, low + [0, 0, 0.02]], axis=1))
