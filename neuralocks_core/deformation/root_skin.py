@@ -112,6 +112,8 @@ class _Below:
 def _below(character: Character, groom: StrandSet, clip: Clip) -> _Below | None:
     """The skin below a groom, or None where no blend shape of the clip moves it."""
     body, begun, roots = character.body, clip.shape[0], groom.rest[:, 0].astype(float)
+    if not groom.valid.any():
+        return None
     shapes = [offsets for offsets, weights in zip(body.shapes.values(), clip.shape.T, strict=True) if weights.any()]
     low, high = roots[groom.valid].min(axis=0) - FAR, roots[groom.valid].max(axis=0) + FAR
     places = [character.canonical(points) for points in (body.points, body.shaped(begun))]

@@ -61,10 +61,9 @@ def one_person(rig: StageRig, other: StageRig) -> bool:
 
 
 def _sharing_a_name(prim: Usd.Prim, seats: list[Seat]) -> list[Seat]:
-    """Those on a skeleton whose path shares most names with the groom's that not all of their paths have; all if none does."""
-    names = [_names(seat.rig.source.prim.GetPath()) for seat in seats]
-    telling = _names(prim.GetPath()) - set.intersection(*names)
-    shared = [len(own & telling) for own in names]
+    """Those on a skeleton whose path shares most names with the groom's."""
+    own = _names(prim.GetPath())
+    shared = [len(own & _names(seat.rig.source.prim.GetPath())) for seat in seats]
     return [seat for seat, count in zip(seats, shared, strict=True) if count == max(shared)]
 
 

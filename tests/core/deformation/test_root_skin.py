@@ -113,3 +113,9 @@ def test_shapes_that_leave_the_skin_at_the_roots_cost_nothing(character, shape):
     assert not skin.moves and (moved == np.float32(0.01)).all() and skin.begun(groom) is groom
     bare = Character(character.skeleton)
     assert not RootSkin(bare, [groom], clip(character, shape)).moves
+
+
+def test_a_groom_without_a_strand_that_moves_is_let_be(character):
+    points = np.repeat(character.skeleton.bind[character.head, None, :3, 3] + [0, 0.1, 0], 3, axis=0)
+    groom = strands_on(character, Groom("Dots", points, np.array([3])))
+    assert not RootSkin(character, [groom], clip(character, [[0, 0, 0], [1, 0, 0]])).moves
