@@ -24,16 +24,40 @@ def centre_lines(points: np.ndarray) -> np.ndarray:
     Returns:
         (S, K, 3) [m], of the same type.
     """
-    result = points.copy()
+    return _centred(points)[0]
+
+
+def passes(points: np.ndarray) -> np.ndarray:
+    """How often `centre_lines` smooths each of the strands (S, K, 3), (S,) int."""
+    return _centred(points)[1]
+
+
+def smoothed(values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Values along strands (S, K, n), smoothed so many `times` (S,): displacements of a coil become those of its line."""
+    result = values.copy()
+    for done in range(times.max(initial=0)):
+        todo = np.flatnonzero(times > done)
+        result[todo] = _once(result[todo])
+    return result
+
+
+def _centred(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    result, times = points.copy(), np.zeros(len(points), int)
     todo = np.flatnonzero(_sharp(points))
     for _ in range(PASSES):
         if not len(todo):
             break
-        strands = result[todo]
-        strands[:, 1:-1] += 0.5 * (0.5 * (strands[:, :-2] + strands[:, 2:]) - strands[:, 1:-1])
+        strands = _once(result[todo])
         result[todo] = strands
+        times[todo] += 1
         todo = todo[_sharp(strands)]
-    return result
+    return result, times
+
+
+def _once(strands: np.ndarray) -> np.ndarray:
+    """Values along strands (S, K, n), changed in place: each halfway to the mean of those beside it, but for both ends."""
+    strands[:, 1:-1] += 0.5 * (0.5 * (strands[:, :-2] + strands[:, 2:]) - strands[:, 1:-1])
+    return strands
 
 
 def _sharp(points: np.ndarray) -> np.ndarray:

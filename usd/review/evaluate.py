@@ -22,6 +22,7 @@ from neuralocks_core.network_sizes import K
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
+from neuralocks_core.strands.centreline import passes, smoothed
 from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
 
@@ -34,6 +35,9 @@ from .own_bends import OwnBends
 STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
 REFERENCE_STRANDS = 200
+WOUND = 1.2
+"""A strand so many times as long as the line of its network vertices is a coil. Of one that has a kink alone, the points move as
+the line does, better than smoothing tells."""
 COLLISION_FRAMES, DEEPEST_FRAMES = 32, 3
 """Frames in which distances to the body are measured: so many evenly over the bake, and those in which hair seems deepest."""
 COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
@@ -111,6 +115,9 @@ class _Subject:
         rest = self.character.canonical(groom.points.astype(float))
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
+        # The points of a coil also turn about its line, whose motion is the one measured.
+        wound = length[self.chosen] > WOUND * self.strands.length
+        times = np.where(wound, passes(self._sampled(rest)), 0)
         self.moved = np.zeros((total, count, K, 3), np.float32)
         self.own_rest = rest[self._own] + (begun.rest[:, 0] - every.rest[:, 0])[groom.strand_of_point[self._own]]
         self.own = np.zeros((total, len(self._own), 3), np.float32)
@@ -122,7 +129,7 @@ class _Subject:
             sums.append(metrics.stretch(metrics.strand_lengths(points, groom.counts)[None], rest_lengths))
             taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
-            self.moved[frame] = offset[self._low] * (1 - self._part) + offset[self._low + 1] * self._part
+            self.moved[frame] = smoothed(self._sampled(offset), times)
             if skin.moves:  # what hair does is measured against the skin that it is on
                 self.moved[frame] -= skin.moved(shapes[frame])[self.chosen]
             self.own[frame] = points[self._own]
@@ -154,6 +161,10 @@ class _Subject:
         most = min(len(movable), COLLISION_VERTICES, COLLISION_POINTS // max(len(self.baked.codes), 1))
         self._own = movable[np.linspace(0, len(movable) - 1, most).round().astype(int)]
         self._edges = np.concatenate(edges) if edges else np.zeros(0, int)
+
+    def _sampled(self, values: np.ndarray) -> np.ndarray:
+        """Values (P, 3) of the whole groom at the chosen strands' network vertices (S, K, 3)."""
+        return values[self._low] * (1 - self._part) + values[self._low + 1] * self._part
 
     def _edge_lengths(self, points: np.ndarray) -> np.ndarray:
         """Lengths (E,) of the chosen strands' own edges [m]; points (P, 3) of the whole groom."""

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.strands.centreline import SHARPEST, centre_lines
+from neuralocks_core.strands.centreline import SHARPEST, centre_lines, passes, smoothed
 
 
 def coil(turns, radius=0.01, height=0.2, vertices=24):
@@ -30,3 +30,10 @@ def test_a_tight_coil_becomes_its_axis():
     assert corners(line).max() <= SHARPEST + 1e-9
     assert np.linalg.norm(line[0, 4:-4, [0, 2]], axis=0).max() < 0.005
     assert np.array_equal(line[:, [0, -1]], coil(9.3)[:, [0, -1]])
+
+
+def test_what_moves_along_a_coil_is_smoothed_as_the_coil_was():
+    both = np.concatenate([coil(9.3), coil(1.5), coil(11)])
+    times = passes(both)
+    assert times[1] == 0 < times[0] != times[2] > 0
+    assert np.array_equal(smoothed(both, times), centre_lines(both))
