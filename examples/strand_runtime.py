@@ -91,8 +91,8 @@ class Runtime:
             led = self.answer("displacement", frame, "lock_").reshape(-1, 24, 3)[self.fixed["lock"]]
             edges = np.diff(self.fixed["rest"], axis=1)
             wanted = edges + np.diff(led + self.stray * (moved - led), axis=1)
-            longer = np.linalg.norm(wanted, axis=2) / np.linalg.norm(edges, axis=2).clip(1e-12)
-            moved[:, 2:] = np.cumsum((wanted / longer[..., None].clip(1e-12) - edges)[:, 1:], axis=1)
+            own, size = (np.linalg.norm(e, axis=2, keepdims=True) for e in (edges + np.diff(moved, axis=1), wanted))
+            moved[:, 2:] = np.cumsum((wanted * own / size.clip(1e-12) - edges)[:, 1:], axis=1)
         moved *= self.fixed["valid"][:, None, None]
         head = head.copy()
         head[:3, :3] /= self.fixed["size"]

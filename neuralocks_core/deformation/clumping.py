@@ -85,7 +85,8 @@ class Locks:
         return ((own + 2 * self.tie * Material().clumping) / (own + 2 * self.tie * clumping)).astype(np.float32)
 
     def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:
-        """Change how far hairs stray from their locks, every length kept.
+        """Change how far hairs stray from their locks. Each edge keeps the length that the network gave it: that at rest, unless
+        the model answers with displacements, which may stretch hair.
 
         Args:
             displacement: of these hairs (n, 72) float32 [m], changed in place.
@@ -97,9 +98,9 @@ class Locks:
         moved = displacement.reshape(rest.shape)
         way = led[self.lock[hairs]]
         edges = np.diff(rest, axis=1)
-        length = np.sqrt(np.square(edges).sum(-1, keepdims=True))
+        own = edges + np.diff(moved, axis=1)
         wanted = edges + np.diff(way + factor[hairs, None, None] * (moved - way), axis=1)
-        size = np.sqrt(np.square(wanted).sum(-1, keepdims=True))
+        length, size = (np.sqrt(np.square(each).sum(-1, keepdims=True)) for each in (own, wanted))
         change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, CLAMPED - 1 :]
         moved[:, :CLAMPED] = 0
         np.cumsum(change, axis=1, out=moved[:, CLAMPED:])

@@ -119,6 +119,17 @@ def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
     assert max(apart) < 0.5 * np.sqrt(np.square(ways[1]).mean())
 
 
+def test_a_little_clumping_changes_little(path, strands):
+    """Of hair that the network stretches, too: its lengths are the network's, not those at rest."""
+    vector = (0.3 * np.random.default_rng(6).normal(size=SPEC.size)).astype(np.float32)
+    session, moved = StrandSession(StrandModel.load(path), strands), []
+    for ratio in (0.0, 1e-5):
+        vector[CLUMPING] = ratio
+        moved.append(session.displacement(vector))
+    assert np.abs(moved[0]).max() > 0.005 and not np.array_equal(*moved)
+    np.testing.assert_allclose(*moved, atol=2e-5)
+
+
 def test_what_strands_share_is_computed_once_a_frame(path, strands, monkeypatch):
     session = StrandSession(StrandModel.load(path), strands)
     vector = np.zeros(SPEC.size, np.float32)

@@ -88,7 +88,7 @@ SLIDERS = {
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
-    "it, scaled to the rest edge's length",
+    'it, scaled to the length that it has with D: its rest length, unless the model\'s `output` is "displacement"',
     "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
     "goes on in a straight line and does not turn. A bake finds cuts, or is told them (`--cuts`)",
     "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
