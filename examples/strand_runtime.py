@@ -38,7 +38,8 @@ class Runtime:
         self.fixed["held"][slice(*self.parts["material"])] = [*ratios, 0]
         for locks in ("", "lock_"):
             self.fixed[f"{locks}anchor"][:] = 0
-            self.fixed[f"{locks}anchor"] = self.answer("offsets", self.made(self.fixed["held"]), locks)
+            if self.model.get("anchored"):
+                self.fixed[f"{locks}anchor"] = self.answer("offsets", self.made(self.fixed["held"]), locks)
         length = np.maximum(self.fixed["length"], 1e-3)
         own = 12.36 * material["bend"] / length**4 + 9.81 * material["weight"] / length
         tie = self.fixed["tie"]
@@ -64,9 +65,13 @@ class Runtime:
         gravity = head.T @ GRAVITY / 9.81
         result[slice(*self.parts["gravity"])] = gravity
         to_head = turns[:-2, 0].transpose(0, 2, 1)
-        push = (places[:-2] - 2 * places[1:-1] + places[2:]) / dt**2
-        steps = [limited((to_head @ (GRAVITY - push)[..., None])[..., 0] / 9.81 - gravity, 6)]
-        for joint in (0, 1):
+        linear, steps = self.model["boundary"]["linear"], []
+        if linear == "gravity":
+            push = (places[:-2] - 2 * places[1:-1] + places[2:]) / dt**2
+            steps = [limited((to_head @ (GRAVITY - push)[..., None])[..., 0] / 9.81 - gravity, 6)]
+        elif linear == "velocity":
+            steps = [limited((to_head @ (places[:-2] - places[1:-1])[..., None])[..., 0] / dt, 25)]
+        for joint in (0, 1) if self.model["boundary"]["chest"] else (0,):
             turn = Rotation.from_matrix(turns[:-2, joint] @ turns[1:-1, joint].transpose(0, 2, 1)).as_rotvec()
             steps.append(limited((to_head @ turn[..., None])[..., 0] / dt, 25))
         ends = np.cumsum(bins)

@@ -9,8 +9,12 @@ from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 
 
-def write_random_model(path: Path, gain: float) -> Path:
+def write_random_model(
+    path: Path, gain: float, spec: BoundarySpec | None = None, *, anchored: bool = True, output: str = "direction"
+) -> Path:
     """Write a model whose last layer is `gain` times that of an untrained one: 4 moves hair by centimetres, 0 not at all.
+
+    `spec`, `anchored` and `output` are as in its file; those of the models shipped where left out.
 
     Skips the test where torch is not installed.
     """
@@ -20,13 +24,13 @@ def write_random_model(path: Path, gain: float) -> Path:
     from neuralocks_core.training.networks import StrandNet
 
     torch.manual_seed(0)
-    spec = BoundarySpec()
+    spec = spec or BoundarySpec()
     net, encoder = StrandNet(spec.size), StrandAutoencoder()
     with torch.no_grad():
         net.out.weight.mul_(gain)
         net.out.bias.mul_(gain)
-    meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": True, "output": "direction"}
-    return model.write(path, meta, strand_graphs(encoder, net, "direction"))
+    meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": anchored, "output": output}
+    return model.write(path, meta, strand_graphs(encoder, net, output))
 
 
 def offsets_of(net, strands, frames):

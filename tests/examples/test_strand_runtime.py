@@ -9,6 +9,8 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from examples.strand_runtime import largest_difference
 from neuralocks_core import model as model_file
+from neuralocks_core.boundary import BoundarySpec
+from tests.strand_models import write_random_model
 from tests.usd.shots import HEAD, JOINTS, Recipe, strand_points, write_shot
 from usd.baking.bake import bake
 from usd.models.export import export_model
@@ -39,6 +41,26 @@ def test_a_runtime_written_from_the_description_has_the_hair_of_the_bake(tmp_pat
         assert largest_difference(tmp_path / "onnx", shot, baked, material) < 1e-5
         if material:
             assert largest_difference(tmp_path / "onnx", shot, baked, {}) > 1e-4
+
+
+PAPER = BoundarySpec(bins=(1,) * 30, linear="none", taper=0.0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "settings"),
+    [
+        (BoundarySpec(), {"anchored": False}),
+        (PAPER, {"anchored": False, "output": "displacement"}),
+        (BoundarySpec(linear="velocity", chest=False), {}),
+    ],
+    ids=["not anchored", "the paper's", "velocity"],
+)
+def test_it_has_it_too_of_models_of_other_kinds(tmp_path, shot, spec, settings):
+    model = write_random_model(tmp_path / "random.neuralocks", 4.0, spec, **settings)
+    export_model(model, tmp_path / "onnx", shot)
+    material = {"weight": 1.4, "clumping": 5.0}
+    bake(shot, tmp_path / "hair.usdc", model, frames="1:40:13", resolve=False, material=material)
+    assert largest_difference(tmp_path / "onnx", shot, tmp_path / "hair.usdc", material) < 1e-5
 
 
 @pytest.mark.parametrize("wider", [2, 6])

@@ -30,16 +30,13 @@ GRAPHS = {
     "rotation now = local rotation in the bind pose * turn. The C header of `neuralocks rig export-c` makes the features, too",
 }
 
-_HISTORY = (
-    "step k = 0 ... steps - 1 is f_k, s_k and, where the model's `chest` is true, c_k, three numbers each. With p the place of the head joint (on hair that a joint below it carries: of `canonical_to_head`'s origin) and t_k = t - k dt: "
-    "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6; "
-    "s_k = T(R_head(t_k)) v / dt with v the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25; c_k the same "
-    "of the upper chest, in the head's axes too. A bin is the mean over as many steps as `bins` says, newest first, times "
-    "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
-    "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the pose that "
-    "is drawn. Before the first sample the head comes in a straight line, with its velocity there, and does not turn; after the last "
-    "one it stands still"
-)
+_STEPS = {
+    "f_k": "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6",
+    "v_k": "v_k = T(R_head(t_k)) (p(t_k) - p(t_k+1)) / dt, no longer than 25",
+    "s_k": "s_k = T(R_head(t_k)) r / dt with r the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25",
+    "c_k": "c_k the same of the upper chest, in the head's axes too",
+}
+"""What a step of the history may be made of."""
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
     f"shot's range adds its end where that lies after the last of them, and its start where that lies {STAND:g} s or more before "
@@ -58,10 +55,9 @@ STRAND_INPUT = {
     "gravity": "T(R_head(t)) g / 9.81",
     "shape": "ten lengths of the bind body [m], as in `held`",
     "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; 0, since clumping is no input",
-    "history": _HISTORY,
     "clip": _CLIP,
 }
-"""How each part of the boundary vector is made, for a model whose `linear` is "gravity", as those shipped."""
+"""How each part of the boundary vector is made, but for the history (`_history`)."""
 
 RIG_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(that in the bind pose), both turned about Y so that the "
@@ -70,7 +66,6 @@ RIG_INPUT = {
     "a joint that a rig does not have",
     "pose": "for neck and upper chest: column 0, then column 1, of T(R_head) R_j",
     "gravity": STRAND_INPUT["gravity"],
-    "history": _HISTORY + ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained",
     "clip": _CLIP,
     "hats": "where a bone between the head and some chains moves on the head, as a hat's does, evaluate once more with that bone's "
     "rotation as the head's, and take those chains' turns from there. Its history is one of its own, p the place to which "
@@ -78,11 +73,11 @@ RIG_INPUT = {
     "turns": "in the axes that each joint has in the model's rig: B, its row of `chains.axes`, is its world rotation in the bind "
     "pose that faces +Z. With J your joint's own there, D = T(J) B, the turn (w, v) becomes (w, det(D) D v)",
 }
-"""How the features of a rig model are made, and what becomes of its answer."""
+"""How the features of a rig model are made, but for the history (`_history`), and what becomes of its answer."""
 
 SLIDERS = {
-    "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, `anchor` anew: `offsets` of "
-    "tail.onnx with `anchor` zero and the frame `held`",
+    "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, where the model is anchored, "
+    "`anchor` anew: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
     "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
@@ -111,6 +106,9 @@ def described(file: model_file.ModelFile) -> dict:
         result["sliders"] = SLIDERS
     else:
         result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT)
+        result["features"]["how"]["history"] += (
+            ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
+        )
     return result | {"model": file.meta | {"training": training}}
 
 
@@ -123,8 +121,23 @@ def _input(spec: BoundarySpec, parts: list[str], how: dict) -> dict:
         "parts": {name: [end - size, end] for name, size, end in zip(parts, sizes, ends, strict=True)},
         "steps": spec.steps,
         "bin weights": [float(weight) for weight in spec.bin_weights],
-        "how": how,
+        "how": how | {"history": _history(spec)},
     }
+
+
+def _history(spec: BoundarySpec) -> str:
+    """How the history of such a boundary vector is made."""
+    linear = {"gravity": ["f_k"], "velocity": ["v_k"], "none": []}[spec.linear]
+    steps = [*linear, "s_k", *["c_k"] * spec.chest]
+    return (
+        f"step k = 0 ... steps - 1 is {', '.join(steps)}, three numbers each. With p the place of the head joint (on "
+        "hair that a joint below it carries: of `canonical_to_head`'s origin) and t_k = t - k dt: "
+        f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
+        "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
+        "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the "
+        "pose that is drawn. Before the first sample the head comes in a straight line, with its velocity there, and does not "
+        "turn; after the last one it stands still"
+    )
 
 
 def _graphs(file: model_file.ModelFile) -> dict:

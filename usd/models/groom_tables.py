@@ -26,7 +26,7 @@ ARRAYS = {
     "valid": "(S,) bool, false where a strand is one point: its displacement is 0",
     "strand_part": f"(S, {HIDDEN}) float32, input of tail.onnx",
     "anchor": f"(S, {SHAPE}) float32, input of tail.onnx, for the default material and the body shape of the first frame: "
-    "`offsets` of tail.onnx with `anchor` zero and the frame `held`",
+    "`offsets` of tail.onnx with `anchor` zero and the frame `held`; zeros where the model is not anchored",
     "edges": f"(S, {SHAPE}) float32, input of tail.onnx",
     "held": "(F,) float32, boundary vector of the bind pose, held",
     "facing": "(3, 3) float64, rotation from bind-world to canonical axes",

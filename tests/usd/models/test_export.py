@@ -8,9 +8,11 @@ import onnxruntime
 import pytest
 
 from neuralocks_core import model as model_file
+from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
+from tests.strand_models import write_random_model
 from usd.models.export import export_model
 from usd.skel.clip_codes import CLOSE, STAND
 
@@ -31,6 +33,20 @@ def test_the_parts_of_the_input_are_those_of_the_graph(tmp_path, kind, graph, en
     (shape,) = described["graphs"][graph]["inputs"].values()
     assert all(word in described[entry]["how"]["clip"] for word in ("range", f"{STAND:g} s", f"{CLOSE:g} s"))
     assert shape[1] == described[entry]["length"] and parts.keys() <= described[entry]["how"].keys()
+
+
+@pytest.mark.parametrize(
+    ("linear", "chest", "told"),
+    [("gravity", True, "f_k, s_k, c_k"), ("velocity", True, "v_k, s_k, c_k"), ("none", False, "s_k")],
+)
+def test_the_history_told_is_that_of_the_model(tmp_path, linear, chest, told):
+    spec = BoundarySpec(linear=linear, chest=chest)
+    export_model(write_random_model(tmp_path / "random.neuralocks", 1.0, spec, anchored=False), tmp_path)
+    described = json.loads((tmp_path / "description.json").read_text("utf-8"))
+    history = described["boundary vector"]["how"]["history"]
+    assert f"is {told}, three numbers each" in history
+    assert all((f"{step} =" in history) == (step in told) for step in ("f_k", "v_k", "s_k"))
+    assert ("the same of the upper chest" in history) == chest
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
