@@ -228,8 +228,8 @@ def _facing(model: RigModel) -> str:
 
 
 def _plain(text: str) -> str:
-    """What may stand in a comment, whoever made the model."""
-    return re.sub(r"[^\w ,.:-]", "_", text[:300])
+    """What may stand in a comment, whoever made the model, in plain ASCII: a compiler may read it in any code page."""
+    return re.sub(r"[^\w ,.:-]", "_", text[:300]).encode("ascii", "backslashreplace").decode()
 
 
 def _float(value) -> str:
