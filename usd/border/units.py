@@ -12,6 +12,8 @@ from neuralocks_core.errors import NeuralocksError
 SLOWEST, FASTEST = 12.0, 600.0
 """Time codes per second between which one time code is a frame, of a slow-motion camera too; other stages count
 seconds, or milliseconds."""
+USUAL = 24.0
+"""Frames per second of a stage that tells neither by its time codes nor by framesPerSecond how many there are."""
 
 
 @dataclass(frozen=True)
@@ -23,12 +25,14 @@ class Border:
         up_axis: "Y" or "Z".
         rate: time codes per second.
         frame: time codes from one frame to the next.
+        guessed: whether the stage does not tell that, so that it is USUAL frames a second.
     """
 
     metres_per_unit: float
     up_axis: str
     rate: float
     frame: float = 1.0
+    guessed: bool = False
 
     @property
     def to_core(self) -> np.ndarray:
@@ -69,6 +73,15 @@ class Border:
             return ""
         return f"has {root.GetInfo('upAxis')} up, the stage {self.up_axis}"
 
+    def frame_notes(self, subject: str) -> list[str]:
+        """The note on a stage that does not tell how long a frame is, beginning with `subject`."""
+        if not self.guessed:
+            return []
+        return [
+            f"{subject}: timeCodesPerSecond is {self.rate:g} and no framesPerSecond says how many frames that are, so they "
+            f"are {USUAL:g}; author framesPerSecond"
+        ]
+
     def seconds(self, time_codes) -> np.ndarray:
         """Times [s] of time codes."""
         return np.asarray(time_codes, float) / self.rate
@@ -96,6 +109,8 @@ class Border:
         rate = float(stage.GetTimeCodesPerSecond())
         if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
             raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, 24 say")
-        shown = stage.GetFramesPerSecond()
-        frame = 1.0 if usual(rate) else rate / (shown if usual(shown) else 24.0)
-        return cls(unit, up, rate, frame)
+        shown = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else math.nan
+        # At 1 and 1 a stage counts seconds all the same.
+        if usual(rate) or rate == shown > 1:
+            return cls(unit, up, rate)
+        return cls(unit, up, rate, rate / (shown if usual(shown) else USUAL), not usual(shown))

@@ -42,8 +42,8 @@ _CLIP = (
     f"shot's range adds its end where that lies after the last of them, and its start where that lies {STAND:g} s or more before "
     "the first: the character stands meanwhile. A start less than that before it adds nothing. Between two "
     f"samples farther apart than {CLOSE:g} s each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
-    f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second, a framesPerSecond-th of a second, counted "
-    f"from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and of the two sides of a "
+    f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second and framesPerSecond differs, a framesPerSecond-th "
+    f"of a second, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and of the two sides of a "
     f"step, which are less than {STEP:g} frames apart and more than {ALONE:g} times as far from the samples around them; no frame less than "
     f"{STEP:g} frames before a step is a sample"
 )

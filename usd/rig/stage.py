@@ -136,7 +136,8 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
         pose_joints: semantic joints that the network reads beside the head.
     """
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
-    return [*source.notes, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
+    frames = source.border.frame_notes(source.path)
+    return [*source.notes, *frames, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

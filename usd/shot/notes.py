@@ -34,9 +34,10 @@ def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
 
 def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them; and where
-    no layer says the unit that counts.
+    no layer says the unit that counts, or how long a frame is.
     """
-    border, notes, layers = Border.of(stage), [], stage.GetLayerStack(includeSessionLayers=False)
+    border, layers = Border.of(stage), stage.GetLayerStack(includeSessionLayers=False)
+    notes = border.frame_notes(path.name)
     for layer in layers[1:]:
         if differs := border.differing(layer):
             notes.append(

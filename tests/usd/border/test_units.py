@@ -1,16 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a stage's own numbers mean."""
 
+from pathlib import Path
+
 import pytest
 from pxr import Usd
 
 from usd.border.units import Border
+from usd.shot.notes import layer_notes
 
 
-@pytest.mark.parametrize(("rate", "shown", "frame"), [(24, 30, 1.0), (1000, 30, 1000 / 30), (1000, 0.5, 1000 / 24)])
+@pytest.mark.parametrize(
+    ("rate", "shown", "frame"),
+    [(24, 30, 1.0), (1000, 30, 1000 / 30), (1000, 0.5, 1000 / 24), (1000, 1000, 1.0), (8, 8, 1.0), (1, 1, 1 / 24)],
+)
 def test_a_frame_is_a_time_code_unless_these_are_too_fine(rate, shown, frame):
-    """Then it is one of the frames a second that the stage is shown with, or 24 where those cannot be meant."""
+    """Then it is one of the frames a second that the stage is shown with, or 24 where those cannot be meant; a stage that is
+    shown with as many frames as it counts time codes means these, but where it counts seconds.
+    """
     stage = Usd.Stage.CreateInMemory()
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(shown)
     assert Border.of(stage).frame == frame
+
+
+@pytest.mark.parametrize(
+    ("rate", "shown", "told"), [(1000, 30, 0), (1000, 1000, 0), (24, None, 0), (1000, 0.5, 1), (1000, None, 1)]
+)
+def test_a_guessed_frame_is_told(rate, shown, told):
+    """A stage of milliseconds that does not say more is baked at 24 frames a second."""
+    stage = Usd.Stage.CreateInMemory()
+    stage.SetTimeCodesPerSecond(rate)
+    if shown is not None:
+        stage.SetFramesPerSecond(shown)
+    assert len(Border.of(stage).frame_notes("shot.usda")) == told
+    assert len(layer_notes(stage, Path("shot.usda"))) == 1 + told  # no unit is authored

@@ -28,6 +28,7 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
     """The character begins with the speed that it has; held for 0.1 s it stands."""
     path = write_shot(tmp_path, Recipe(rate=rate, frames=9))
     stage = Usd.Stage.Open(str(path))
+    stage.SetFramesPerSecond(24)  # the last one counts milliseconds
 
     def read(hold):
         stage.SetStartTimeCode(1 - hold * rate)
