@@ -32,7 +32,7 @@ def test_frames_are_the_shots_where_its_time_codes_are_seconds_or_milliseconds(t
     shots = [write_shot(tmp_path, Recipe(rate=24, frames=9), "frames"), tmp_path / "counted.usda"]
     stage = Usd.Stage.Open(Usd.Stage.Open(str(shots[0])).Flatten())
     stage.SetTimeCodesPerSecond(rate)
-    stage.SetFramesPerSecond(rate if rate > 24 else 24)
+    stage.SetFramesPerSecond(24)
     stage.SetStartTimeCode(rate / 24)
     stage.SetEndTimeCode(9 * rate / 24)
     motion = stage.GetPrimAtPath("/Hero/Rig/Motion")
