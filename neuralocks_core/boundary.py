@@ -18,6 +18,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import MEASURES, measures_read
 from neuralocks_core.motion import GRAVITY, Clip, G
+from neuralocks_core.stepped import Stepped
 from neuralocks_core.track import Track
 
 POSE_JOINTS = ("neck", "upper_chest", "left_shoulder", "right_shoulder", "left_upper_arm", "right_upper_arm")
@@ -137,8 +138,8 @@ def joints_read(character: Character, pose_joints=POSE_JOINTS) -> list[int]:
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
-    Motion between samples, before and after the clip is that of `Track`; after a cut, that of the part of the clip by
-    itself.
+    Motion between samples, before and after the clip is that of `Track`, on twos that of `Stepped`; after a cut, that of the
+    part of the clip by itself.
 
     Attributes:
         joints: joint indices of the head, the upper chest and the pose joints (n + 2,).
@@ -160,7 +161,8 @@ class BoundarySampler:
         self.stance = np.stack([_stance(character, name) for name in spec.pose_joints])
         parts = clip.parts if spec.bins else [clip]
         self._cuts = np.array([part.start for part in parts[1:]])
-        self._tracks = [Track(character, part, self.joints) for part in parts]
+        self._stepped = [Stepped.of(part, self.joints) for part in parts]
+        self._tracks = [Track(character, each.clip, self.joints) for each in self._stepped]
         self._bin_weights = spec.bin_weights
         self._shape_cache: dict[bytes, np.ndarray] = {}
 
@@ -229,7 +231,8 @@ class BoundarySampler:
         part = np.searchsorted(self._cuts - 1e-9, times, side="right")
         for one in np.unique(part):
             rows = part == one
-            places, rotations = self._tracks[one].at((times[rows, None] - lags).ravel())
+            shown = self._stepped[one].times(times[rows])
+            places, rotations = self._tracks[one].at((shown[:, None] - lags).ravel())
             position[rows] = places.reshape(-1, len(lags), 3)
             turns[rows] = rotations.reshape(-1, len(lags), len(self.joints), 3, 3)
         return position, turns

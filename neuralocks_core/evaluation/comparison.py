@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neuralocks_core import metrics
+from neuralocks_core.boundary import joints_read
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
@@ -15,6 +16,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.smooth_motion import SmoothMotion
+from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 
@@ -101,6 +103,8 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
     """What `simulated` gives, of a clip without cuts and with hair at rest at `start` [s]."""
     from neuralocks_core.reference import simulate
 
+    stepped = Stepped.of(clip, joints_read(character))
+    clip, start, times = stepped.clip, stepped.times(np.array([start]))[0], stepped.times(times)
     # One step more than the last time needs: how hair goes on there is known, whichever times are wanted.
     clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
     joints, shapes = _unscaled(character, _without_stop(character, clip, clock, times[-1])), clip.shape_at(clock)

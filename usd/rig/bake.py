@@ -22,7 +22,7 @@ from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_input
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import without_turn, written_notes
+from ..shot.notes import on_twos, without_turn, written_notes
 from ..shot.stage import check_cuts, frame_range
 from .layer import write_rig_layer
 from .stage import RiggedHair, mirrored_notes, read_rigged_hair, rigged_notes
@@ -117,6 +117,7 @@ def bake_rig(
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
     notes += hair.source.loop_notes(wanted, moved) if loop else []
+    notes += on_twos(hair.source, model.spec.pose_joints) if model.dynamic else []
     if (loop or cuts is None) and model.dynamic:
         notes += hair.source.cut_notes(loop)
     notes += written_notes(hair.stage, [hair.source], out, wanted)

@@ -14,6 +14,7 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rotation import flat
+from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.arclength import count_pointlike
 
 from ..border.damage import text_of
@@ -130,10 +131,27 @@ def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
 
 
 def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
-    """The notes on a held pose, on joints that were not recognized by name and on a head of an unlikely size."""
+    """The notes on a held pose and on poses that are held for some frames, on joints that were not recognized by name and on a
+    head of an unlikely size.
+    """
     held = len(rig.time_codes) == 1
     notes = [f"{rig.path}: the animation has one sample, so the hair is that of a held pose"] if held else []
-    return notes + unfound(rig, joints) + unlikely_head(rig)
+    return notes + on_twos(rig, joints) + unfound(rig, joints) + unlikely_head(rig)
+
+
+def on_twos(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
+    """The note on animation that holds its poses for some frames each, as far as hair reads it."""
+    if "head" not in rig.character.humanoid:
+        return []
+    read = joints_read(rig.character, joints)
+    held = np.concatenate([Stepped.of(part, read).held for part in rig.clip.parts])
+    if not len(held):
+        return []
+    frames = np.array([held.min(), held.max()]) * np.median(np.diff(rig.time_codes)) / rig.border.frame
+    named = " to ".join(dict.fromkeys(f"{each:.3g}" for each in frames))
+    return [
+        f"{rig.path}: its animation holds poses for {named} frames each; hair moves as if it went on smoothly in between"
+    ]
 
 
 def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:

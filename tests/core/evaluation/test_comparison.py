@@ -87,6 +87,19 @@ def test_a_reference_is_as_smooth_at_every_rate_as_on_the_solvers_own_clock():
         assert metrics.motion_error(true(times), found, strands.length)["median"] < 0.01
 
 
+def test_the_reference_of_animation_on_twos_is_that_of_the_smooth_motion_held_with_each_pose():
+    character, strands = person(HEAD.vertices + CENTRE, {}), lying_strands(person(HEAD.vertices + CENTRE, {}))
+    times = np.arange(24) / 24
+    joints = np.tile(rigs.bind(), (24, 1, 1, 1))
+    joints[:, :, 0, 3] += 1.5 * times[:, None]
+    joints[:, rigs.HEAD, :3, :3] = rotation.from_vector(np.outer(0.5 * np.sin(6 * times), [0, 1, 0]))
+    first = np.arange(24) - np.arange(24) % 2
+    smooth = simulated(character, strands, Clip(times[::2], joints[::2]), times[::2])
+    np.testing.assert_allclose(
+        simulated(character, strands, Clip(times, joints[first]), times), smooth.repeat(2, axis=0), atol=1e-6
+    )
+
+
 def test_a_part_of_the_times_wanted_is_the_same():
     character, (times, joints) = person(HEAD.vertices + CENTRE, {}), pushed(20)
     strands, wanted = lying_strands(character), np.arange(10) / 24
