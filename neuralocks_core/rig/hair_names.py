@@ -9,21 +9,25 @@ _HAIR_ALONE = (
     "hair|pony|braid|pigtail|twintail|ahoge|mane|plait|dreadlock|forelock|sidelock|sideburn|topknot|cowlick|ringlet|mohawk|quiff"
     "|ponite"
 )
-_HAIR = f"{_HAIR_ALONE}|bang(?!le)|fringe|tress|strand|lock(?!et)|curl|kami|dread|bun(?!ny)|wig(?!gle)"
+_HAIR = f"{_HAIR_ALONE}|bang(?!le)|fringe|tress|strand|kami|dread|bun(?!ny)|wig(?!gle)"
+_HAIR_OR_FACE = "lock(?!et)|curl"
+"""What features do, too: lips and tongues curl."""
+_FEATURES = "(?:left|right)?eye|lid|brow(?!n)|jaw|tongue|teeth|tooth|lip|mouth|nose|nostril|lash|oris|snout|muzzle|beak"
 _FACE = (
-    "(?:left|right)?eye|lid|brow|jaw|tongue|teeth|tooth|lip|mouth|cheek|nose|nostril|chin|face|facial|lash|ear|earring|temple|forehead"
-    "|pupil|iris|oris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
+    f"{_FEATURES}|cheek|chin|face|facial|ear|earring|temple|forehead"
+    "|pupil|iris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
     "|whisker|mo?ustache|bunny|neko"
-    "|snout|muzzle|beak|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
+    "|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
     "|antenna|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
     "|(?:bow|pin|clip|cap|hood|veil|mask|halo|bell|gem|wing|mic)s?$"
 )
 _HAIR_ANYWHERE = re.compile(
-    "hair|pigtail|twintail|sidetail|(?:mae|ushiro|yoko)gami"
-    "|髪|アホ毛|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ"
-    "|头发|髮|刘海|马尾|辫|呆毛|머리카락|앞머리|뒷머리|옆머리"
+    "(?<!c)hair|pigtail|twintail|sidetail|(?:mae|ushiro|yoko)gami"
+    "|髪|アホ毛|アホゲ|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ|ちょんまげ|触角"
+    r"|髮|刘海|马尾|辫|鬓|呆毛|[头前后侧长]发|发(?![^\W\da-z左右])|머리카락|앞머리|뒷머리|옆머리"
 )
-"""Wherever in a name they stand; those of MikuMikuDance rigs come in files with UTF-8 names."""
+"""Wherever in a name they stand, but 发, which also begins other words, at a word's end; those of MikuMikuDance rigs come in
+files with UTF-8 names."""
 _FACE_ANYWHERE = re.compile(
     "headphone|headset|headband|headdress|headgear|headwear"
     "|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|耳|鼻|頬|ほほ|ひげ|髭|角"
@@ -32,7 +36,7 @@ _FACE_ANYWHERE = re.compile(
 )
 _WORN_IN_HAIR = re.compile(
     r"hair(?:pin|clip|band|tie|bow|accessor|ornament|decor|net|flower)|ribbon"
-    r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止)|发(?:带|夹|卡)"
+    r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止)|发(?:带|夹|卡|箍|簪|圈|绳)"
 )
 """Ribbons and pins are stiff, or have an animation of their own: they ride on the hair or the head."""
 
@@ -44,6 +48,8 @@ def says_hair(name: str) -> bool:
         return False
     if _begins(name, _HAIR) or _HAIR_ANYWHERE.search(whole):
         return True
+    if _begins(name, _HAIR_OR_FACE):
+        return not _begins(name, _FEATURES)
     # Below a head these are hair, unless another word says what is meant: `brow_tail`, まつ毛.
     return not says_face(name) and (_begins(name, "tail|tuft") or "毛" in whole)
 

@@ -54,6 +54,27 @@ def test_what_names_of_many_conventions_say():
     assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
 
 
+def test_features_may_curl_and_lock():
+    """The bake would write over their animation; by ears and on foreheads lies hair."""
+    features = "lip_curl_1 tongue_curl_L_2 brow_lock_1 eyeLock_R lash_curl_L"
+    assert [name for name in features.split() if says_hair(name) or not says_face(name)] == []
+    hair = "curl_1 lock_L_2 ear_lock_L forehead_curl pin_curl_1 brown_curl_1 eye_bangs_L"
+    assert [name for name in hair.split() if not says_hair(name)] == []
+
+
+def test_hair_in_chinese_and_in_the_words_of_animation():
+    """发 at a word's end is hair; it also begins other words."""
+    hair = "前发_左_1 后发1 侧发_R 鬓发 长发_1 卷发_左_1 发_02 アホゲ_1 触角_左 ちょんまげ 앞머리1 뒷머리"
+    other = "发光 发射_1 发带 发夹_L 发簪 머리 머리끝"
+    assert [name for name in hair.split() if not says_hair(name)] == []
+    assert [name for name in other.split() if says_hair(name)] == []
+
+
+def test_a_chair_is_no_hair():
+    assert not any(map(says_hair, "wheelchair chair_01 Armchair prop_chair".split()))
+    assert all(map(says_hair, "C_Hair CHair_1 bang_c_hair J_C_HAIR BackHair".split()))
+
+
 def test_what_says_hair_wherever_it_hangs():
     """Coats have tails, fringes and strands; fingers curl, and rigs have locators."""
     assert all(map(says_hair_alone, "hair0_0 J_Sec_Hair1_01 PonyTail_L 左髪_1 braid_02 Mane_01".split()))
