@@ -27,8 +27,10 @@ def outside_notes(source: StageRig) -> list[str]:
     above = carrier(names[character.head], *loose)
     chest = character.humanoid.get("upper_chest")
     neck = names[character.head].removeprefix("" if chest is None else names[chest]).split("/")
-    hang = f"and {len(loose) - 1} more hang from '{above}' and are" if loose[1:] else f"hangs from '{above}' and is"
-    remedy = (
-        f"to move all, train and bake with --head {above}" if above in neck else "hang them from the head in the rig"
-    )
+    hang, them = f"hangs from '{above}' and is", "it"
+    if loose[1:]:
+        hang, them = f"and {len(loose) - 1} more hang from '{above}' and are", "them"
+    remedy = f"hang {them} from the head in the rig"
+    if above in neck:
+        remedy = f"to move all, train and bake with --head {above}"
     return [f"{source.path}: '{leaf(loose[0])}' {hang} not moved; {remedy}"]
