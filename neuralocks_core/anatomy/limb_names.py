@@ -51,6 +51,9 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
     if found["lower_leg"] is not None:  # a control of the leg may have its name, and stand nearer to the root
         over = first(PARTS["upper_leg"], among=ancestors(found["lower_leg"], parents)[1:])
         found["upper_leg"] = found["upper_leg"] if over is None else over
+        above = parents[found["lower_leg"]]
+        if found["upper_leg"] is None and above >= 0 and sides[above] == side and keys[above] == "leg":
+            found["upper_leg"] = int(above)  # MikuMikuDance in English: `leg`, `knee`, `ankle`
     if found["upper_leg"] is None and _numbered(found["lower_leg"], side, sides, keys, parents):
         found["upper_leg"], found["lower_leg"] = found["lower_leg"], None
     if found["upper_arm"] is None and plain is not None:

@@ -223,6 +223,10 @@ RIGS = {
         "    lowerarm_l\n     hand_l\n     wrist_l\n  upperarm_r",
         {"left_foot": "foot_l", "left_hand": "hand_l"},
     ),
+    "MikuMikuDance in English": (
+        "center\n upper_body\n  neck\n   head\n  arm_L\n   elbow_L\n  arm_R\n lower_body\n  leg_L\n   knee_L\n    ankle_L\n  leg_R",
+        {"left_upper_leg": "leg_L", "left_lower_leg": "knee_L", "left_foot": "ankle_L", "left_lower_arm": "elbow_L"},
+    ),
     "Motive": (
         "Hip\n Ab\n  Chest\n   Neck\n    Head\n   LShoulder\n    LUArm\n     LFArm\n      LHand\n   RShoulder\n    RUArm\n"
         "     RFArm\n LThigh\n  LShin\n RThigh",
