@@ -10,7 +10,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_hair
-from neuralocks_core.rig.measuring import measured_chains
+from neuralocks_core.rig.measuring import driving, measured_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 CAP = 0.7
@@ -90,25 +90,25 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
     """First joints of the subtrees that are hair by their names or by what they drive."""
     skeleton, head = character.skeleton, character.head
     names, children = skeleton.names, skeleton.children
-    used, body = np.zeros((2, len(names)), bool)
+    used, body = driving(skeleton, meshes), np.zeros(len(names), bool)
     outside = ~skeleton.below(head)
     for mesh in meshes or ():
         drives = mesh.driven_by(len(names))
-        used |= drives
         if (drives & outside).any():
             body |= drives
     tops, todo = [], [(joint, False) for joint in children[head]]
     while todo:
         joint, worn = todo.pop()
         tree = np.flatnonzero(skeleton.below(joint))
-        hair = says_hair(names[joint])
+        steered = _steered(character, joint, used, meshes)
+        hair = any(says_hair(names[j]) for j in [joint, *steered])
         if meshes and not used[tree].any():
             continue
         # Below a jaw or a hat only a name makes hair.
         worn = worn or says_face(names[joint]) and not hair
         below = [(child, worn) for child in children[joint]]
         # A holder that drives nothing is no bone of hair: its children are. Without meshes only a fan tells.
-        if (not used[joint] and below) if meshes else len(below) > 1:
+        if (not used[joint] and below and not steered) if meshes else len(below) > 1:
             todo += below
             continue
         strange = len(tree) > 1 and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
@@ -117,6 +117,18 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         else:
             tops.append(joint)
     return tops
+
+
+def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[SkinnedMesh] | None) -> list[int]:
+    """What rides on a joint that drives nothing itself but is a bone of hair, as in a chain of controls: one other joint goes on
+    from it, on which something rides, too. Taken for a holder, it would leave each bone to turn about a pivot of its own.
+    """
+    skeleton = character.skeleton
+    riding = riders(skeleton, joint, used)
+    on = [child for child in skeleton.children[joint] if child not in riding and used[skeleton.below(child)].any()]
+    if used[joint] or len(on) != 1 or used[on[0]] or not riders(skeleton, on[0], used):
+        return []
+    return [] if any(_is_cap(character, rider, meshes) for rider in riding) else riding
 
 
 def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:

@@ -28,13 +28,13 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     """
     skeleton = character.skeleton
     places = character.canonical(skeleton.bind[:, :3, 3])
-    rows, free = _moving(character, tops, meshes, places)
+    rows, free, ends = _moving(character, tops, meshes, places)
     if not rows:
         raise NeuralocksError(
             f"skeleton: hair joint '{leaf(skeleton.names[tops[0]])}' drives no vertices and has no child; "
             "skin the hair to its joints or choose others with --chains"
         )
-    bone_joint, bone_end, bones = _bones(skeleton, rows, free, places)
+    bone_joint, bone_end, bones = _bones(skeleton, rows, free, ends, places)
     joints = np.array(list(rows), int)
     names = [leaf(skeleton.names[j]) for j in joints]
     double = next((n for n in names if names.count(n) > 1), None)
@@ -66,29 +66,52 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     )
 
 
-def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict]:
-    """Joints that move -> their row among the hair joints, and -> the free end of their bone (3,) [m], if they have one."""
+def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
+    """Last joints that hang at a joint's own place and drive skin, as the deforming ones of a control rig: they turn with it.
+
+    Args:
+        skeleton: bind pose, in which places are compared [m].
+        joint: index in the skeleton.
+        drives: which joints drive skin, (J,) bool.
+    """
+    places = skeleton.bind[:, :3, 3]
+    last = [child for child in skeleton.children[joint] if drives[child] and not skeleton.children[child]]
+    return [child for child in last if np.linalg.norm(places[child] - places[joint]) < NO_BONE]
+
+
+def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict, dict]:
+    """Joints that move -> their row among the hair joints, -> the free end of their bone (3,) [m], if they have one, and
+    -> the joints at the other ends of their bones.
+    """
     skeleton = character.skeleton
+    drives = driving(skeleton, meshes)
     order = np.flatnonzero(np.any([skeleton.below(top) for top in tops], axis=0)).tolist()
-    carries = _carrying(skeleton, order, meshes)
-    rows, free = {}, {}
+    carries = _carrying(skeleton, order, drives)
+    rows, free, ends = {}, {}, {}
     for joint in order:
-        last = not skeleton.children[joint]
-        end = _free_end(character, joint, joint in tops, meshes, places) if last else None
-        if not last and joint in carries or end is not None:
-            rows[joint] = len(rows)
-            free[joint] = end
-    return rows, free
+        riding = riders(skeleton, joint, drives)
+        beyond = [child for child in skeleton.children[joint] if child not in riding]
+        end = None if beyond else _free_end(character, [joint, *riding], joint in tops, meshes, places)
+        if beyond and joint in carries or end is not None:
+            rows[joint], free[joint], ends[joint] = len(rows), end, beyond
+    return rows, free, ends
 
 
-def _bones(skeleton: Skeleton, rows: dict, free: dict, places: np.ndarray) -> tuple[list, list, np.ndarray]:
+def driving(skeleton: Skeleton, meshes: list[SkinnedMesh] | None) -> np.ndarray:
+    """Which joints (J,) bool drive skin of any mesh."""
+    drives = np.zeros(len(skeleton.names), bool)
+    for mesh in meshes or ():
+        drives |= mesh.driven_by(len(drives))
+    return drives
+
+
+def _bones(skeleton: Skeleton, rows: dict, free: dict, ends: dict, places: np.ndarray) -> tuple[list, list, np.ndarray]:
     """Each bone's joint and the one at its end (-1: none that moves), as rows, and its vector (M, 3) [m]."""
     bone_joint, bone_end, bones = [], [], []
     for joint, row in rows.items():
-        children = skeleton.children[joint]
-        for end, place in [(rows.get(child, -1), places[child]) for child in children] or [(-1, free[joint])]:
+        for end, place in [(rows.get(child, -1), places[child]) for child in ends[joint]] or [(-1, free[joint])]:
             if np.linalg.norm(place - places[joint]) < NO_BONE:
-                child = next((leaf(skeleton.names[c]) for c in children), "its end")
+                child = next((leaf(skeleton.names[c]) for c in ends[joint]), "its end")
                 raise NeuralocksError(
                     f"skeleton: hair bone '{leaf(skeleton.names[joint])}' has no length ('{child}' lies at the same place); "
                     "move or remove one of the two, or leave the chain out with --chains"
@@ -99,35 +122,31 @@ def _bones(skeleton: Skeleton, rows: dict, free: dict, places: np.ndarray) -> tu
     return bone_joint, bone_end, np.array(bones)
 
 
-def _carrying(skeleton: Skeleton, order: list[int], meshes: list[SkinnedMesh] | None) -> set[int]:
+def _carrying(skeleton: Skeleton, order: list[int], drives: np.ndarray) -> set[int]:
     """Those of these joints that drive skin or have skin further down: end joints may have ends of their own, which
     exporters add. All of them where none drives any, as in a rig that nobody has skinned yet.
     """
-    parents = skeleton.parents
-    used = np.zeros(len(parents), bool)
-    for mesh in meshes or ():
-        used |= mesh.driven_by(len(parents))
     carries = set()
     for joint in order:
-        up = joint if used[joint] else -1
+        up = joint if drives[joint] else -1
         while up >= 0 and up not in carries:
             carries.add(up)
-            up = int(parents[up])
+            up = int(skeleton.parents[up])
     return carries if carries else set(order)
 
 
-def _free_end(character: Character, joint: int, is_top: bool, meshes, places: np.ndarray) -> np.ndarray | None:
+def _free_end(character: Character, own: list[int], is_top: bool, meshes, places: np.ndarray) -> np.ndarray | None:
     """Where the bone of a last joint ends (3,) [m]: as far as its skin reaches. None if it drives nothing, that is, if
     it is an end marker.
 
     Args:
+        own: the joint, and those that ride on it.
         is_top: a chain of this joint alone, which points where its skin does; others go on as the bone before.
         places: of all joints in canonical space, (J, 3) [m].
     """
-    parent = int(character.skeleton.parents[joint])
-    points = [
-        mesh.points[np.sum(mesh.joint_weights * (mesh.joint_indices == joint), axis=1) > 0.3] for mesh in meshes or ()
-    ]
+    joint, parent = own[0], int(character.skeleton.parents[own[0]])
+    mask = np.isin(np.arange(len(places)), own)
+    points = [mesh.points[mesh.weight_on(mask) > 0.3] for mesh in meshes or ()]
     points = np.concatenate(points) if points else np.zeros((0, 3))
     if not len(points):
         return None

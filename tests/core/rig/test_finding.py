@@ -91,6 +91,45 @@ def test_a_holder_that_drives_nothing_is_no_bone(name):
     assert find_chains(who, meshes).names == ("hair_1", "hair_2")
 
 
+def _steered(leaf, next_leaf=True):
+    """A chain of three controls, each with a joint at its own place that drives its bone's skin, and that skin."""
+    rows, skins = [], {}
+    for i, (name, parent, place) in enumerate(tail("phys", 3)):
+        rows += [(name, parent, place), (f"{leaf}_{i + 1}", name, place if i != 1 or next_leaf else (0, 1.5, -0.2))]
+        skins[f"{leaf}_{i + 1}"] = [place, np.add(place, (0, -0.03, -0.005)), np.add(place, (0, -0.06, -0.01))]
+    return character(rows), skins
+
+
+@pytest.mark.parametrize("patterns", [None, ["phys_1"]])
+def test_a_chain_of_controls_with_deforming_joints_beside_them_is_one_chain(patterns):
+    """Each of these by itself would turn about a pivot of its own, and the skin gape."""
+    who, skins = _steered("hair")
+    chains = find_chains(who, [skin(who, skins)], patterns)
+    assert chains.names == ("phys_1", "phys_2", "phys_3") and list(chains.parents) == [-1, 0, 1]
+    assert chains.chain_length(0) == pytest.approx(3 * np.hypot(0.06, 0.01))
+
+
+def test_a_holder_of_pieces_that_do_not_go_on_from_each_other_is_no_bone():
+    """What hangs from the next joint is off its place: a group in a group."""
+    who, skins = _steered("hair", next_leaf=False)
+    assert "phys_1" not in find_chains(who, [skin(who, skins)]).names
+
+
+def test_a_control_of_the_cap_of_the_hair_is_no_bone():
+    """As where the joint drives it itself."""
+    who, skins = _steered("hair")
+    del skins["hair_1"]
+    meshes = [skin(who, skins), _ring(who, "head"), _ring(who, "hair_1")]
+    names = find_chains(who, meshes).names
+    assert names[-2:] == ("phys_2", "phys_3") and "phys_1" not in names
+
+
+def test_controls_of_a_face_are_no_hair():
+    who, skins = _steered("lip")
+    with pytest.raises(NeuralocksError, match="no hair chains"):
+        find_chains(who, [skin(who, skins)])
+
+
 def test_hair_in_compound_and_japanese_names():
     """Where the hair is part of the body's mesh, only names tell."""
     who = character([*tail("PigTailL", 2), *tail("左髪", 2, at=(0.1, 1.6, 0)), *tail("cable", 2, at=(-0.1, 1.6, 0))])
@@ -113,19 +152,19 @@ def test_what_a_head_wears_is_no_hair(name):
 def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
     """Turned, it would take all hair through the forehead: the tails that hang from it move."""
     who = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3, parent="Hair")])
-    ring = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1) * [0.1, 1, 0.1]
     tails = skin(who, {"Hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "Hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
+    head = _ring(who, "head")
+    assert find_chains(who, [head, tails, _ring(who, "Hair", 1.1)]).names == ("Hair_1", "Hair_2")
+    assert find_chains(who, [head, tails, _ring(who, "Hair", 0.2)]).names == ("Hair", "Hair_1", "Hair_2")
 
-    def driven(joint, points):
-        index = [n.rsplit("/", 1)[-1] for n in who.skeleton.names].index(joint)
-        return replace(
-            tails, points=points, joint_indices=np.full((12, 1), index), joint_weights=np.ones((12, 1)), triangles=[]
-        )
 
-    head = driven("head", ring)
-    assert find_chains(who, [head, tails, driven("Hair", ring * [1.1, 1, 1.1])]).names == ("Hair_1", "Hair_2")
-    lock = ring * [0.2, 1, 0.2]
-    assert find_chains(who, [head, tails, driven("Hair", lock)]).names == ("Hair", "Hair_1", "Hair_2")
+def _ring(who, joint, size=1.0):
+    """Skin around the head, which a joint drives."""
+    points = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1)
+    mesh = skin(who, {joint: points[:3]})
+    indices = np.full((12, 1), mesh.joint_indices[0, 0])
+    points = points * [0.1 * size, 1, 0.1 * size]
+    return replace(mesh, points=points, joint_indices=indices, joint_weights=np.ones((12, 1)), triangles=[])
 
 
 def test_a_branching_chain_is_one_chain():
