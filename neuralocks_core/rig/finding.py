@@ -13,6 +13,8 @@ from neuralocks_core.rig.hair_names import says_face, says_hair
 from neuralocks_core.rig.measuring import driving, measured_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
+UNNAMED = 3
+"""Joints in a row that drive skin below a head may be hair, whatever they are called."""
 CAP = 0.7
 """Share of the head's width and depth that skin must cover to be a cap."""
 
@@ -56,6 +58,28 @@ def find_chains(
             f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); {remedy}"
         )
     return measured_chains(character, sorted(tops), meshes)
+
+
+def left_out(character: Character, meshes: list[SkinnedMesh], chains: HairChains) -> list[int]:
+    """First joints of chains below the head that may be hair, but move with none: of names that say nothing, in a mesh that the
+    body drives, too.
+    """
+    skeleton, found = character.skeleton, []
+    drives = driving(skeleton, meshes)
+    face = np.array([says_face(name) for name in skeleton.names])
+    moved = np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
+
+    def in_a_row(joint: int) -> int:
+        return int(drives[joint]) + max(map(in_a_row, skeleton.children[joint]), default=0)
+
+    todo = list(skeleton.children[character.head])
+    while todo:
+        joint = todo.pop(0)
+        if not face[joint] and drives[joint] and not ((face | moved) & skeleton.below(joint)).any():
+            found += [joint] if in_a_row(joint) >= UNNAMED else []
+        elif not face[joint] and not moved[joint]:
+            todo += skeleton.children[joint]
+    return sorted(found)
 
 
 def fits(name: str, pattern: str) -> bool:

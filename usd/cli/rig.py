@@ -158,11 +158,11 @@ def inspect(
     as_json: AsJson = False,
 ) -> None:
     """List the hair chains of a rig with their lengths and joint counts."""
-    from ..rig.stage import check_patterns, describe_chains, read_rigged_hair, rigged_notes
+    from ..rig.stage import chain_notes, check_patterns, describe_chains, read_rigged_hair, rigged_notes
 
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"))
     check_patterns(hair, chains)
-    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.source)
+    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.source) + chain_notes(hair, chains)
     if as_json:
         print_json({"skeleton": hair.source.path, "chains": rows, "notes": notes})
         return

@@ -22,7 +22,7 @@ from ..border.placement import Placement
 from ..border.stage_files import OTHERS, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
-from ..rig.outside import outside_notes
+from ..rig.outside import left_out_notes, outside_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
@@ -147,7 +147,8 @@ def _rig(rig: StageRig) -> dict:
 def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
     """Hair joints of rigged mesh hair; none is nothing to report."""
     try:
-        chains = assemble_rig(rig.character, core_meshes(rig)).chains
+        meshes = core_meshes(rig)
+        chains = assemble_rig(rig.character, meshes).chains
         check_orients(rig, chains)
     except NoHairChains:
         return []
@@ -156,6 +157,7 @@ def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
     spoils += weight_notes(rig) + facing_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
+    spoils += left_out_notes(rig, meshes, chains)
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
     ]

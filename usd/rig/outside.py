@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair joints that do not hang from the head, and that nothing moves therefore."""
+"""Joints that nothing moves, though they are hair or may be: those that do not hang from the head, and those of other names."""
 
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import carrier, leaf
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.finding import left_out
 from neuralocks_core.rig.hair_names import says_hair_alone
-from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT
+from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
 from ..skel.source import StageRig
 
@@ -34,3 +36,20 @@ def outside_notes(source: StageRig) -> list[str]:
     if above in neck:
         remedy = f"to move all, train and bake with --head {above}"
     return [f"{source.path}: '{leaf(loose[0])}' {hang} not moved; {remedy}"]
+
+
+def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChains) -> list[str]:
+    """The note on chains below the head that were not found, where some were found by themselves.
+
+    Args:
+        source: the character.
+        meshes: its skinned meshes in the core's axes.
+        chains: those that were found.
+    """
+    found = [leaf(source.source.names[joint]) for joint in left_out(source.character, meshes, chains)]
+    if not found:
+        return []
+    what, they = f"'{found[0]}' is", "it is"
+    if found[1:]:
+        what, they = f"'{found[0]}' and {len(found) - 1} more are", "they are"
+    return [f"{source.path}: {what} not moved; if {they} hair, name all that is to move with --chains"]

@@ -25,7 +25,7 @@ from ..shot.notes import another_head, unfound, unlikely_head
 from ..skel.source import StageRig, find_skeletons, read_rig
 from ..skel.surface import find_skins, rest_primvar
 from .facing import facing_notes
-from .outside import outside_notes
+from .outside import left_out_notes, outside_notes
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
@@ -138,6 +138,11 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
     frames = source.border.frame_notes(source.path)
     return [*source.notes, *frames, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
+
+
+def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
+    """What a user should know about the choice of chains that was made for them; of their own, by patterns, they know."""
+    return [] if patterns else left_out_notes(hair.source, core_meshes(hair.source), hair.rig.chains)
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

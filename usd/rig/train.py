@@ -12,7 +12,7 @@ from neuralocks_core.progress import Progress
 
 from ..border.amounts import check_number
 from ..border.extras import check_training
-from .stage import check_patterns, read_rigged_hair, rigged_notes
+from .stage import chain_notes, check_patterns, read_rigged_hair, rigged_notes
 
 
 def train_rig(
@@ -64,7 +64,7 @@ def train_rig(
     _check_writable(out)
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
     check_patterns(hair, chains)
-    notes = rigged_notes(hair.source)
+    notes = rigged_notes(hair.source) + chain_notes(hair, chains)
     if hair.rig.character.body is None:
         notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
     if tell:

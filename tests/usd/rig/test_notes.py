@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.stage import check_patterns, read_rigged_hair, rigged_notes
+from usd.rig.stage import chain_notes, check_patterns, read_rigged_hair, rigged_notes
 
 from ..rig_shots import model_for, small_shot
 
@@ -243,6 +243,33 @@ def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
     head = "hips/neck/head"
     shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{head}/hair_0/end", "hips/neck/pony"))
     assert not any(" not moved; " in note for note in rigged_notes(read_rigged_hair(shot).source))
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("cable", "'cable_0' is not moved; if it is hair, name all that is to move with --chains"),
+        ("ear", None),
+    ],
+)
+def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
+    """In a mesh that the body drives, too, only names tell hair; joints in rows of three may be some."""
+    head = "hips/head"
+
+    def change(stage):
+        rig = stage.GetPrimAtPath("/Who/Rig")
+        more = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
+        rig.GetAttribute("joints").Set([*rig.GetAttribute("joints").Get(), *more])
+        for attribute in (rig.GetAttribute("bindTransforms"), rig.GetAttribute("restTransforms")):
+            attribute.Set(Vt.Matrix4dArray([*attribute.Get(), *list(attribute.Get())[2:5]]))
+        indices = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar()
+        indices.Set([0, 2, 3, 4, 6, 7, 8, 7, 8])
+
+    shot = edited(change)
+    hair = read_rigged_hair(shot)
+    expected = [f"/Who/Rig: {told}"] if told else []
+    assert chain_notes(hair, None) == expected and chain_notes(hair, ["hair_0"]) == []
+    assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == expected
 
 
 @pytest.mark.parametrize("locks", [["pony"], ["hair_0", "pony"]])
