@@ -35,7 +35,7 @@ def moment_losses(
     Args:
         net: the network.
         moments: B moments.
-        hair: the hair of each, all with the same number of strands.
+        hair: the hair of each. Of small grooms it has fewer strands: moments are stacked with those of as many.
         inputs: what the network reads of each groom's strands, one (S, 70) a groom.
         spec: of the boundary vectors.
         options: weights of the potentials, ranges of the materials, the device.
@@ -45,6 +45,18 @@ def moment_losses(
     Returns:
         By name; `inertia_past` is the term whose past is not detached, with its weight.
     """
+    counts = np.array([len(h.strands) for h in hair])
+    total: dict[str, Tensor] = {}
+    for count in np.unique(counts):
+        alike = np.flatnonzero(counts == count)
+        chosen = ([moments[i] for i in alike], [hair[i] for i in alike])
+        for name, mean in _stacked_losses(net, *chosen, inputs, spec, options, rng, dynamics).items():
+            total[name] = total.get(name, 0.0) + len(alike) / len(hair) * mean
+    return total
+
+
+def _stacked_losses(net, moments, hair, inputs, spec, options, rng, dynamics) -> dict[str, Tensor]:
+    """As `moment_losses`, of hair with the same number of strands each."""
     device = options.device
     rods = _stacked(hair, device)
     materials = [_material(options, rng) for _ in moments]

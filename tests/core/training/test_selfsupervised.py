@@ -138,6 +138,27 @@ def test_each_choice_changes_what_is_minimised(pool, inputs):
     assert not torch.isclose(heavy["gravity"], base["gravity"])
 
 
+def test_grooms_of_few_strands_are_learned_beside_others_each_moment_as_much(pool, inputs):
+    """Hair of 16 strands and of 5 does not stack."""
+    scene = replace(pool.scene, grooms=(straight_hair(), straight_hair(5, 1)))
+    mixed = MomentPool(scene)
+    for _ in range(4):
+        mixed.grow()
+    both = [*inputs, strand_inputs(scene.grooms[1], np.zeros((5, 32)))]
+    hair = [mixed.hair[m.hair] for m in mixed.moments]
+    few = [i for i, h in enumerate(hair) if len(h.strands) == 5]
+    assert 0 < len(few) < len(hair)
+    options, net = SelfSupervisedOptions(random_materials=False, volume=0.0), _net(pool, inputs)
+
+    def losses(moments):
+        chosen = [mixed.moments[i] for i in moments], [hair[i] for i in moments]
+        return _values(moment_losses(net, *chosen, both, SPEC, options, np.random.default_rng(0)))
+
+    alone = [losses([i]) for i in range(len(hair))]
+    for name, mean in losses(range(len(hair))).items():
+        assert mean == pytest.approx(np.mean([one[name] for one in alone]), rel=1e-4), name
+
+
 def test_a_past_that_is_not_detached_changes_the_gradient(pool, inputs):
     net, grads = _net(pool, inputs), []
     for past in (0.0, 8.0):
