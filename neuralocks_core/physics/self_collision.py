@@ -4,15 +4,24 @@
 from __future__ import annotations
 
 import math
+from functools import partial
+from itertools import pairwise
 
+import numpy as np
 import torch
+from scipy.spatial import cKDTree
 from torch import Tensor
+from torch.utils.checkpoint import checkpoint
 
 from neuralocks_core.materials import SMOOTHING
 from neuralocks_core.physics.rods import Rods
 
 STIFFNESS = 0.3
 """[m^2/s^2], on relative density."""
+FEW = 1536
+"""Vertices, of 64 strands, that are compared each with each; of more, each with those near it."""
+PAIRS = 1_000_000
+"""Pairs of vertices in memory at a time, a quarter of a gigabyte at most."""
 
 
 def self_collision(
@@ -55,12 +64,44 @@ def density(x: Tensor, mass: Tensor) -> Tensor:
     Returns:
         (..., S, K) density per unit line density [1/m^2].
     """
-    flat = x.flatten(-3, -2)
-    square = (flat[..., :, None, :] - flat[..., None, :, :]).square().sum(-1)
-    # The root of zero has no gradient; a vertex and itself have none to give.
-    distance = square.clamp_min(1e-16).sqrt()
-    masses = mass.flatten(-2, -1)[..., None, :]
-    return (masses * kernel(distance, SMOOTHING)).sum(-1).reshape(x.shape[:-1])
+    flat, masses = x.flatten(-3, -2), mass.expand(x.shape[:-1]).flatten(-2, -1)
+    if flat.shape[-2] <= FEW:
+        return _by_all(flat, masses).reshape(x.shape[:-1])
+    each = zip(flat.reshape(-1, *flat.shape[-2:]), masses.reshape(-1, masses.shape[-1]))
+    return torch.stack([by_near(points, m) for points, m in each]).reshape(x.shape[:-1])
+
+
+def _by_all(points: Tensor, mass: Tensor) -> Tensor:
+    """Densities (..., N) of points (..., N, 3) from all pairs at once: the fastest for few."""
+    square = (points[..., :, None, :] - points[..., None, :, :]).square().sum(-1)
+    return (mass[..., None, :] * kernel(_root(square), SMOOTHING)).sum(-1)
+
+
+def by_near(points: Tensor, mass: Tensor) -> Tensor:
+    """Densities (N,) of points (N, 3) from the pairs that the kernel reaches, which are found again for the gradient:
+    no more than about PAIRS are in memory at a time.
+    """
+    places = points.detach().cpu().double().numpy()
+    everywhere = cKDTree(places)
+    reach = 2.001 * SMOOTHING  # a little too far: what rounding lets in counts nothing
+    # Successive vertices of a strand have about as many near them.
+    near = np.repeat(everywhere.query_ball_point(places[::8], reach, return_length=True), 8)[: len(places)]
+    starts = np.flatnonzero(np.diff(np.cumsum(near) // PAIRS, prepend=-1))
+
+    def block(first: int, last: int, points: Tensor, mass: Tensor) -> Tensor:
+        here = cKDTree(places[first:last])
+        pairs = here.sparse_distance_matrix(everywhere, reach, output_type="ndarray")
+        one, other = (torch.from_numpy(pairs[name].astype(np.int64)).to(points.device) for name in ("i", "j"))
+        square = (points[first + one] - points[other]).square().sum(-1)
+        return points.new_zeros(here.n).index_add(0, one, mass[other] * kernel(_root(square), SMOOTHING))
+
+    once_more = partial(checkpoint, block, use_reentrant=False, preserve_rng_state=False)
+    return torch.cat([once_more(*ends, points, mass) for ends in pairwise([*starts.tolist(), len(places)])])
+
+
+def _root(square: Tensor) -> Tensor:
+    """Distances; the root of zero has no gradient, and a vertex and itself have none to give."""
+    return square.clamp_min(1e-16).sqrt()
 
 
 def kernel(distance: Tensor, smoothing: float) -> Tensor:

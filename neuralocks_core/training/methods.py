@@ -91,6 +91,7 @@ class MomentMethod:
             replace(scene, strands=options.strands),
             supported=options.supported,
             nearest_vertices=options.paper_adhesion,
+            volume=options.volume > 0,
         )
         for i in range(FIRST):
             report(0.0, f"first motions: {i} of {FIRST}")

@@ -61,7 +61,7 @@ class Hair:
         rods: constants, float32 tensors.
         margin: (n, 24) distance kept from the body, no more than at rest [m].
         neighbours: (n, 24, N) int32 for adhesion.
-        rest_density: (n, 24) for self-collision.
+        rest_density: (n, 24) for self-collision; None where nothing asks for it.
     """
 
     groom: int
@@ -70,7 +70,7 @@ class Hair:
     rods: Rods
     margin: Tensor
     neighbours: Tensor
-    rest_density: Tensor
+    rest_density: Tensor | None
 
 
 class MomentPool:
@@ -80,10 +80,13 @@ class MomentPool:
         scene: what to draw from; `scene.strands` strands go with each moment.
         supported: whether the rods carry their own weight at rest.
         nearest_vertices: adhesion to the five nearest vertices, as in the paper, not to the lock's nearest strands.
+        volume: whether self-collision counts, whose density at rest takes longest.
     """
 
-    def __init__(self, scene: TrainingScene, *, supported: bool = True, nearest_vertices: bool = False):
-        self.scene, self.supported, self.nearest_vertices = scene, supported, nearest_vertices
+    def __init__(
+        self, scene: TrainingScene, *, supported: bool = True, nearest_vertices: bool = False, volume: bool = True
+    ):
+        self.scene, self.supported, self.nearest_vertices, self.volume = scene, supported, nearest_vertices, volume
         self.hair: list[Hair] = []
         self.moments: list[Moment] = []
         self._maker = RolloutMaker(scene)
@@ -144,7 +147,7 @@ class MomentPool:
             constants,
             torch.from_numpy(margin),
             torch.from_numpy(near.astype(np.int32)),
-            density(constants.rest, constants.mass),
+            density(constants.rest, constants.mass) if self.volume else None,
         )
 
 

@@ -186,13 +186,13 @@ class RolloutMaker:
     def _locks(self, which: int, rng) -> np.ndarray:
         """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood."""
         groom, usable = self.scene.grooms[which], self._usable[which]
-        chosen: list[int] = []
+        chosen: dict[int, None] = {}  # a set that keeps its order
         while len(chosen) < min(self.scene.strands, len(usable)):
             seed = usable[rng.integers(len(usable))]
             lock = usable[groom.lock[usable] == groom.lock[seed]]
             near = np.argsort(np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable")[:8]
-            chosen.extend(int(i) for i in lock[near] if i not in chosen)
-        return np.array(sorted(chosen[: self.scene.strands]))
+            chosen.update(dict.fromkeys(lock[near].tolist()))
+        return np.array(sorted(list(chosen)[: self.scene.strands]))
 
     def _shape(self, rng) -> np.ndarray:
         count = 0 if self.scene.character.body is None else len(self.scene.character.body.shapes)

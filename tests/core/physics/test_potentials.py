@@ -201,6 +201,34 @@ def test_the_kernel_is_normalised_and_ends_smoothly_at_twice_h():
     assert (volume.kernel(radius, 0.015).diff() <= 0).all()
 
 
+def test_the_density_of_many_strands_is_that_of_all_pairs(curls, monkeypatch):
+    """Found by nearness, block by block, with the gradient of each."""
+    generator = torch.Generator().manual_seed(0)
+    apart = 0.1 * torch.rand(2, 30, 1, 3, generator=generator, dtype=torch.float64)
+    x = (curls[torch.arange(30) % 4] + apart).requires_grad_()
+    mass = rods(x[0].detach()).mass
+    weight = torch.rand(2, 30, 12, generator=generator, dtype=torch.float64)
+    found = []
+    for few, pairs in ((10**6, 1), (0, 10**6), (0, 5000)):
+        monkeypatch.setattr(volume, "FEW", few)
+        monkeypatch.setattr(volume, "PAIRS", pairs)
+        density = volume.density(x, mass)
+        found.append((density.detach(), *torch.autograd.grad((weight * density).sum(), x)))
+    for density, gradient in found[1:]:
+        torch.testing.assert_close(density, found[0][0], rtol=1e-12, atol=0.0)
+        torch.testing.assert_close(gradient, found[0][1], rtol=1e-9, atol=1e-9)
+    monkeypatch.setattr(volume, "PAIRS", 500)
+    energy = _potentials(curls)["volume"]
+    assert torch.autograd.gradcheck(energy, (moved(curls).requires_grad_(),), eps=1e-7, atol=1e-5, rtol=1e-4)
+
+
+def test_the_density_of_a_whole_groom_fits_into_memory():
+    """All pairs of 3,000 strands are 62 GB, of 2,000 they are 27."""
+    roots = 0.2 * torch.rand(2000, 1, 3, generator=torch.Generator().manual_seed(0))
+    groom = roots + straight(24, 0.3).float()
+    assert volume.density(groom, rods(groom).mass).isfinite().all()
+
+
 def test_the_sum_names_only_what_acts(curls):
     assert set(energies(curls, rods(curls), Surroundings())) == {"stretch", "bend_twist"}
     around = Surroundings(

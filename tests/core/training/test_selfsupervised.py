@@ -159,6 +159,13 @@ def test_grooms_of_few_strands_are_learned_beside_others_each_moment_as_much(poo
         assert mean == pytest.approx(np.mean([one[name] for one in alone]), rel=1e-4), name
 
 
+def test_density_is_measured_where_self_collision_counts(pool, inputs):
+    free = MomentPool(pool.scene, volume=False)
+    free.grow()
+    assert free.hair[0].rest_density is None and pool.hair[0].rest_density is not None
+    assert "self_collision" not in _losses(_net(pool, inputs), free, inputs, SelfSupervisedOptions(volume=0.0))
+
+
 def test_a_past_that_is_not_detached_changes_the_gradient(pool, inputs):
     net, grads = _net(pool, inputs), []
     for past in (0.0, 8.0):
