@@ -43,6 +43,17 @@ class ModelFile:
         """`strands` or `rig`."""
         return self.meta["kind"]
 
+    def shortcomings(self) -> list[str]:
+        """What its own report says against using it, as notes for a user."""
+        held_out = self.meta["report"].get("held out")
+        error = held_out.get("motion") if isinstance(held_out, dict) else None
+        if not isinstance(error, int | float) or error <= 1:
+            return []
+        fact = (
+            f"its motion error on motion and strands that it never saw is {error:.2f}, where hair carried rigidly has 1"
+        )
+        return [f"{self.path}: {fact}; train longer, or with other options"]
+
 
 def shipped(kind: str = "strands") -> Path:
     """Path of the model that is used when none is named.

@@ -21,7 +21,7 @@ STIFFNESS = 0.3
 FEW = 1536
 """Vertices, of 64 strands, that are compared each with each; of more, each with those near it."""
 PAIRS = 1_000_000
-"""Pairs of vertices in memory at a time, a quarter of a gigabyte at most."""
+"""Pairs of vertices in memory at a time, of about 0.3 kB each."""
 
 
 def self_collision(

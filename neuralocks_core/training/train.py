@@ -27,6 +27,7 @@ from neuralocks_core.training.gauge import Gauge, measure
 from neuralocks_core.training.methods import method_of, wait
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.option_checks import changed, check_options
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.work import (
@@ -57,6 +58,7 @@ def train_strands(
     keep_work: bool = False,
     credits: tuple[str, ...] = (),
     command: str = "",
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Train on rollouts of the solver, or on the physics of random moments, and write a model file.
@@ -77,12 +79,15 @@ def train_strands(
         keep_work: leave that folder behind after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
+        tell: called with notes for the user on a resumed training.
         progress: called with done, total (thousandths of the budget) and a message with the gauge.
 
     Raises:
-        NeuralocksError: nothing to train on, a model or a checkpoint that does not fit, or a failed solver process.
+        NeuralocksError: an option out of bounds, nothing to train on, a model or a checkpoint that does not fit, or a
+            failed solver process.
     """
     options = options or RegressionOptions()
+    check_options(options, rollouts, processes)
     out, work = Path(out), work_folder(out, resume)
     start = beginning_of(work, begin, resume)
     beginning = Beginning(start) if start else None
@@ -97,7 +102,7 @@ def train_strands(
             if start:
                 keep_beginning(start, work)
         keep_inputs(scene, work, resume)
-        description, graphs = _trained(scene, work, options, rollouts, processes, beginning, resume, report)
+        description, graphs = _trained(scene, work, options, rollouts, processes, beginning, resume, tell, report)
         description["training"] = {"command": command, **description["training"]}
         description["credits"] = list(dict.fromkeys([*description["credits"], *credits]))
         path = model.write(out, description, graphs)
@@ -107,7 +112,7 @@ def train_strands(
 
 
 def _trained(
-    scene, work: Path, options, rollouts: int, processes: int, beginning: Beginning | None, resume: bool, report
+    scene, work: Path, options, rollouts: int, processes: int, beginning: Beginning | None, resume: bool, tell, report
 ) -> tuple[dict, dict]:
     """The trained model's description and graphs; see `train_strands`."""
     saved = work / "checkpoint.npz"
@@ -122,6 +127,8 @@ def _trained(
         coder = beginning.coder() if beginning else _coder(scene, work, options, report)
         method = method_of(scene, coder.codes_of, options, farm, report)
         run = _Run(scene, method, RolloutBank(scene_out, coder.codes_of), saved, beginning, resume and saved.exists())
+        if tell and run.meta["changed"]:
+            tell([f"{work}: goes on with other options than it was begun with: {', '.join(run.meta['changed'])}"])
         gauge = run.train(farm, held_farm, report)
     card = {**run.card(), **_inputs_of(scene, coder, beginning), "options": asdict(options, dict_factory=_plain)}
     description = {
@@ -171,10 +178,13 @@ class _Run:
         self._optimisers = self._options.optimisers(self.net)
         settings = {"method": method.name, "boundary": scene.spec.to_json(), "anchored": self._options.anchored}
         settings |= {name: getattr(self._options, name, None) for name in ("output", "motion", "static", "optimiser")}
-        settings = json.loads(json.dumps(settings))  # tuples become lists, as in a checkpoint
-        self.meta = {"settings": settings, "step": 0, "seconds": 0.0, "curve": []}
+        # Tuples become lists, as in a checkpoint.
+        settings, now = json.loads(json.dumps([settings, asdict(self._options, dict_factory=_plain)]))
+        self.meta = {"settings": settings, "options": now, "changed": [], "step": 0, "seconds": 0.0, "curve": []}
         if resume:
-            self.meta = checkpoint.load(saved, {"net": self.net}, self._optimisers, settings)
+            kept = checkpoint.load(saved, {"net": self.net}, self._optimisers, settings)
+            since = [*kept.get("changed", []), *changed(kept.get("options", {}), now)]
+            self.meta = {**kept, "options": now, "changed": since}
 
     def train(self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]) -> Gauge:
         """Until the budget is used; what the gauge says in the end.
@@ -207,12 +217,14 @@ class _Run:
 
     def card(self) -> dict:
         """How it was trained, for the model card."""
+        other = {"resumed with other options": self.meta["changed"]} if self.meta["changed"] else {}
         return {
             "seed": self.scene.seed,
             "method": self.method.name,
             "minutes": round(self.meta["seconds"] / 60, 1),
             "steps": self.meta["step"],
             **self.method.card(),
+            **other,
         }
 
     @staticmethod

@@ -34,7 +34,9 @@ def command_of(app: typer.Typer):
                 except NeuralocksError as error:
                     one_line(f"error: {error}")
                     raise typer.Exit(1) from None
-                except MemoryError:
+                except (MemoryError, RuntimeError) as error:
+                    if not _out_of_memory(error):
+                        raise
                     one_line("error: not enough memory; work on fewer strands at a time, or on a larger machine")
                     raise typer.Exit(1) from None
 
@@ -43,6 +45,12 @@ def command_of(app: typer.Typer):
         return wrap
 
     return command
+
+
+def _out_of_memory(error: Exception) -> bool:
+    """Whether memory was refused to Python, or to torch, which has no type of its own for the processor's."""
+    words = ("can't allocate memory", "OutOfMemoryError")
+    return isinstance(error, MemoryError) or any(word in f"{type(error).__name__} {error}" for word in words)
 
 
 def _load_usd() -> None:

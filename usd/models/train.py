@@ -9,8 +9,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from neuralocks_core import model
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
@@ -21,12 +19,8 @@ from neuralocks_core.progress import Progress
 from ..border.extras import check_training
 
 METHODS = ("rollouts", "selfsupervised")
-SHARES = ("mirror", "warmup")
-"""Settings that are a share of something, 1 at most."""
 SHIPPED, NOTHING = "shipped", "nothing"
 """Words for what a training begins with."""
-MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
-"""Beyond these it is a slip of the finger: a hundred thousand processes take a machine down."""
 
 
 def train(
@@ -70,7 +64,8 @@ def train(
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
-        tell: called with notes for the user before the training, whose minutes some of them would save.
+        tell: called with notes for the user: most of them before the training, whose minutes some would save, and last of
+            all on what it has learned.
         progress: called with (done, total, message).
 
     Raises:
@@ -84,7 +79,7 @@ def train(
     import torch
 
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
-    from neuralocks_core.training.networks import MOTIONS, OUTPUTS
+    from neuralocks_core.training.option_checks import check_options
     from neuralocks_core.training.regression import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands
@@ -94,9 +89,8 @@ def train(
 
     kind = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
     values = parsed(kind, settings)
-    _check_amounts({**values, "rollouts": rollouts, "processes": processes})
     options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
-    _check_choices(options, {"output": OUTPUTS, "motion": MOTIONS, "optimiser": ("muon", "adamw")})
+    check_options(options, rollouts, processes)
     try:
         torch.empty(0, device=options.device)
     except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
@@ -111,11 +105,20 @@ def train(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
         variations=variations, tell=tell, progress=progress, **history,
     )  # fmt: skip
-    command = shlex.join(["neuralocks", *sys.argv[1:]]) if Path(sys.argv[0]).name.startswith("neuralocks") else ""
-    return train_strands(
+    path = train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
-        credits=tuple(credits), command=command, keep_work=keep_work, progress=progress,
+        credits=tuple(credits), command=_command(), keep_work=keep_work, tell=tell, progress=progress,
     )  # fmt: skip
+    if tell:
+        tell(model.read(path).shortcomings())
+    return path
+
+
+def _command() -> str:
+    """The command line that this is, for the model card; empty where it is none of ours."""
+    program = Path(sys.argv[0])
+    ours = program.name.startswith("neuralocks") or program.parts[-2:] == ("usd", "__main__.py")
+    return shlex.join(["neuralocks", *sys.argv[1:]]) if ours else ""
 
 
 def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:
@@ -136,31 +139,6 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
         return None
     beginning.check(spec, options, resume)
     return beginning.path
-
-
-def _check_amounts(given: dict) -> None:
-    for name, most in MOST.items():
-        value = given.get(name)
-        if isinstance(value, (int, float)) and not 0 < value <= most:
-            raise NeuralocksError(f"--{name} {value:g}: must be above 0, and at most {most:,}")
-
-
-def _check_choices(options, known: dict[str, tuple[str, ...]]) -> None:
-    """Known before the simulations begin: words that are among the known ones, counts from 1, weights not below 0, shares
-    up to 1.
-    """
-    for name, default in ((field.name, field.default) for field in dataclasses.fields(options)):
-        value = getattr(options, name)
-        if name in known and value not in known[name]:
-            raise NeuralocksError(f"--set {name}={value}: is unknown; give {'|'.join(known[name])}")
-        if name == "seed" and not 0 <= value < 2**32:
-            raise NeuralocksError(f"--seed {value}: must be a whole number from 0, below 2^32")
-        if type(default) is int and name != "seed" and value < 1:
-            raise NeuralocksError(f"--set {name}={value}: must be at least 1")
-        if isinstance(default, float | tuple) and not all(v >= 0 for v in np.atleast_1d(value)):
-            raise NeuralocksError(f"--set {name}={value}: must not be below 0")
-        if name in SHARES and value > 1:
-            raise NeuralocksError(f"--set {name}={value:g}: is a share; give a number from 0 to 1")
 
 
 def parsed(kind: type, settings: dict) -> dict:

@@ -243,7 +243,7 @@ def _model(path: Path) -> dict:
         from neuralocks_core.runtime import StrandModel
 
         facts["inputs of the body"] = StrandModel(file, threads=1).spec.size
-    return facts | {"stops": [], "spoils": []}
+    return facts | {"stops": [], "spoils": file.shortcomings()}
 
 
 def _motion(path: Path) -> dict:

@@ -19,6 +19,7 @@ from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.training import checkpoint, methods
 from neuralocks_core.training.farm import load, save
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RegressionOptions
 from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
 from neuralocks_core.training.train import train_strands
@@ -186,5 +187,30 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     with claimed(tmp_path / "hair.neuralocks.training"), pytest.raises(NeuralocksError, match="another training is at"):
         train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4)
     assert out.read_bytes() == before
-    train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True)
-    assert model.read(out).meta["training"]["steps"] == 4
+    train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True, keep_work=True)
+    card = model.read(out).meta["training"]
+    assert card["steps"] == 4 and "resumed with other options" not in card
+    told = []
+    other = RegressionOptions(steps=6, collision=9.0, **tiny)
+    train_strands(scene, out, other, rollouts=4, resume=True, tell=told.extend)
+    assert len(told) == 1 and "goes on with other options than it was begun with: collision 9.0 after 45.0" in told[0]
+    assert model.read(out).meta["training"]["resumed with other options"] == ["collision 9.0 after 45.0"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    (
+        SelfSupervisedOptions(style=()),
+        SelfSupervisedOptions(steps=0),
+        SelfSupervisedOptions(output="x"),
+        SelfSupervisedOptions(strands=0),
+        SelfSupervisedOptions(poses=0),
+        RegressionOptions(optimiser="sgd"),
+        RegressionOptions(clips=10_000_000),
+        RegressionOptions(rate=float("nan")),
+    ),
+)
+def test_options_that_no_training_can_use_are_refused_at_once(scene, tmp_path, options):
+    with pytest.raises(NeuralocksError, match="--s"):
+        train_strands(scene, tmp_path / "x.neuralocks", options)
+    assert not list(tmp_path.iterdir())

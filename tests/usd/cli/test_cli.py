@@ -11,14 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from neuralocks_core import model as model_file
 from neuralocks_core.json_values import plain
 from usd.assets.groom import import_groom, write_groom
 from usd.baking.bake import bake
+from usd.cli.command import command_of
 from usd.review.inspect import inspect
 
 from ...shared_data import SHARED
+from ...strand_models import write_random_model
 from ..commands import status
 from ..shots import Recipe, write_shot
 
@@ -250,6 +253,34 @@ def test_inspect_tells_of_a_model_what_a_person_reads(capsys):
     assert "trainings before this one: " in text and "began with:" not in text
 
 
+def test_inspect_tells_of_a_model_that_moves_hair_worse_than_not_at_all(tmp_path, capsys):
+    for motion, told in ((1.3, 1), (0.9, 0)):
+        path = write_random_model(tmp_path / "m.neuralocks", 1.0)
+        file = model_file.read(path)
+        model_file.write(path, {**file.meta, "report": {"held out": {"motion": motion}}}, file.graphs)
+        assert status("inspect", path) == 0
+        assert capsys.readouterr().out.count("its motion error on motion and strands that it never saw is 1.30") == told
+
+
+def test_memory_that_torch_lacks_is_one_line(capsys):
+    """It has no MemoryError."""
+
+    def failing(error):
+        def fill() -> None:
+            """Fill memory."""
+            raise error
+
+        return command_of(typer.Typer())("fill", usd=False)(fill)
+
+    on_device = type("OutOfMemoryError", (RuntimeError,), {})("CUDA out of memory")
+    for error in (RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9"), on_device):
+        with pytest.raises(typer.Exit):
+            failing(error)()
+        assert capsys.readouterr().err.startswith("error: not enough memory; work on fewer strands")
+    with pytest.raises(RuntimeError, match="another"):
+        failing(RuntimeError("another"))()
+
+
 def test_a_wrong_unit_is_noticed(tmp_path):
     from pxr import Usd, UsdGeom
 
@@ -338,6 +369,8 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
         (("--set", "minutes=-5"), "--minutes"),
         (("--set", "rate=-1"), "rate"),
         (("--set", "clips=0"), "clips"),
+        (("--set", "clips=10000000"), "clips=10000000: must be at most 10,000"),
+        ((*selfsupervised, "--set", "poses=100000000"), "poses=100000000: must be at most 10,000"),
         (("--set", "mirror=5"), "mirror=5"),
         ((*selfsupervised, "--set", "warmup=1.5"), "warmup=1.5"),
         (("--set", "motion=magic"), "modulated"),
