@@ -179,13 +179,18 @@ class BoundarySampler:
                 known better than by the clip.
 
         Raises:
-            NeuralocksError: a time is not finite, or the times are no row of numbers.
+            NeuralocksError: a time, material or strength is not finite, or an array is of another shape.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
         if times.ndim > 1:
             raise NeuralocksError(f"times: are of shape {times.shape}; give (n,) seconds")
         if not np.isfinite(times).all():
             raise NeuralocksError("times: hold NaN or infinity; give seconds")
+        if not np.isfinite(strength):
+            raise NeuralocksError(f"strength {strength}: give a number, 0 for the held pose")
+        count = len(self.character.skeleton.names)
+        if joints is not None and np.shape(joints) != (len(times), count, 4, 4):
+            raise NeuralocksError(f"joints: are of shape {np.shape(joints)}; give {(len(times), count, 4, 4)}")
         if not len(times):
             return np.zeros((0, spec.size), np.float32)
         lags = spec.dt * np.arange(spec.steps + 2)
@@ -199,7 +204,7 @@ class BoundarySampler:
         static = np.einsum("nji,j->ni", head, GRAVITY / G)
         result[:, parts["gravity"]] = static
         result[:, parts["shape"]] = [self._measures(shape) for shape in self.clip.shape_at(times)]
-        result[:, parts["material"]] = material
+        result[:, parts["material"]] = _log_ratios(material, len(times))
         if spec.bins:
             result[:, parts["history"]] = strength * self._history(position, turns, static)
         return result
@@ -211,7 +216,7 @@ class BoundarySampler:
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
         result[parts["gravity"]] = GRAVITY / G
         result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
-        result[parts["material"]] = material
+        result[parts["material"]] = _log_ratios(material)
         return result
 
     def _measures(self, shape: np.ndarray) -> np.ndarray:
@@ -272,6 +277,14 @@ def _stance(character: Character, name: str) -> np.ndarray:
     if np.linalg.norm(bone) < 1e-6:
         return np.eye(3)
     return rotation.between([1.0 if side == "left" else -1.0, 0.0, 0.0], bone)
+
+
+def _log_ratios(material, *count: int) -> np.ndarray:
+    """The material (4,), or `count` of them (n, 4), checked."""
+    material = np.asarray(material, float)
+    if material.shape not in ((MATERIALS,), (*count, MATERIALS)) or not np.isfinite(material).all():
+        raise NeuralocksError(f"material {material}: give {MATERIALS} log-ratios, as Material.log_ratios does")
+    return material
 
 
 def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:

@@ -112,7 +112,13 @@ class Clip:
         return (1 - fraction)[:, None] * self.shape[low] + fraction[:, None] * self.shape[high]
 
     def wrapped(self, times: np.ndarray) -> np.ndarray:
-        """Times inside the clip: clamped, or modulo the period of a loop."""
+        """Times inside the clip: clamped, or modulo the period of a loop.
+
+        Raises:
+            NeuralocksError: a time is NaN.
+        """
+        if np.isnan(times).any():
+            raise NeuralocksError("times: hold NaN; give seconds")
         if self.loop and self.end > self.start:
             inside = (times >= self.start) & (times <= self.end)
             return np.where(inside, times, self.start + np.mod(times - self.start, self.end - self.start))

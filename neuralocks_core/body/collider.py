@@ -57,12 +57,19 @@ class Collider:
                 always measured exactly.
             proven: go on until no other triangle can be nearer; else only those around the nearest four samples are
                 looked at, which may miss the nearest one by a fraction of a millimetre.
+
+        Raises:
+            NeuralocksError: points that are no finite (..., 3), or a limit below 0.
         """
         distance, normal, _ = self.closest(points, limit, proven)
         return distance, normal
 
     def closest(self, points: np.ndarray, limit: float = 0.03, proven: bool = True):
         """Like `distance`, with the index (...,) of the nearest triangle among `triangles`."""
+        if np.shape(points)[-1:] != (3,) or not np.isfinite(points).all() or not limit >= 0:
+            raise NeuralocksError(
+                f"points {np.shape(points)}, limit {limit}: give finite points (..., 3), a limit from 0"
+            )
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
             return np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape, int)

@@ -11,6 +11,7 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.laying import SLACK, clearance, resolved, rest_distance
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
@@ -94,9 +95,18 @@ class Resolver:
             joints: world joint transforms (J, 4, 4).
             shape: blend shape weights (B,).
             each: as `map`, on several threads say; the result does not depend on them.
+
+        Raises:
+            NeuralocksError: an array is of another shape.
         """
         if self.body is None or not len(displacement):
             return
+        for name, array, wanted in (
+            ("displacement", displacement, self.strands.rest.shape),
+            ("joints", joints, self.character.skeleton.bind.shape),
+        ):
+            if np.shape(array) != wanted:
+                raise NeuralocksError(f"{name}: is of shape {np.shape(array)}; give {wanted}")
         rest, clear = self.strands.rest, self.clear
         parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
         edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))

@@ -10,6 +10,7 @@ from threading import Lock
 import numpy as np
 
 from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_codes
@@ -53,6 +54,9 @@ class StrandSession:
         """Displacement (S, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
 
         Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
+
+        Raises:
+            NeuralocksError: the vector is of another shape.
         """
         frame, gather = self._frame(vector)
         result = self._tail("displacement", frame, gather)
@@ -77,6 +81,8 @@ class StrandSession:
     def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
         """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
         plain, column = np.array(vector, np.float32), self.model.spec.slices["material"].start + COLUMN
+        if plain.shape != (self.model.spec.size,):
+            raise NeuralocksError(f"vector: is of shape {plain.shape}; this model reads ({self.model.spec.size},)")
         clumping, plain[column] = float(plain[column]), 0.0
         return plain, clumping
 

@@ -96,6 +96,10 @@ def simulate(
         raise NeuralocksError(f"volume {volume}: must be 0 or above")
     if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
+    if substeps % 1 or iterations % 1 or not np.isfinite(margin):
+        raise NeuralocksError(
+            f"substeps {substeps}, iterations {iterations}, margin {margin}: give whole steps, metres"
+        )
     way, frames = head_motion(head, substeps), len(head)
     # about the head's first place: far from the world's origin rounding would decide
     away = way.origin[0]
@@ -106,6 +110,8 @@ def simulate(
         return result
     if start is not None and np.shape(start) != rods.points.shape:
         raise NeuralocksError(f"start: shape {np.shape(start)}; give {rods.points.shape}, as rest")
+    if start is not None and not np.isfinite(start).all():
+        raise NeuralocksError("start: holds NaN or infinity; give points in metres")
     from neuralocks_core.reference.stepper import Stepper
 
     stepper = Stepper(

@@ -206,3 +206,21 @@ def test_unknown_description_asks_for_an_update():
 def test_an_impossible_description_is_refused_in_one_line(values):
     with pytest.raises(NeuralocksError, match="^model: "):
         BoundarySpec.from_json(values)
+
+
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    (
+        ({"material": [np.nan] * 4}, "material .*give 4 log-ratios"),
+        ({"material": [0.0] * 3}, "material .*give 4 log-ratios"),
+        ({"strength": np.nan}, "strength nan: give a number"),
+        ({"joints": np.eye(4)}, "joints: are of shape .* give .1, 6, 4, 4."),
+    ),
+)
+def test_what_is_no_material_strength_or_pose_is_refused(change, fact):
+    sampler = BoundarySampler(BoundarySpec(), person(), moved([0.0, 1.0]))
+    with pytest.raises(NeuralocksError, match=fact):
+        sampler.vectors([0.5], **change)
+    if "material" in change:
+        with pytest.raises(NeuralocksError, match=fact):
+            sampler.held_bind(**change)

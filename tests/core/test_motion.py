@@ -64,3 +64,9 @@ def test_bad_clips_are_refused(times, change, fact):
 def test_cuts_that_are_no_times_are_refused(cuts):
     with pytest.raises(NeuralocksError, match="animation: cuts at .*; give finite times"):
         Clip([0.0, 1.0], np.tile(bind(), (2, 1, 1, 1)), cuts=cuts)
+
+
+@pytest.mark.parametrize("ask", (Clip.at, Clip.shape_at))
+def test_a_time_that_is_none_is_refused(ask):
+    with pytest.raises(NeuralocksError, match="times: hold NaN"):
+        ask(moved([0.0, 1.0]), [0.5, np.nan])

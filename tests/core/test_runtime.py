@@ -69,6 +69,8 @@ def test_split_inference_equals_the_whole_network(path, net, strands):
         expected = deform(offsets[:1], torch.tensor(strands.rest), offsets[1:], path.stem)[0].numpy()
     expected[7] = 0
     assert np.abs(session.displacement(vector) - expected).max() < 1e-5
+    with pytest.raises(NeuralocksError, match=r"vector: is of shape \(5,\); this model reads"):
+        session.displacement(vector[:5])
 
 
 def test_threads_and_chunks_give_the_same_bits(path, strands):

@@ -75,6 +75,7 @@ def training_scene(
     Raises:
         NeuralocksError: a file cannot be used, there is no hair, or there are to be variations of no library, or too many.
     """
+    grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:
         raise NeuralocksError(f"--variations {variations}: must be from 0 to {MOST_VARIATIONS}")
     if variations and LIBRARY not in grooms:

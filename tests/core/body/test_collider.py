@@ -106,3 +106,13 @@ def test_no_points_give_no_distances():
     mesh = trimesh.creation.icosphere()
     distance, direction = Collider(mesh.vertices, mesh.faces).distance(np.zeros((0, 24, 3)))
     assert distance.shape == (0, 24) and direction.shape == (0, 24, 3)
+
+
+@pytest.mark.parametrize(
+    ("points", "limit"),
+    ((np.zeros((4, 2)), 0.03), (np.full((1, 3), np.nan), 0.03), (np.ones((1, 3)), np.nan), (np.ones((1, 3)), -1.0)),
+)
+def test_points_and_limits_that_are_none_are_refused(points, limit):
+    ball = trimesh.creation.icosphere(1)
+    with pytest.raises(NeuralocksError, match="give finite points .*, a limit from 0"):
+        Collider(ball.vertices, ball.faces).distance(points, limit=limit)

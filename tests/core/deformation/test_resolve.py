@@ -10,6 +10,7 @@ from neuralocks_core.body.near_body import NearBody
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.laying import MARGIN, clearance, resolved, rest_distance
 from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
@@ -224,3 +225,14 @@ def test_the_grooms_of_a_head_share_its_grid():
         return Resolver(Character(person.skeleton, body), hair.subset(strands), clip)._near.head
 
     assert grid(1.0, [0, 1]) is grid(1.0, [5, 7]) is not grid(1.1, [5, 7])
+
+
+def test_poses_and_displacements_of_others_are_refused():
+    character, hair = rigs.person(), rigs.straight_hair(5)
+    count = len(HEAD.vertices)
+    skin = np.full((count, 1), rigs.HEAD), np.ones((count, 1))
+    body = Body(HEAD.vertices + rigs.bind()[rigs.HEAD, :3, 3], HEAD.faces, *skin)
+    resolver = Resolver(Character(character.skeleton, body), hair, rigs.moved([0.0, 1.0]))
+    for strands, joints, name in ((4, rigs.bind(), "displacement"), (5, rigs.bind()[:2], "joints")):
+        with pytest.raises(NeuralocksError, match=f"^{name}: is of shape"):
+            resolver.apply(np.zeros((strands, 24, 3), np.float32), joints)

@@ -140,6 +140,9 @@ def test_substeps_follow_the_same_motion():
         ({"neighbours": np.array([[9]] * 4)}, "outside"),
         ({"material": {"bend": -1.0}}, "bend"),
         ({"device": "tpu"}, "device"),
+        ({"substeps": 1.5}, "substeps 1.5"),
+        ({"margin": np.nan}, "margin nan"),
+        ({"start": np.full((4, 24, 3), np.nan)}, "start: holds NaN"),
     ],
 )
 def test_errors_name_the_argument(change, word):
