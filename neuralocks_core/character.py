@@ -14,6 +14,8 @@ from neuralocks_core.skinned_body import Body
 
 HEAD_WIDTHS = (0.08, 0.6)
 """Between these a head's width is believed [m]; others hint at a wrong unit."""
+COMMON_WIDTH = 0.15
+"""About as wide is a person's head [m]."""
 LEAST_SKIN = 20
 """Fewer vertices than these are no head that could be measured."""
 MOVED = 0.001
@@ -240,6 +242,15 @@ class Character:
         if "head" not in self.humanoid or self.head_skin is None:
             return None
         return float(np.ptp((self.body.points[self.head_skin] @ self.facing.T)[:, 0]))
+
+    @cached_property
+    def times_human(self) -> float:
+        """How many times a person's size a giant has, a power of two; 1 for all whose head's width is believed, or unknown,
+        and for what is smaller.
+        """
+        if self.head_width is None or self.head_width <= HEAD_WIDTHS[1]:
+            return 1.0
+        return float(2 ** np.round(np.log2(self.head_width / COMMON_WIDTH)))
 
     @cached_property
     def head_centre(self) -> np.ndarray:

@@ -34,12 +34,17 @@ def reach(character: Character, strands: StrandSet) -> float:
     """
     if not strands.valid.any():
         return 0.0
-    roots = strands.rest[strands.valid, 0] - character.head_centre
-    return float(STEP * np.ceil((np.linalg.norm(roots, axis=1) + strands.length[strands.valid]).max() / STEP) + ROOM)
+    roots, step = strands.rest[strands.valid, 0] - character.head_centre, STEP * character.times_human
+    far = (np.linalg.norm(roots, axis=1) + strands.length[strands.valid]).max()
+    return float(step * np.ceil(far / step) + ROOM * character.times_human)
 
 
 class Resolver:
     """Keeps one groom out of its character's body, frame by frame, in canonical space.
+
+    A giant is shrunk to a person's size for it, or its grids would have a thousand times as many nodes, and what is near,
+    thin or deep on a person would be nothing on it. By a power of two, which rounds no number: what is not pushed stays bit
+    for bit.
 
     Args:
         character: whose body the hair must stay out of; without a body nothing is done.
@@ -54,6 +59,8 @@ class Resolver:
     def __init__(self, character: Character, strands: StrandSet, clip: Clip):
         self.character, self.strands, self._clip = character, strands, clip
         self.body = None if character.body is None else _within_reach(character, strands)
+        self._size = np.float32(character.times_human)
+        self._rest = strands.rest if self._size == 1 else strands.rest / self._size
 
     @cached_property
     def at_rest(self) -> Collider | None:
@@ -77,8 +84,8 @@ class Resolver:
             joints: world joint transforms (J, 4, 4).
             shape: blend shape weights (B,).
         """
-        points = np.asarray(points, np.float32)
-        return self._posed(joints, shape, points.min(axis=0), points.max(axis=0)).distance(points)[0]
+        points = np.asarray(points, np.float32) / self._size
+        return self._posed(joints, shape, points.min(axis=0), points.max(axis=0)).distance(points)[0] * self._size
 
     def prepare(self) -> None:
         """Make now, once for all frames, what the first one would have to wait for."""
@@ -107,7 +114,14 @@ class Resolver:
         ):
             if np.shape(array) != wanted:
                 raise NeuralocksError(f"{name}: is of shape {np.shape(array)}; give {wanted}")
-        rest, clear = self.strands.rest, self.clear
+        if self._size != 1:
+            displacement /= self._size
+        self._push(displacement, joints, shape, each)
+        if self._size != 1:
+            displacement *= self._size
+
+    def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, each: Callable) -> None:
+        rest, clear = self._rest, self.clear
         parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
         edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
         body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
@@ -123,13 +137,19 @@ class Resolver:
 
     def _posed(self, joints, shape, low, high) -> PosedBody:
         changed = None if shape is None else np.asarray(shape, float) - self._constant
-        return self._near.posed(self.character.skinning(joints), changed, low, high)
+        return self._near.posed(self._shrunk(self.character.skinning(joints)), changed, low, high)
+
+    def _shrunk(self, transforms: np.ndarray) -> np.ndarray:
+        """Transforms (..., 4, 4) into canonical space that go on to a person's size."""
+        result = transforms.copy()
+        result[..., :3, :] /= self._size
+        return result
 
     @cached_property
     def clear(self) -> np.ndarray:
-        """Distance (S, 24) float32 [m] that each vertex must keep."""
+        """Distance (S, 24) float32 [m] that each vertex must keep, at a person's size."""
         joints = self.character.skeleton.bind
-        points = self.strands.rest
+        points = self._rest
         rest = self._posed(joints, self._constant, *_corners(points))
         return clearance(
             np.concatenate([rest_distance(points[i : i + BATCH], rest) for i in range(0, len(points), BATCH)])
@@ -155,10 +175,10 @@ class Resolver:
         body, character, strands, still = self.body, self.character, self.strands, self._still
         if body.shapes:
             body = replace(body, points=body.shaped(self._constant))
-        length = float(strands.length[strands.valid].max())
-        roots = strands.rest[strands.valid, 0]
+        length = float(strands.length[strands.valid].max() / self._size)
+        roots = self._rest[strands.valid, 0]
         low, high = roots.min(axis=0) - length, roots.max(axis=0) + length
-        return NearBody(body, character.bind_to_canonical, still, low, high)
+        return NearBody(body, self._shrunk(character.bind_to_canonical), still, low, high)
 
     @property
     def _constant(self) -> np.ndarray:
@@ -183,7 +203,7 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
         shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))
     far = np.linalg.norm(character.canonical(body.points), axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
-    still = np.sum(body.joint_weights * each, axis=1) < STILL
+    still = np.sum(body.joint_weights * each, axis=1) < STILL * character.times_human
     for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
         if varies:
             still &= ~(np.abs(offsets) > 1e-5).any(axis=1)

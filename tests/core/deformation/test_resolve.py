@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair leaves the body whether what it meets stands still (a grid) or moves (samples), strand by strand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody
-from neuralocks_core.character import Character
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.deformation.laying import MARGIN, clearance, resolved, rest_distance
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
@@ -236,3 +238,46 @@ def test_poses_and_displacements_of_others_are_refused():
     for strands, joints, name in ((4, rigs.bind(), "displacement"), (5, rigs.bind()[:2], "joints")):
         with pytest.raises(NeuralocksError, match=f"^{name}: is of shape"):
             resolver.apply(np.zeros((strands, 24, 3), np.float32), joints)
+
+
+def pushed(size, nods):
+    """Of a person so many times larger than one: what 1 cm sideways is changed to (60, 24, 3) [m], and the resolver."""
+    mesh, times = trimesh.creation.icosphere(subdivisions=2, radius=0.1), np.arange(3) / 24
+    place = np.diag([size, size, size, 1.0])
+    bind = place @ rigs.bind() @ np.linalg.inv(place)
+    ball, count = bind[rigs.HEAD, :3, 3] + size * mesh.vertices, len(mesh.vertices)
+    below, faces = ball - [0, 0.15 * size, 0], np.concatenate([mesh.faces, mesh.faces + count])
+    joint, weight = np.repeat([[rigs.HEAD], [0]], count, axis=0), np.ones((2 * count, 1))
+    body = Body(np.concatenate([ball, below]), faces, joint, weight)
+    joints = np.tile(bind, (3, 1, 1, 1))
+    joints[:, rigs.HEAD, :3, :3] = from_vector(np.outer(times, [4.0 * nods, 0, 0]))
+    points = strands().reshape(-1, 3) + rigs.bind()[rigs.HEAD, :3, 3]
+    hair = strand_set(Groom("Hair", points, np.full(60, 24)), rigs.bind()[rigs.HEAD, :3, 3], np.zeros(3))
+    hair = replace(hair, rest=hair.rest * np.float32(size), length=hair.length * np.float32(size))
+    resolver = Resolver(Character(Skeleton(rigs.NAMES, rigs.PARENTS, bind), body), hair, Clip(times, joints))
+    moved = np.full((60, 24, 3), 0.01 * size, np.float32)
+    resolver.apply(moved, joints[2])
+    return moved, resolver
+
+
+@pytest.mark.parametrize("nods", [False, True])
+def test_a_giant_takes_no_more_work_than_a_person(nods):
+    """As large as a character in the wrong unit; its hair is pushed as a person's."""
+
+    def nodes(resolver):
+        return np.array([resolver._near.head._values.size, resolver._near.box.count])
+
+    (moved, person), (far, giant) = pushed(1, nods), pushed(64, nods)
+    assert (len(person._near.head.moving) > 0) == nods and np.abs(moved - 0.01).max() > 0.005
+    np.testing.assert_array_equal(far, 64 * moved)
+    np.testing.assert_array_equal(nodes(giant), nodes(person))
+    for size in (10, 100, 1000):
+        assert (nodes(pushed(size, nods)[1]) < 1.5 * nodes(person)).all()
+
+
+def test_a_giant_is_measured_at_its_size():
+    """What is asked of the skin of one that is resolved as a person: rough distances, like the exact ones, are in metres."""
+    resolver = pushed(64, False)[1]
+    points = np.float32([[0, 64 * 0.103, 0], [64 * 0.098, 0, 0]])
+    rough = resolver.rough_distance(points, resolver.character.skeleton.bind, np.zeros(0))
+    np.testing.assert_allclose(rough, resolver.at_rest.distance(points)[0], atol=64e-3)
