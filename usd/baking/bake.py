@@ -3,6 +3,7 @@
 
 import hashlib
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from neuralocks_core.runtime import StrandModel, cores
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import written_notes
+from ..shot.notes import out_of_place, out_of_range
 from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
 from .posing import GroomPoser
@@ -62,6 +63,7 @@ def bake(
     cuts=None,
     velocities: bool = True,
     jobs: int | None = None,
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> BakeResult:
     """Bake moving hair.
@@ -83,6 +85,7 @@ def bake(
         cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
         velocities: write velocities.
         jobs: threads; a core each, eight at most, if left out.
+        tell: called with the notes that are known before hair is posed, then with the others.
         progress: called with (done, total, message); raising from it stops the bake.
 
     Raises:
@@ -106,15 +109,19 @@ def bake(
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
     facts |= given_facts(cuts, joints)
+    notes = [
+        *known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins),
+        *_unheard(strand_model, look),
+    ]
+    if tell:
+        tell(notes)
     resumed = write_samples(
         shot, out, codes, poser, inputs | options, facts, together=True, velocities=velocities, progress=progress
     )
-    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
-    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
-    if (loop or cuts is None) and strand_model.spec.bins:
-        notes += [text for rig in shot.rigs for text in rig.cut_notes(loop)]
-    notes += _unheard(strand_model, look)
-    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
+    late = out_of_place(shot.stage, out)
+    if tell:
+        tell(late)
+    return BakeResult(out, codes, described(shot), notes + late, time.monotonic() - began, resumed)
 
 
 def as_material(material) -> Material:
@@ -129,6 +136,16 @@ def as_material(material) -> Material:
             f"material: {material!r} is none; give a Material, words such as 'bend=2x', or a dict of them"
         )
     return Material.parse(words)
+
+
+def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:
+    """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
+    return [
+        *shot.notes,
+        *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1])),
+        *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
+        *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
+    ]
 
 
 def described(shot: Shot) -> list[dict]:

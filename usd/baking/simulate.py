@@ -2,6 +2,7 @@
 """A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
 
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
@@ -20,10 +21,10 @@ from neuralocks_core.strands.locks import whole_locks
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import written_notes
+from ..shot.notes import out_of_place
 from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
-from .bake import BakeResult, as_material, described
+from .bake import BakeResult, as_material, described, known_notes
 from .placing import GroomPlacer
 from .samples import write_samples
 from .stencils import Stencils
@@ -49,12 +50,13 @@ def simulate(
     volume: float = 0.0,
     loop: bool = False,
     cuts=None,
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> BakeResult:
     """Simulate a shot's hair and write it as a bake.
 
     Args:
-        shot, out, grooms, skeleton, head, frames, joints, subframes, material, loop, cuts, progress: as for `bake`.
+        shot, out, grooms, skeleton, head, frames, joints, subframes, material, loop, cuts, tell, progress: as for `bake`.
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these and
             are pushed out of the body.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
@@ -80,11 +82,14 @@ def simulate(
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= given_facts(cuts, joints)
+    notes = known_notes(shot, codes, loop, loop or cuts is None)
+    if tell:
+        tell(notes)
     resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
-    notes = [*shot.notes, *written_notes(shot.stage, shot.rigs, out, codes)]
-    notes += [text for rig in shot.rigs if loop for text in rig.loop_notes(codes)]
-    notes += [text for rig in shot.rigs if loop or cuts is None for text in rig.cut_notes(loop)]
-    return BakeResult(out, codes, described(shot), notes, time.monotonic() - began, resumed)
+    late = out_of_place(shot.stage, out)
+    if tell:
+        tell(late)
+    return BakeResult(out, codes, described(shot), notes + late, time.monotonic() - began, resumed)
 
 
 class _SimulatedPoser:

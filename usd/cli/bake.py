@@ -61,7 +61,7 @@ def bake_command(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
             resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
-            jobs=jobs, progress=progress,
+            jobs=jobs, tell=note, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
 
@@ -117,13 +117,12 @@ def simulate_command(
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,
-            loop=loop, cuts=cut_codes(cuts), progress=progress,
+            loop=loop, cuts=cut_codes(cuts), tell=note, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
 
 
 def _bake_report(result, as_json: bool) -> None:
-    note(result.notes)
     if as_json:
         print_json(
             {
