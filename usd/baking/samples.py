@@ -113,7 +113,9 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
                 if spool.holds(number, code, ends[-1]):
                     resumed += sum(code in plan.wanted for plan in some)
                 else:
-                    made = made or poser(items)
+                    if made is None:
+                        made = poser(items)
+                        say(done, total, items[0].path)  # the time left is reckoned from here on
                     # At once: points that waited for it would lie in memory beside those of the next frame.
                     spool.write(number, code, made.points(code))
                 behind.put(stores[0].frame, code)

@@ -3,8 +3,13 @@
 
 import re
 import sys
+from types import SimpleNamespace
 
+from usd.baking.bake import bake
+from usd.baking.posing import GroomPoser
 from usd.cli import progress
+
+from ..shots import Recipe, write_shot
 
 
 def test_a_log_tells_the_time_left_of_the_step_that_it_is_at(monkeypatch, capsys):
@@ -27,6 +32,29 @@ def test_the_time_before_work_gets_going_is_not_taken_for_its_speed(monkeypatch,
         for done in (0, 0, 0, 0, 50):
             say(done, 100, "first simulations" if not done else "")
     assert ", 0.5 min left" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_what_a_bake_prepares_is_not_taken_for_its_speed(tmp_path, model, monkeypatch, capsys):
+    """A minute before the first frame, a second for each: nobody waits for hours."""
+    clock, poser, points = [0.0], GroomPoser.__init__, GroomPoser.points
+
+    def begun(*args, **options):
+        clock[0] += 60
+        poser(*args, **options)
+
+    def posed(*args):
+        clock[0] += 1
+        return points(*args)
+
+    monkeypatch.setattr(GroomPoser, "__init__", begun)
+    monkeypatch.setattr(GroomPoser, "points", posed)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(progress, "LOG_EVERY", 0.5)
+    shot = write_shot(tmp_path, Recipe(strands=4))
+    with progress.progress_bar("baking") as say:
+        bake(shot, tmp_path / "out.usdc", model, velocities=False, progress=say)
+    left = re.findall(r"([\d.]+) min left", capsys.readouterr().err)
+    assert len(left) == 9 and float(left[0]) == 0.1
 
 
 def test_nothing_is_foretold_of_the_first_frame_alone(monkeypatch, capsys):
