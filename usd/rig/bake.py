@@ -24,7 +24,7 @@ from ..border.stage_files import check_layer_name, check_not_input
 from ..border.time_codes import given_cuts, time_codes
 from ..shot.notes import on_twos, without_turn, written_notes
 from ..shot.stage import check_cuts, frame_range
-from .layer import write_rig_layer
+from .layer import kept_hair, write_rig_layer
 from .stage import RiggedHair, mirrored_notes, read_rigged_hair, rigged_notes
 
 STILL = 1e-4
@@ -101,7 +101,7 @@ def bake_rig(
     if stops := without_turn(hair.source, model.spec.pose_joints):
         raise NeuralocksError(stops[0])
     wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
-    codes = _with_samples(hair, wanted)
+    codes = _with_samples(hair, moved, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     carried = CarriedHair(model, moved, hair.source.character, clip)
     turns = hair.source.authored_turns(moved, _turns(hair, carried, clip, codes, strength, progress))
@@ -128,7 +128,7 @@ def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHa
     """The shot, the model with the shot's names of its joints, where these are in the skeleton (N,), and how many times as
     large as the model's rig it is.
     """
-    given = {"skeleton": skeleton, "head": head, "joints": joints, "cuts": cuts}
+    given = {"skeleton": skeleton, "head": head, "joints": joints, "cuts": cuts, "unbaked": True}
     # The model knows its joints: no guess is made about which ones are hair.
     try:
         hair = read_rigged_hair(shot, chains=model.chains.tops, **given)
@@ -196,17 +196,19 @@ def _resized(path: str, size: float) -> list[str]:
     ]
 
 
-def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
+def _with_samples(hair: RiggedHair, moved: np.ndarray, wanted: list[float]) -> list[float]:
     """What was asked for and the animation's own samples: the body must come out sample for sample."""
-    own = _rotation_samples(hair)
+    own = _rotation_samples(hair, moved)
     # A frame and a sample at the same time, up to rounding, are one.
     apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
     return sorted({*apart, *own})
 
 
-def _rotation_samples(hair: RiggedHair) -> list[float]:
-    animation = hair.source.source.animation
-    return [] if animation is None else list(UsdSkel.Animation(animation).GetRotationsAttr().GetTimeSamples())
+def _rotation_samples(hair: RiggedHair, moved: np.ndarray) -> list[float]:
+    source = hair.source.source
+    read = [source.animation] + [source.copied] * bool(kept_hair(source, moved))
+    attributes = [UsdSkel.Animation(prim).GetRotationsAttr() for prim in read if prim]
+    return sorted({code for attribute in attributes for code in attribute.GetTimeSamples()})
 
 
 def _turns(hair, carried, clip, codes, strength, progress) -> np.ndarray:

@@ -14,6 +14,7 @@ from ..baking.header import apply_binding, over_prim, write_header
 from ..border.damage import named
 from ..border.stage_files import refresh_open
 from ..skel.joints import JointSource
+from ..skel.rig_copy import hair_of, tell_source
 from .stage import BAKED, RiggedHair
 
 
@@ -40,7 +41,8 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     source = hair.source.source
     own = _usable_animation(source)
     order = [str(name) for name in own.GetJointsAttr().Get()] if own else []
-    order += [source.names[j] for j in joints if source.names[j] not in order]
+    moved, kept = [source.names[j] for j in joints], kept_hair(source, joints)
+    order += [name for name in (*moved, *kept) if name not in order]
     names = Sdf.ValueTypeNames
     Sdf.AttributeSpec(prim, "joints", names.TokenArray, Sdf.VariabilityUniform).default = Vt.TokenArray(order)
     rest = _rest_channels(source, order)
@@ -56,7 +58,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
         for code in samples:
             layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
     spec = Sdf.AttributeSpec(prim, "rotations", names.QuatfArray)
-    places = [order.index(source.names[j]) for j in joints]
+    places = [order.index(name) for name in moved]
     bind = to_quaternion(rotation_part(relative_to_parents(source.bind, source.parents)[joints]))
     attribute = own.GetRotationsAttr() if own else None
     for code, turn in zip(codes, turns):
@@ -64,11 +66,24 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
         # The second factors keep w > 0, so no sign flips between samples.
         for place, q in zip(places, quaternion_product(bind, turn)):
             values[place] = Gf.Quatf(*map(float, q))
+        former = UsdSkel.Animation(source.copied).GetRotationsAttr().Get(code) if kept else ()
+        for name, column in kept.items():
+            values[order.index(name)] = former[column]
         layer.SetTimeSample(spec.path, float(code), Vt.QuatfArray(values))
     if source.animation is not None:
         _blend_shapes(layer, prim, UsdSkel.Animation(source.animation))
+        tell_source(prim, source.animation, [*moved, *kept])
     _save(layer, out)
     return str(prim.path)
+
+
+def kept_hair(source: JointSource, joints: np.ndarray) -> dict[str, int]:
+    """Joints -> columns of an earlier bake that moves them and was of other hair than `joints` (N,)."""
+    if source.copied is None:
+        return {}
+    moved, listed = {source.names[j] for j in joints}, UsdSkel.Animation(source.copied).GetJointsAttr().Get()
+    column = {str(name): number for number, name in enumerate(listed or ())}
+    return {name: column[name] for name in hair_of(source.copied) if name in column and name not in moved}
 
 
 def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:

@@ -61,6 +61,7 @@ def read_rigged_hair(
     all_shapes: bool = False,
     cuts: list[float] | None = None,
     baked_first: bool = False,
+    unbaked: bool = False,
 ) -> RiggedHair:
     """Read the rigged mesh hair of a stage.
 
@@ -73,6 +74,7 @@ def read_rigged_hair(
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
         baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
+        unbaked: as for `read_rig`.
 
     Raises:
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
@@ -88,11 +90,12 @@ def read_rigged_hair(
             )
     if not prims:
         raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
+    given = {"all_shapes": all_shapes, "joints": joints, "cuts": cuts, "unbaked": unbaked}
     found, errors, skins = [], [], find_skins(stage)
     for prim in prims:
         try:
             _check_authored(prim)
-            source = read_rig(stage, prim, border, head, all_shapes=all_shapes, joints=joints, cuts=cuts, skins=skins)
+            source = read_rig(stage, prim, border, head, skins=skins, **given)
             rig = assemble_rig(source.character, core_meshes(source), chains)
         except NeuralocksError as error:
             errors.append(type(error)(_with_path(prim, error)))

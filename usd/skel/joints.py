@@ -15,6 +15,7 @@ from neuralocks_core.rotation import from_quaternion, relative_to_parents
 from ..border.arrays import wxyz
 from ..border.placement import Placement
 from ..border.values import as_names, as_numbers
+from .rig_copy import source_of
 
 STRETCH = 0.003
 """A quaternion's length may be off by so much before a user is told: single and half precision are nearer."""
@@ -30,15 +31,20 @@ class JointSource:
         bind: bind transforms as authored, (J, 4, 4).
         rest: local rest transforms, (J, 4, 4).
         animation: the SkelAnimation prim, or None.
+        copied: the SkelAnimation prim that `animation` is read instead of, as it is a rig bake's copy of that; or None.
         placement: where the skeleton stands.
         notes: what a user should know about it.
         ignored: the note that says why the animation does not count; None if it does, or if there is none.
+
+    Args:
+        prim: the Skeleton.
+        unbaked: read the animation that a rig bake copied in the place of its copy.
 
     Raises:
         NeuralocksError: it has no joints, or arrays that do not fit each other.
     """
 
-    def __init__(self, prim: Usd.Prim):
+    def __init__(self, prim: Usd.Prim, unbaked: bool = False):
         self.prim, self.path = prim, str(prim.GetPath())
         self._stage = prim.GetStage()  # a prim alone does not keep its stage open
         self.notes: list[str] = []
@@ -50,7 +56,9 @@ class JointSource:
         self.parents = self._parents()
         self.bind, self.rest = self._bind_and_rest(skeleton)
         self.placement = Placement(prim)
-        source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
+        source, self.copied = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource(), None
+        if unbaked and source and (original := source_of(source)):
+            source, self.copied = original, source
         self.animation = source if source and source.IsA(UsdSkel.Animation) and source.IsActive() else None
         if source and not source.IsActive():
             self._ignore(
@@ -80,7 +88,7 @@ class JointSource:
 
     def posed(self, time_codes) -> np.ndarray:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
-        local = self._local(time_codes)
+        local = self.local(time_codes)
         for joint, parent in enumerate(self.parents):  # parents come first
             if parent >= 0:
                 local[:, joint] = local[:, parent] @ local[:, joint]
@@ -208,8 +216,8 @@ class JointSource:
                 return f"{path}: its {name} are {own}, so UsdSkel ignores the animation; author {wanted}"
         return None
 
-    def _local(self, time_codes) -> np.ndarray:
-        """Local joint transforms (T, J, 4, 4)."""
+    def local(self, time_codes) -> np.ndarray:
+        """Joints (T, J, 4, 4) against their parents at time codes (T,)."""
         result = np.broadcast_to(self.rest, (len(time_codes), *self.rest.shape)).copy()
         if self._columns is None:
             return result

@@ -18,11 +18,16 @@ from neuralocks_core.motion import LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, transformed
 
 from ..border.units import Border
+from ..border.values import as_names
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
 from .clip_codes import clip_codes
 from .joints import JointSource
+from .rig_copy import alike, hair_of, source_of
 from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
+
+COMPARED = 100
+"""About so many poses of a rig bake are compared with those that it was made from."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +164,7 @@ def read_rig(
     cuts: list[float] | None = None,
     skins: Skins | None = None,
     headless: bool = False,
+    unbaked: bool = False,
 ) -> StageRig:
     """Read a skeleton, its meshes and its motion.
 
@@ -172,14 +178,16 @@ def read_rig(
         cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
         skins: of the stage, if they were looked for already.
         headless: read it without a head, and without any other joint's meaning, where no joint is named like one.
+        unbaked: of a rig bake, the animation that it was made from, with a note where the two differ.
 
     Raises:
         NoHead: no joint is named like a head.
         NeuralocksError: something in it cannot be used; the message names the prim.
     """
-    source = JointSource(prim)
+    source = JointSource(prim, unbaked)
     notes = source.notes
     time_codes = clip_codes(source, border)
+    notes += _old_copy(source, time_codes)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
@@ -226,6 +234,28 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     """Skeleton prims in stage order."""
     every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
     return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+
+
+def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
+    """The note on a rig bake whose body does not move as the animation does that it was made from."""
+    copy = source.copied or source.animation
+    original = copy and source_of(copy)
+    if not original:
+        return []
+    codes, hair = time_codes[:: max(1, len(time_codes) // COMPARED)], hair_of(copy)
+    shapes = as_names(attribute := UsdSkel.Animation(original).GetBlendShapesAttr(), attribute.Get())
+    body = [joint for joint, name in enumerate(source.names) if name not in hair]
+    try:
+        both = [JointSource(source.prim, unbaked) for unbaked in (False, True)]
+        same = alike(*(each.local(codes)[:, body] for each in both))
+        if same and np.allclose(*(each.shape(shapes, codes) for each in both), atol=1e-4):
+            return []
+    except NeuralocksError:  # whichever is read tells it
+        return []
+    fact = (
+        f"{source.path}: its animation {copy.GetName()} is a rig bake of {original.GetPath()}, which has changed since"
+    )
+    return [f"{fact}; {'what that shows is read' if source.copied else 'bake the rig again'}"]
 
 
 def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rig bake over a rig bake: the body moves as the animation that was copied does, not as the copy."""
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd
+
+from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.rig.stage import BAKED, read_rigged_hair
+from usd.skel.rig_copy import HAIR, SOURCE
+
+from ..rig_shots import hair_turns, model_for, small_shot
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A bake `hair.usda` of `shot.usda`, and `new.usda`, which goes over either with a head that is turned more."""
+    shot = small_shot(tmp_path / "shot.usda")
+    bake_rig(shot, tmp_path / "hair.usda", model_for(read_rigged_hair(shot)))
+    new = Sdf.Layer.CreateNew(str(tmp_path / "new.usda"))
+    for below in ("shot", "hair"):
+        text = f"#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@./new.usda@, @./{below}.usda@]\n)\n"
+        (tmp_path / f"on_{below}.usda").write_text(text)
+    stage = Usd.Stage.Open(str(tmp_path / "on_shot.usda"))
+    stage.SetEditTarget(new)
+    rotations = stage.GetPrimAtPath("/Who/Motion").GetAttribute("rotations")
+    before = {code: list(rotations.Get(code)) for code in rotations.GetTimeSamples()}
+    for code, values in before.items():
+        values[1] = values[1] * Gf.Quatf(Gf.Rotation(Gf.Vec3d(0, 1, 0), 40).GetQuat())
+        rotations.Set(values, code)
+    new.Save()
+    return tmp_path
+
+
+def _rotations(path, prim="/Who/Rig") -> list:
+    stage = Usd.Stage.Open(str(path))
+    attribute = stage.GetPrimAtPath(f"{prim}/{BAKED}").GetAttribute("rotations")
+    return [list(attribute.Get(code)) for code in attribute.GetTimeSamples()]
+
+
+def test_an_updated_animation_reaches_a_bake_over_an_old_one(folder):
+    model = model_for(read_rigged_hair(folder / "shot.usda"))
+    notes = bake_rig(folder / "on_hair.usda", folder / "again.usda", model).notes
+    assert not any("rig bake" in note for note in bake_rig(folder / "on_shot.usda", folder / "fresh.usda", model).notes)
+    assert _rotations(folder / "again.usda") == _rotations(folder / "fresh.usda") != _rotations(folder / "hair.usda")
+    assert any("rig bake of /Who/Motion, which has changed since; what that shows is read" in note for note in notes)
+    notes = bake_rig(folder / "again.usda", folder / "third.usda", model).notes
+    assert not any("changed since" in note for note in notes)
+    assert _rotations(folder / "third.usda") == _rotations(folder / "again.usda")
+
+
+def test_whoever_reads_the_copy_is_told_that_it_is_old(folder):
+    """Renderers show it, and strands must fit what they show."""
+    old = "/Who/Rig: its animation NeuralocksHair is a rig bake of /Who/Motion, which has changed since; bake the rig again"
+    assert old in inspect(folder / "on_hair.usda")["spoils"]
+    assert not any("changed since" in note for note in inspect(folder / "hair.usda")["spoils"])
+
+
+def test_what_was_copied_is_found_through_references(folder):
+    (folder / "set.usda").write_text(
+        '#usda 1.0\n(\n  metersPerUnit = 1\n)\ndef "Hero" (references = @./on_hair.usda@</Who>)\n{\n}\n'
+    )
+    model = model_for(read_rigged_hair(folder / "shot.usda"))
+    bake_rig(folder / "set.usda", folder / "again.usda", model)
+    bake_rig(folder / "on_shot.usda", folder / "fresh.usda", model)
+    assert _rotations(folder / "again.usda", "/Hero/Rig") == _rotations(folder / "fresh.usda")
+
+
+def test_a_bake_of_other_hair_keeps_that_of_the_one_before(folder):
+    model = model_for(read_rigged_hair(folder / "shot.usda", chains=["hair_1"]))
+    bake_rig(folder / "on_hair.usda", folder / "both.usda", model)
+    bake_rig(folder / "on_shot.usda", folder / "second.usda", model)
+    codes = range(1, 26)
+    first, second, both = (hair_turns(folder / f"{name}.usda", codes) for name in ("hair", "second", "both"))
+    np.testing.assert_array_equal(both[:, 0], first[:, 0])
+    np.testing.assert_array_equal(both[:, 1:], second[:, 1:])
+    stage = Usd.Stage.Open(str(folder / "both.usda"))
+    baked = stage.GetPrimAtPath(f"/Who/Rig/{BAKED}")
+    assert [str(path) for path in baked.GetRelationship(SOURCE).GetTargets()] == ["/Who/Motion"]
+    assert {name.rsplit("/", 1)[1] for name in baked.GetAttribute(HAIR).Get()} == {"hair_0", "hair_1", "hair_2"}
+
+
+def test_a_copy_whose_source_is_gone_is_read_itself(folder):
+    layer = Usd.Stage.Open(str(folder / "hair.usda")).Flatten()
+    del layer.GetPrimAtPath("/Who").nameChildren["Motion"]
+    layer.Export(str(folder / "alone.usda"))
+    bake_rig(folder / "alone.usda", folder / "again.usda", model_for(read_rigged_hair(folder / "shot.usda")))
+    assert _rotations(folder / "again.usda") == _rotations(folder / "hair.usda")

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SkelAnimation that `rig bake` wrote: a copy of the character's own with other rotations of the hair joints."""
+
+import numpy as np
+from pxr import Sdf, Usd, UsdSkel, Vt
+
+from ..border.values import as_names
+
+SOURCE = "neuralocks:animation"
+"""A relationship to the animation that was copied,"""
+HAIR = "neuralocks:joints"
+"""and the joints whose rotations are not that one's."""
+
+
+def tell_source(copy: Sdf.PrimSpec, source: Usd.Prim, hair: list[str]) -> None:
+    """Write on a copy what it was made from, and its hair joints; nothing where that was itself."""
+    if copy.path != source.GetPath():
+        Sdf.RelationshipSpec(copy, SOURCE, custom=True).targetPathList.explicitItems = [source.GetPath()]
+        spec = Sdf.AttributeSpec(copy, HAIR, Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+        spec.default, spec.custom = Vt.TokenArray(hair), True
+
+
+def source_of(animation: Usd.Prim) -> Usd.Prim | None:
+    """The animation that one was copied from, where that is still there; None also where it is no copy."""
+    targets = animation.GetRelationship(SOURCE).GetTargets() if animation.HasRelationship(SOURCE) else []
+    found = [animation.GetStage().GetPrimAtPath(path) for path in targets]
+    whole = [
+        prim
+        for prim in found
+        if prim and prim != animation and prim.IsActive() and UsdSkel.Animation(prim).GetJointsAttr().Get()
+    ]
+    return whole[0] if len(whole) == 1 and whole[0].IsA(UsdSkel.Animation) else None
+
+
+def hair_of(copy: Usd.Prim) -> tuple[str, ...]:
+    """The hair joints of a copy, where it tells them."""
+    attribute = copy.GetAttribute(HAIR)
+    return as_names(attribute, attribute.Get()) if attribute else ()
+
+
+def alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether local joint transforms (T, J, 4, 4) are the same but for rounding."""
+    parts = ((part[..., :3, :3], part[..., :3, 3]) for part in (one, other))
+    return all(np.allclose(a, b, rtol=0, atol=1e-4 * max(1e-6, np.abs(a).max())) for a, b in zip(*parts))
