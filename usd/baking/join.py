@@ -18,6 +18,7 @@ from ..border.damage import first_line, named
 from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
 from ..border.units import Border
 from ..shot.gaps import gaps
+from ..shot.made_from import INPUTS, unlike
 from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
 from .header import relative, repeat_metadata
@@ -168,11 +169,16 @@ class _Part:
         for groom in self.grooms:
             other = next((part for part in others if groom in part.grooms), self)
             mine, theirs = self.made(groom), other.made(groom)
-            unlike = sorted(name for name in {*mine, *theirs} if mine.get(name) != theirs.get(name))
-            if unlike:
+            options = sorted(name for name in {*mine, *theirs} - {INPUTS} if mine.get(name) != theirs.get(name))
+            if options:
                 raise NeuralocksError(
-                    f"{self.path}: {groom} was baked with other {', '.join(unlike)} than in {other.path}; "
+                    f"{self.path}: {groom} was baked with other {', '.join(options)} than in {other.path}; "
                     "bake both with the same options"
+                )
+            if inputs := unlike(mine, theirs):
+                raise NeuralocksError(
+                    f"{self.path}: {groom} was baked from another {' and '.join(inputs)} than in {other.path}; "
+                    "bake the older one again"
                 )
 
     def _shots(self) -> list[str]:

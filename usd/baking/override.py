@@ -15,6 +15,7 @@ from ..border.damage import named
 from ..border.stage_files import refresh_open
 from ..border.stopping import check
 from ..shot.curves import rest_points, widest_sample
+from ..shot.made_from import INPUTS, made_from
 from ..shot.recorded import record
 from ..shot.stage import Shot, StageGroom
 from ..skel.surface import FORMER
@@ -48,7 +49,7 @@ class OverrideWriter:
             np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
         )
         over = over_prim(layer, item.prim)
-        record(over, {**facts, "joint": item.joint})
+        record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
         if item.attachment.skinned:
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             apply_binding(over, item.prim)

@@ -12,6 +12,7 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
+from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint
 from ..shot.stage import Shot, StageGroom, read_shot
 
@@ -111,8 +112,9 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     least = min(2, max(len(codes) for codes in sampled.values()))
     items = tuple(item for item in shot.grooms if len(sampled[item.path]) >= least)
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
+    old = [note for item in items for note in baked_from_others(item.prim, item.attachment, item.groom)]
     codes = sorted({code for item in items for code in sampled[item.path]})
-    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left)), np.array(codes))
+    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left, *old)), np.array(codes))
 
 
 def _named_head(shot: Shot) -> str | None:

@@ -31,6 +31,7 @@ from ..shot.curves import find_curves
 from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
+from ..shot.made_from import baked_from_others
 from ..shot.motion_notes import motion_notes
 from ..shot.notes import (
     another_head,
@@ -187,7 +188,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
-    to_bind, drawn, joint = border.to_core @ placement.reference, False, {}
+    found, to_bind, drawn, joint = None, border.to_core @ placement.reference, False, {}
     if search is not None:
         try:
             found = search.attachment(prim, placement)
@@ -202,6 +203,8 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     if joint:
         spoils += groom_notes(prim, groom, border)
+    if found:
+        spoils += baked_from_others(prim, found, groom)
     made = recorded(prim)
     baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
     return facts | joint | groom_facts(groom) | baked

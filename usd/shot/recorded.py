@@ -8,6 +8,8 @@ from pxr import Sdf, Usd, Vt
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 
+from ..border.units import Border
+
 KEY = "neuralocks"
 """In a groom's customData; it is composed with the points, through whatever layers come on top."""
 
@@ -19,10 +21,7 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 def recorded(prim: Usd.Prim) -> dict:
     """What `record` wrote, with time codes as a list of those of the stage; empty where nothing did."""
-    # The strongest layer's alone: composed, a bake over another one would tell a mixture of both.
-    stack = prim.GetPrimStackWithLayerOffsets()
-    told = ((spec.customData[KEY], offset) for spec, offset in stack if KEY in spec.customData)
-    facts, offset = next(told, (None, None))
+    facts, offset, _ = _strongest(prim)
     if not isinstance(facts, dict):
         return {}
 
@@ -30,6 +29,26 @@ def recorded(prim: Usd.Prim) -> dict:
         return [round(offset * code, 9) for code in value] if isinstance(value, Vt.DoubleArray) else value
 
     return {name: as_stage_has_it(value) for name, value in facts.items()}
+
+
+def recorded_speed(prim: Usd.Prim) -> float:
+    """How many time codes of the stage are one of a groom's bake."""
+    return _strongest(prim)[1].scale
+
+
+def seen_as_written(prim: Usd.Prim, border: Border) -> bool:
+    """Whether a groom's bake lies at its own time codes in the stage, and counts in the stage's unit and axis."""
+    _, offset, layer = _strongest(prim)
+    return offset.IsIdentity() and (layer is None or not border.differing(layer))
+
+
+def _strongest(prim: Usd.Prim) -> tuple:
+    """What the strongest layer tells, its offset, and the layer: composed, a bake over another one would tell a mixture of
+    both.
+    """
+    stack = prim.GetPrimStackWithLayerOffsets()
+    told = ((spec.customData[KEY], offset, spec.layer) for spec, offset in stack if KEY in spec.customData)
+    return next(told, (None, Sdf.LayerOffset(), None))
 
 
 def given_facts(cuts: list[float] | None, joints: dict[str, str] | None) -> dict:

@@ -94,10 +94,15 @@ class JointSource:
                 local[:, joint] = local[:, parent] @ local[:, joint]
         return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ local
 
+    @property
+    def shape_names(self) -> tuple[str, ...]:
+        """The blend shapes that the animation moves."""
+        return () if self._animation is None else _names(self._animation.GetBlendShapesAttr())
+
     def shape(self, names, time_codes) -> np.ndarray:
         """Blend shape weights (T, B) of the named shapes at time codes (T,); 0 where the animation has none."""
         result = np.zeros((len(time_codes), len(names)))
-        order = () if self._animation is None else _names(self._animation.GetBlendShapesAttr())
+        order = self.shape_names
         wanted = [(column, order.index(name)) for column, name in enumerate(names) if name in order]
         if not wanted:
             return result

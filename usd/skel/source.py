@@ -18,11 +18,11 @@ from neuralocks_core.motion import LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, transformed
 
 from ..border.units import Border
-from ..border.values import as_names
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
 from .clip_codes import clip_codes
 from .joints import JointSource
+from .motion_sketch import motion_sketch
 from .rig_copy import alike, hair_of, source_of
 from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
 
@@ -128,6 +128,11 @@ class StageRig:
             return None if body is None else Collider(body.points, body.triangles)
         except NeuralocksError:  # a mesh of points alone
             return None
+
+    @cached_property
+    def motion_sketch(self) -> str:
+        """What `motion_sketch` tells of it."""
+        return motion_sketch(self.source, self.border.rate)
 
     @cached_property
     def _to_world(self) -> np.ndarray:
@@ -243,12 +248,11 @@ def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
     if not original:
         return []
     codes, hair = time_codes[:: max(1, len(time_codes) // COMPARED)], hair_of(copy)
-    shapes = as_names(attribute := UsdSkel.Animation(original).GetBlendShapesAttr(), attribute.Get())
     body = [joint for joint, name in enumerate(source.names) if name not in hair]
     try:
         both = [JointSource(source.prim, unbaked) for unbaked in (False, True)]
         same = alike(*(each.local(codes)[:, body] for each in both))
-        if same and np.allclose(*(each.shape(shapes, codes) for each in both), atol=1e-4):
+        if same and np.allclose(*(each.shape(both[1].shape_names, codes) for each in both), atol=1e-4):
             return []
     except NeuralocksError:  # whichever is read tells it
         return []

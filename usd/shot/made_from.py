@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a groom was baked from: told in the bake, and compared with what is there."""
+
+from pxr import Usd
+
+from neuralocks_core.groom import Groom
+from neuralocks_core.sketch import alike, sketch
+
+from .attach import Attachment, rig_joint
+from .recorded import recorded, recorded_joint, seen_as_written
+
+INPUTS = "inputs"
+"""Key of what `made_from` gives, in the record of a bake."""
+NEAR = {"groom": 1e-4, "animation": 1e-6}
+"""Points at rest are in single precision, and some are brought from one space to another; motion is read as it is authored."""
+AT_A_TIME = 1 << 16
+
+
+def made_from(found: Attachment, groom: Groom) -> dict[str, str]:
+    """Sketches of the groom at rest, seen from the head, and of what moves its character."""
+    points, canonical = groom.points, found.character.canonical
+    blocks = (canonical(points[i : i + AT_A_TIME].astype(float)) for i in range(0, len(points), AT_A_TIME))
+    told = f"{groom.strand_count} strands {sketch(blocks)}"
+    return {"groom": told, "animation": found.rig.motion_sketch}
+
+
+def unlike(one: dict, other: dict) -> list[str]:
+    """Which inputs differ in two records, of those that both tell."""
+    mine, theirs = (made if isinstance(made := facts.get(INPUTS), dict) else {} for facts in (one, other))
+    return [
+        name for name in NEAR if name in mine and name in theirs and not _same(mine[name], theirs[name], NEAR[name])
+    ]
+
+
+def baked_from_others(prim: Usd.Prim, found: Attachment, groom: Groom) -> list[str]:
+    """The notes on a bake over a groom or an animation that is not the one that it was made from.
+
+    Where time codes are shifted or stretched between the bake and the stage, or units differ, or another joint is taken for
+    the head, nothing can be told.
+    """
+    told, border = recorded(prim), found.rig.border
+    if INPUTS not in told or not seen_as_written(prim, border) or recorded_joint(prim) != rig_joint(found):
+        return []
+    return [
+        f"{prim.GetPath()}: the shot's {name} is not the one that this was baked from; bake again"
+        for name in unlike(told, {INPUTS: made_from(found, groom)})
+    ]
+
+
+def _same(one: str, other: str, near: float) -> bool:
+    first, second = (str(text).rpartition("strands ") for text in (one, other))
+    try:
+        return first[0] == second[0] and alike(first[2], second[2], near)
+    except ValueError:  # written by others
+        return True
