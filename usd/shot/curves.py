@@ -159,11 +159,10 @@ def _copy(prim: Usd.Prim) -> UsdGeom.Primvar | None:
     return primvar if primvar and primvar.HasValue() else None
 
 
-def _steady_counts(prim: Usd.Prim, most: int = 16) -> np.ndarray:
+def _steady_counts(prim: Usd.Prim) -> np.ndarray:
     """Points of each strand (S,), which some caches write anew for each frame."""
     attribute, counts = UsdGeom.BasisCurves(prim).GetCurveVertexCountsAttr(), rest_counts(prim)
-    times = attribute.GetTimeSamples()
-    for time in times[:: max(1, len(times) // most)]:
+    for time in attribute.GetTimeSamples():
         if not np.array_equal(counts, attribute.Get(time)):
             raise NeuralocksError(
                 f"{prim.GetPath()}: its curveVertexCounts at time code {time:g} are not those at rest; "

@@ -77,11 +77,11 @@ def test_varying_widths_of_cubic_curves_are_those_of_segments_ends(name):
 def test_caches_may_repeat_their_counts_but_not_change_them():
     stage = Usd.Stage.CreateInMemory()
     curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
-    for code in (1, 2):
+    for code in (1, 2, *range(4, 50)):
         curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(POINTS), code)
         curves.CreateCurveVertexCountsAttr().Set(COUNTS, code)
     assert read_groom(curves.GetPrim(), np.eye(4), []).counts.tolist() == COUNTS
-    curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)
+    curves.GetCurveVertexCountsAttr().Set([3, 2, 2], 3)  # in a single sample of many
     with pytest.raises(NeuralocksError, match="/Hair: its curveVertexCounts at time code 3 are not those at rest"):
         read_groom(curves.GetPrim(), np.eye(4), [])
 
