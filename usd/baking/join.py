@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, Vt
+from pxr import Ar, Sdf, Tf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
@@ -161,7 +161,12 @@ class _Part:
         return self.layer.GetPrimAtPath(groom).customData[KEY] | options
 
     def check_alike(self, others: list["_Part"]) -> None:
-        """Refuse what is of another shot than other parts, or has a groom of theirs with other options."""
+        """Refuse what does not find its shot, is of another one than other parts, or has a groom of theirs with other options."""
+        for shot in self._shots():
+            if not Ar.GetResolver().Resolve(shot):
+                raise NeuralocksError(
+                    f"{self.path}: does not find its shot ({shot}) from here; join where it was baked"
+                )
         if others and self._shots() != others[0]._shots():
             raise NeuralocksError(
                 f"{self.path}: is a bake of another shot than {others[0].path} is; join the parts of one"

@@ -17,13 +17,13 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import names_damage
-from ..border.stage_files import check_not_input, used_files
+from ..border.stage_files import check_not_input, unsaved, used_files
 from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
 from .override import OverrideWriter, deliver
 from .sample_layer import Lagging
-from .spool import Spool, fingerprint, program_files
+from .spool import Spool, fingerprint, program_files, unsaved_digest
 from .stencils import Stencils
 from .write_behind import WriteBehind
 
@@ -73,6 +73,7 @@ def write_samples(
     """
     check_not_input(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
+    inputs["unsaved"] = unsaved_digest(unsaved(shot.stage))
     batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     _check_space(spool, batched, codes, velocities)

@@ -163,6 +163,11 @@ def fingerprint(files, values: dict) -> str:
     return hashlib.sha256(json.dumps([facts, values], sort_keys=True).encode()).hexdigest()
 
 
+def unsaved_digest(layers) -> str:
+    """Digest of what layers (Sdf.Layer) hold that no file does."""
+    return hashlib.sha256("".join(sorted(layer.ExportToString() for layer in layers)).encode()).hexdigest()
+
+
 def program_files() -> list[Path]:
     """The program's own files: frames of another version of it are not gone on from."""
     import neuralocks_core

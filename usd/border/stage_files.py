@@ -58,6 +58,11 @@ def used_files(stage: Usd.Stage) -> list[str]:
     return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})
 
 
+def unsaved(stage: Usd.Stage) -> list[Sdf.Layer]:
+    """Layers of the stage that hold what no file does: a host keeps what its user edits, and who opens the stage there sees it."""
+    return [layer for layer in stage.GetUsedLayers() if not layer.empty and (layer.dirty or not layer.realPath)]
+
+
 def check_layer_name(out: Path) -> None:
     """Refuse to write USD under a name that is no USD layer's.
 

@@ -13,7 +13,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
 from ..shot.made_from import baked_from_others
-from ..shot.recorded import recorded_cuts, recorded_joint
+from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
 
 MOST_BODY_POINTS = 400_000
@@ -113,6 +113,7 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     items = tuple(item for item in shot.grooms if len(sampled[item.path]) >= least)
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
     old = [note for item in items for note in baked_from_others(item.prim, item.attachment, item.groom)]
+    old += [note for item in items for note in retimed(item.prim)]
     codes = sorted({code for item in items for code in sampled[item.path]})
     return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left, *old)), np.array(codes))
 

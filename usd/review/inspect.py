@@ -27,7 +27,7 @@ from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains,
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
 from ..shot.curve_ends import groom_between
-from ..shot.curves import find_curves
+from ..shot.curves import find_curves, rest_counts
 from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
@@ -45,7 +45,7 @@ from ..shot.notes import (
     rig_notes,
     without_turn,
 )
-from ..shot.recorded import recorded, recorded_cuts
+from ..shot.recorded import recorded, recorded_cuts, retimed
 from ..shot.stage import frame_range
 from ..shot.unnamed_head import read_each_rig
 from ..skel.source import StageRig, find_skeletons
@@ -207,6 +207,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
         spoils += baked_from_others(prim, found, groom)
     made = recorded(prim)
     baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
+    spoils += retimed(prim) + _unfit(prim) if made else []
     return facts | joint | groom_facts(groom) | baked
 
 
@@ -217,6 +218,21 @@ def _samples(prim, border: Border) -> dict:
         return {"number": 0}
     missing = gaps(codes, border.frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
     return {"first": codes[0], "last": codes[-1], "number": len(codes), "missing": missing}
+
+
+def _unfit(prim) -> list[str]:
+    """The note on a bake that does not fit what lies over it or below."""
+    curves, count = UsdGeom.BasisCurves(prim), int(rest_counts(prim).sum())
+    codes = curves.GetPointsAttr().GetTimeSamples()
+    if not codes:
+        return [f"{prim.GetPath()}: its samples are hidden by a stronger layer; bake again"]
+    code = codes[len(codes) // 2]
+    for attribute in (curves.GetPointsAttr(), curves.GetVelocitiesAttr()):
+        values = attribute.Get(code)
+        if values is not None and len(values) not in (0, count):
+            fact = f"{len(values)} {attribute.GetName()} at time code {code:g} for curves of {count} points"
+            return [f"{prim.GetPath()}: {fact}; bake again"]
+    return []
 
 
 def groom_facts(groom: Groom) -> dict:

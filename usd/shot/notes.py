@@ -18,6 +18,7 @@ from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.arclength import count_pointlike
 
 from ..border.damage import text_of
+from ..border.stage_files import unsaved
 from ..border.units import Border
 from ..skel.source import StageRig
 from .alike import one_person
@@ -60,7 +61,10 @@ def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: 
         out: the layer.
         codes: the time codes that were asked for, ascending.
     """
-    return [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])] + out_of_place(stage, out)
+    edited = [layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath]
+    notes = [f"{name}: has unsaved changes, which this bake has in it; save it" for name in sorted(edited)]
+    notes += [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
+    return notes + out_of_place(stage, out)
 
 
 def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:

@@ -31,9 +31,18 @@ def recorded(prim: Usd.Prim) -> dict:
     return {name: as_stage_has_it(value) for name, value in facts.items()}
 
 
-def recorded_speed(prim: Usd.Prim) -> float:
-    """How many time codes of the stage are one of a groom's bake."""
-    return _strongest(prim)[1].scale
+def retimed(prim: Usd.Prim) -> list[str]:
+    """The note on a bake that a stage plays at another speed."""
+    _, offset, layer = _strongest(prim)
+    if layer is None:
+        return []
+    slower = offset.scale * layer.timeCodesPerSecond / prim.GetStage().GetTimeCodesPerSecond()
+    if abs(slower - 1) < 1e-6:
+        return []
+    return [
+        f"{prim.GetPath()}: its bake is stretched to {slower:g} times as long, but its velocities and the way it swings are not; "
+        "bake the shot as it is timed here"
+    ]
 
 
 def seen_as_written(prim: Usd.Prim, border: Border) -> bool:

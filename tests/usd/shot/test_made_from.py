@@ -86,3 +86,68 @@ def test_a_moving_cache_whose_bake_gives_it_points_at_rest_is_known_again(tmp_pa
     stage.GetRootLayer().Save()
     bake(shot, tmp_path / "hair.usdc", model)
     assert not any("baked from" in note for note in inspect(tmp_path / "hair.usdc")["spoils"])
+
+
+def over(folder, name, below, how="", more=""):
+    """A layer over another one."""
+    path = folder / f"{name}.usda"
+    path.write_text(f"#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@./{below}@{how}]\n)\n{more}")
+    return path
+
+
+def test_a_bake_that_is_played_slower_is_told_so_and_another_frame_rate_is_not(tmp_path, model):
+    bake(write_shot(tmp_path), tmp_path / "hair.usdc", model)
+    slow = over(tmp_path, "slow", "hair.usdc", " (scale = 2)")
+    for notes in (inspect(slow)["spoils"], evaluate(slow).notes):
+        assert any("/Hero/Hair: its bake is stretched to 2 times as long" in note for note in notes)
+    fast = over(tmp_path, "fast", "hair.usdc")
+    fast.write_text(fast.read_text().replace("(\n", "(\n  timeCodesPerSecond = 48\n", 1))
+    for path in (fast, over(tmp_path, "late", "hair.usdc", " (offset = 10)")):
+        assert not any("stretched" in note for note in inspect(path)["spoils"])
+
+
+def test_a_bake_under_another_groom_is_told(tmp_path, model):
+    """Of fewer strands in a layer below; and of points over it, which hide its samples."""
+    shot = write_shot(tmp_path)
+    bake(shot, tmp_path / "hair.usdc", model)
+    stage = Usd.Stage.Open(str(shot))
+    points = stage.GetPrimAtPath("/Hero/Hair").GetAttribute("points").Get()
+    told = f'over "Hero"\n{{\n  over "Hair"\n  {{\n    point3f[] points = {[tuple(p) for p in points]}\n  }}\n}}\n'
+    notes = inspect(over(tmp_path, "hides", "hair.usdc", more=told))["spoils"]
+    assert "/Hero/Hair: its samples are hidden by a stronger layer; bake again" in notes
+    unfit = "/Hero/Hair: 480 points at time code 5 for curves of 360 points; bake again"
+    assert unfit not in inspect(tmp_path / "hair.usdc")["spoils"]
+    hair = stage.GetPrimAtPath("/Hero/Hair")
+    hair.GetAttribute("points").Set(points[:360])
+    hair.GetAttribute("curveVertexCounts").Set([12] * 30)
+    stage.GetRootLayer().Save()
+    assert unfit in inspect(tmp_path / "hair.usdc")["spoils"]
+
+
+def test_unsaved_changes_are_told_and_not_gone_on_without(tmp_path, model):
+    shot, out = write_shot(tmp_path), tmp_path / "hair.usdc"
+
+    def stop(done, total, message):
+        if done >= 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    body = layer.GetPrimAtPath("/Hero/Rig")
+    body.SetInfo("comment", "edited")
+    assert layer.dirty
+    result = bake(shot, out, model)
+    assert not result.resumed and "shot.usda: has unsaved changes, which this bake has in it; save it" in result.notes
+    layer.Save()
+    assert not any("unsaved" in note for note in bake(shot, out, model).notes)
+
+
+def test_parts_that_do_not_find_their_shot_are_not_joined(tmp_path, model):
+    (tmp_path / "node").mkdir()
+    part = bake(write_shot(tmp_path), tmp_path / "node" / "part.usdc", model, frames="1:4").path
+    (tmp_path / "far" / "away").mkdir(parents=True)
+    gone = part.rename(tmp_path / "far" / "away" / "part.usdc")
+    with pytest.raises(NeuralocksError, match="part.usdc: does not find its shot .* join where it was baked"):
+        join([gone], tmp_path / "hair.usdc")
+    assert not (tmp_path / "hair.usdc").exists()
