@@ -157,27 +157,6 @@ def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path, wider):
     )
 
 
-def test_a_blend_shape_named_like_the_joint_of_fur_does_not_say_that_it_rides_there(tmp_path):
-    path = write_shot(tmp_path, Recipe(bound="mesh"))
-    stage = Usd.Stage.Open(str(path))
-    skin = stage.GetPrimAtPath("/Hero/Skin")
-    points = np.array(UsdGeom.Mesh(skin).GetPointsAttr().Get())
-    low = points[points[:, 1] < 1.3]
-    add_curves(stage, "/Hero/Fur", np.stack([low, low + [0, 0, 0.02]], axis=1))
-    shape = UsdSkel.BlendShape.Define(stage, "/Hero/Skin/Breath")
-    shape.CreateOffsetsAttr(Vt.Vec3fArray(len(points), (0, 0, 0.05)))
-    binding, motion = UsdSkel.BindingAPI.Apply(skin), UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
-    binding.CreateBlendShapesAttr(["spine"])
-    binding.CreateBlendShapeTargetsRel().SetTargets([shape.GetPath()])
-    motion.CreateBlendShapesAttr(["spine"])
-    for code in (1, 9):
-        motion.CreateBlendShapeWeightsAttr().Set([float(code > 1)], code)
-    stage.Save()
-    notes = read_shot(path).notes
-    assert any(note.startswith("/Hero/Fur: blend shape 'spine' moves") for note in notes)
-    assert "/Hero/Fur: rides on 'spine', not on a head" in notes
-
-
 def test_arms_that_no_joint_continues_are_told_to_count_as_straight(tmp_path):
     path = write_shot(tmp_path, Recipe())
     assert not _said(path, "_lower_arm")
