@@ -61,10 +61,14 @@ def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: 
         out: the layer.
         codes: the time codes that were asked for, ascending.
     """
-    edited = [layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath]
-    notes = [f"{name}: has unsaved changes, which this bake has in it; save it" for name in sorted(edited)]
-    notes += [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
-    return notes + out_of_place(stage, out)
+    ranges = [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
+    return edited(stage) + ranges + out_of_place(stage, out)
+
+
+def edited(stage: Usd.Stage) -> list[str]:
+    """The notes on layers of a shot whose changes are in no file, so that another program reads another shot."""
+    names = sorted(layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath)
+    return [f"{name}: has unsaved changes, which this bake has in it; save it" for name in names]
 
 
 def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:

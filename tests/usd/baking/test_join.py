@@ -237,6 +237,7 @@ def test_a_stopped_join_leaves_nothing(shot, tmp_path, model):
 def test_less_than_a_frame_at_the_ends_of_a_shot_is_no_gap(tmp_path, model, rate, frames, begin, end, parts):
     path = write_shot(tmp_path, Recipe(rate=rate, frames=frames))
     stage = Usd.Stage.Open(str(path))
+    stage.SetFramesPerSecond(24)
     stage.SetStartTimeCode(begin)
     stage.SetEndTimeCode(end)
     stage.Save()
