@@ -17,7 +17,7 @@ from neuralocks_core.runtime import StrandModel, cores
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import edited, out_of_place, out_of_range
+from ..shot.notes import asked_notes, out_of_place
 from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
 from .posing import GroomPoser
@@ -142,8 +142,7 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
     """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
     return [
         *shot.notes,
-        *edited(shot.stage),
-        *(text for rig in shot.rigs for text in out_of_range(rig, codes[0], codes[-1])),
+        *asked_notes(shot.stage, shot.rigs, codes),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
         *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
     ]

@@ -135,9 +135,9 @@ def _history(spec: BoundarySpec) -> str:
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
         "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the "
-        "pose that is drawn. Of animation on twos to fours, in which poses are held for two to four samples each, the samples that "
-        "repeat a pose are left out, and at their times t is that of the pose's first. Before the first sample the head comes in a straight line, with its velocity there, and does not "
-        "turn; after the last one it stands still"
+        "pose that is drawn. Of animation on twos to fours, in which poses are held for two to four samples each, the "
+        "samples that repeat a pose are left out, and at their times t is that of the pose's first. Before the first sample "
+        "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still"
     )
 
 

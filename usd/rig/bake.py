@@ -22,7 +22,7 @@ from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_input
 from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import on_twos, without_turn, written_notes
+from ..shot.notes import asked_notes, on_twos, out_of_place, without_turn
 from ..shot.stage import check_cuts, frame_range
 from .layer import kept_hair, write_rig_layer
 from .stage import RiggedHair, mirrored_notes, read_rigged_hair, rigged_notes
@@ -120,7 +120,7 @@ def bake_rig(
     notes += on_twos(hair.source, model.spec.pose_joints) if model.dynamic else []
     if (loop or cuts is None) and model.dynamic:
         notes += hair.source.cut_notes(loop)
-    notes += written_notes(hair.stage, [hair.source], out, wanted)
+    notes += asked_notes(hair.stage, [hair.source], wanted) + out_of_place(hair.stage, out)
     return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
 
 

@@ -52,20 +52,18 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
     return notes
 
 
-def written_notes(stage: Usd.Stage, rigs: Iterable[StageRig], out: Path, codes: list[float]) -> list[str]:
-    """The notes on a layer that was written over a shot.
+def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float]) -> list[str]:
+    """The notes on what a bake was asked for.
 
     Args:
         stage: the shot.
-        rigs: skeletons that carry what was baked.
-        out: the layer.
-        codes: the time codes that were asked for, ascending.
+        rigs: skeletons that carry what is baked.
+        codes: the time codes, ascending.
     """
-    ranges = [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
-    return edited(stage) + ranges + out_of_place(stage, out)
+    return _edited(stage) + [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
 
 
-def edited(stage: Usd.Stage) -> list[str]:
+def _edited(stage: Usd.Stage) -> list[str]:
     """The notes on layers of a shot whose changes are in no file, so that another program reads another shot."""
     names = sorted(layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath)
     return [f"{name}: has unsaved changes, which this bake has in it; save it" for name in names]
