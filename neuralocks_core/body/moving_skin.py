@@ -19,6 +19,8 @@ DEPTH = 3
 """Cells below the skin in which a sample is entered too: hair may come that deep."""
 ENOUGH_SAMPLES = 20_000
 MOST_SAMPLES = 60_000
+THIN = 0.002
+"""A point that lies farther below a sample than the body is thick there, by more than this [m], is not below it."""
 MOST_CELLS = 4_000_000
 
 
@@ -77,6 +79,7 @@ class Skin:
         # Skin on the other side of a thin part is no neighbour; the sample itself stands in for it.
         other = np.einsum("ni,nki->nk", normal, normal[near]) < 0.2
         own = np.arange(len(place))[:, None]
+        self.thick = _thickness(place, normal, tree)
         self.near = np.where(other | (far > 3 * spacing[:, None]), own, near).astype(np.int32)
         self.counted = np.where((self.near == own) & (np.arange(count) > 0), 0, 1).astype(np.float32)
 
@@ -179,7 +182,23 @@ class PosedSkin:
         direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
         beyond = nearest - value * value > 4 * square
         beyond |= nearest - 0.5 * square > head * head
+        # A shoulder is thinner than the grid goes down: what is below its front is behind its back.
+        beyond |= -value > skin.thick.take(near[:, 0]) + np.float32(THIN)
         return np.where(beyond, np.inf, value), direction
+
+
+def _thickness(place: np.ndarray, normal: np.ndarray, tree: cKDTree) -> np.ndarray:
+    """How far (N,) float32 [m] below each sample the skin of the other side is; infinite where none is as near as is asked for."""
+    thick = np.full(len(place), np.inf, np.float32)
+    for depth in np.arange(0.5, DEPTH + 1.1, 0.5) * CELL:
+        below = place - np.float32(depth) * normal
+        off, other = tree.query(below, distance_upper_bound=CELL)
+        found = np.flatnonzero(np.isfinite(off))
+        other = other[found]
+        found, other = (each[np.einsum("ni,ni->n", normal[found], normal[other]) < 0] for each in (found, other))
+        height = np.einsum("ni,ni->n", place[found] - place[other], normal[found])
+        thick[found] = np.minimum(thick[found], np.maximum(height, 0))
+    return thick
 
 
 def _sampled(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -73,6 +73,17 @@ def test_moving_skin_is_found_where_it_is():
     assert np.abs(value - 0.004).max() < 1e-3
 
 
+def test_what_lies_behind_a_thin_part_is_not_below_its_front():
+    # As thick as a shoulder: what is known of its front reaches down to where its back has long been left.
+    slab = trimesh.creation.box((0.3, 0.3, 0.02)).subdivide_to_size(0.015)
+    posed = near_body(False, slab).posed(np.eye(4)[None], None, LOW, HIGH)
+    rng = np.random.default_rng(5)
+    points = rng.uniform([-0.14, -0.14, -0.06], [0.14, 0.14, 0.06], (5000, 3)).astype(np.float32)
+    depth, value = np.abs(points[:, 2]) - 0.01, posed.distance(points)[0]
+    assert (value[depth > 0] > -0.002).all()
+    assert (value[depth < 0] < 0).all()
+
+
 def test_the_sieve_finds_every_strand_that_is_inside(body):
     points = strands(300, seed=5)
     low = clearance(np.full((300, 24), 0.01)) - np.float32(1e-5)
