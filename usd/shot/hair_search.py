@@ -7,13 +7,15 @@ from dataclasses import replace
 from pxr import Usd
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
+from ..skel.surface import bound_skeleton
 from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
 from .curves import left_as_they_are, without_points
-from .notes import another_carries, few, no_points, too_far
+from .notes import another_carries, few, no_points, too_far, unusable_skeleton
 from .other_curves import other_hair
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 
@@ -27,6 +29,7 @@ class HairSearch:
         notes: what a user should know is added here.
         named: the user named these curves: none is left out because it is empty or far away.
         others: skeletons whose hair is not wanted.
+        forced: the user named the skeleton for these curves: that they are bound to another does not count.
 
     Attributes:
         rigs: as given.
@@ -41,10 +44,12 @@ class HairSearch:
         *,
         named: bool = False,
         others: Sequence[StageRig] = (),
+        forced: bool = False,
     ):
         self.rigs, self._head, self._notes = rigs, head, notes
-        self._named, self._others = named, list(others)
+        self._named, self._others, self._forced = named, list(others), forced
         self._far: list[str] = []
+        self._unusable: list[str] = []
         self._controls: list[str] = []
         self._off_head: list[str] = []
         self.carriers: list[StageRig] = []
@@ -52,7 +57,7 @@ class HairSearch:
     def no_hair(self) -> list[str]:
         """Why curves are not taken for hair: notes where other hair was found, the first of them the error where none was."""
         others = [] if self._named else other_hair(self.rigs)
-        return few(others) + few(self._far) + controls_left_out(self._controls)
+        return few(others) + few(self._unusable) + few(self._far) + controls_left_out(self._controls)
 
     def off_heads(self) -> list[str]:
         """The notes on hair that is not on a head, where none on that hair names its joint."""
@@ -71,9 +76,15 @@ class HairSearch:
         """What carries the curves of a prim; None where they are another skeleton's, or no hair.
 
         Raises:
-            NeuralocksError: as `attach`.
+            NeuralocksError: as `attach`; or the curves are named, and bound to a skeleton that cannot be used.
         """
-        path = str(prim.GetPath())
+        path, bound = str(prim.GetPath()), bound_skeleton(prim)
+        if bound and not self._forced and all(rig.path != bound for rig in (*self.rigs, *self._others)):
+            # On another's head it would be skinned by its own skeleton once more.
+            if self._named:
+                raise NeuralocksError(unusable_skeleton(path, bound))
+            self._unusable.append(unusable_skeleton(path, bound))
+            return None
         if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
             self._notes.append(another_carries(path, other))
             return None

@@ -125,6 +125,11 @@ def another_carries(path: str, rig: StageRig) -> str:
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
+def unusable_skeleton(path: str, bound: str) -> str:
+    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it."""
+    return f"{path}: is bound to {bound}, which cannot be used, and is left out with it; mend that skeleton, or unbind the hair"
+
+
 def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
     """The note on curves that start too far from any head to be taken for hair, unless their user named them."""
     where = (

@@ -122,7 +122,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)[0]
     others = [rig for rig in every if skeleton and rig.path != skeleton]
-    search = HairSearch(rigs, head, notes, named=bool(grooms), others=others)
+    search = HairSearch(rigs, head, notes, named=bool(grooms), others=others, forced=bool(grooms and skeleton))
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
     if not found:

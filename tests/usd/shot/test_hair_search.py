@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
@@ -64,3 +64,27 @@ def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_p
     assert any("/doll/Hair" in note and "no animation" in note for note in shot.notes)
     with pytest.raises(NeuralocksError, match="/doll/Rig.*no animation"):
         read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
+
+
+def test_hair_bound_to_a_skeleton_that_cannot_be_used_goes_to_no_other_head(tmp_path):
+    write_shot(tmp_path, Recipe(), "hero")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, mirror in (("ann", 1), ("bob", -1)):
+        prim = stage.DefinePrim(f"/{name}")
+        prim.GetReferences().AddReference("./hero.usda", "/Hero")
+        scale = UsdGeom.Xformable(prim).AddTransformOp(opSuffix="mirror")
+        scale.Set(
+            Gf.Matrix4d().SetScale(Gf.Vec3d(mirror, 1, 1))
+            * Gf.Matrix4d().SetTranslate(Gf.Vec3d(0.4 * (mirror < 0), 0, 0))
+        )
+    stage.GetRootLayer().Save()
+    path = stage.GetRootLayer().realPath
+    for skeleton in (None, "/ann/Rig"):
+        shot = read_shot(path, skeleton=skeleton)
+        assert [item.path for item in shot.grooms] == ["/ann/Hair"]
+        assert any(note.startswith("/bob/Hair: is bound to /bob/") and "left out" in note for note in shot.notes)
+    facts = inspect(path)
+    assert [groom["path"] for groom in facts["grooms"]] == ["/ann/Hair"]
+    with pytest.raises(NeuralocksError, match="/bob/Hair: is bound to /bob/.*cannot be used"):
+        read_shot(path, ["/bob/Hair"])
