@@ -26,7 +26,7 @@ class Baked:
 
     Attributes:
         shot: the stage.
-        codes: time codes of the samples (T,), ascending.
+        codes: time codes (T,) at which some groom has a sample, ascending.
     """
 
     shot: Shot
@@ -36,6 +36,10 @@ class Baked:
     def times(self) -> np.ndarray:
         """(T,) [s]."""
         return self.shot.border.seconds(self.codes)
+
+    def alone(self, item: StageGroom) -> "Baked":
+        """The same at one groom's own samples: between them its points are drawn along chords, which are no hair."""
+        return replace(self, codes=np.array(UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples()))
 
     def world(self, item: StageGroom, code: float) -> np.ndarray:
         """Points (P, 3) of a groom, as it is drawn, at a time code, world metres.

@@ -77,18 +77,20 @@ def evaluate(
     say = progress or silent
     measured, compared, curves = {}, {}, {}
     notes = list(baked.shot.notes)
-    if len(baked.codes) < 3:
+    each = {item.path: baked.alone(item) for item in baked.shot.grooms}
+    if min(len(own.codes) for own in each.values()) < 3:
         notes.append("fewer than three frames: nothing is said about motion, and nothing is compared")
     for item in baked.shot.grooms:
-        subject = _Subject(baked, item, say)
+        own = each[item.path]
+        subject = _Subject(own, item, say)
         look = material or recorded_material(item.prim) or Material()
         measured[item.path] = subject.measures(look)
         if not len(subject.chosen):
             notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
             continue
-        curves[item.path] = {"times": baked.times, "bake": metrics.tip_curves(subject.moved)}
+        curves[item.path] = {"times": own.times, "bake": metrics.tip_curves(subject.moved)}
         curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
-        if reference and len(baked.codes) >= 3:
+        if reference and len(own.codes) >= 3:
             rows, tips = subject.compared(look, model)
             compared[item.path] = rows
             curves[item.path] |= tips

@@ -168,6 +168,23 @@ def test_only_what_was_baked_is_measured(tmp_path, model):
     assert any("/Hero/Beard" in note for note in card.notes)
 
 
+def test_each_groom_is_measured_at_its_own_samples(tmp_path, model):
+    """Between its samples and after them a groom is drawn along chords, or stands still in a character that goes on."""
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
+    stage.GetRootLayer().Save()
+    bake(stage.GetRootLayer().realPath, tmp_path / "hair.usdc", model, subframes=2)
+    layer = Sdf.Layer.FindOrOpen(str(tmp_path / "hair.usdc"))
+    for code in layer.ListTimeSamplesForPath("/Hero/Beard.points"):
+        if code % 1 or code > 6:
+            layer.EraseTimeSample("/Hero/Beard.points", code)
+    layer.Save()
+    card, alone = evaluate(tmp_path / "hair.usdc"), evaluate(tmp_path / "hair.usdc", grooms=["/Hero/Beard"])
+    assert card.grooms["/Hero/Hair"]["frames"] > card.grooms["/Hero/Beard"]["frames"] == 6
+    assert card.grooms["/Hero/Beard"] == pytest.approx(alone.grooms["/Hero/Beard"], nan_ok=True)
+    assert card.grooms["/Hero/Beard"]["stretch_percent_max"] < 0.01
+
+
 def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
     """Through a layer on top, too; a given one wins, and one that is none is told."""
     shot, out, above = write_shot(tmp_path), tmp_path / "hair.usdc", tmp_path / "above.usda"
