@@ -70,7 +70,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
                 actions.check_mode_left(armature, bones.bones)
         finally:  # whatever keeps the new keys from being made leaves earlier ones, and Live, as they were
             refresh(scene)
-        frames = frame_numbers(first, last, 1)
+        frames = frame_numbers(first, last, scene.neuralocks.subframes)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
         own = own_turns(sampled.own, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.

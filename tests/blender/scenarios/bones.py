@@ -57,6 +57,18 @@ def bones(folder: Path) -> None:
     as_groomed()
     for f in still:
         assert apart(turns(f), still[f]) < 1e-6
+    scene.neuralocks.subframes = 2  # as many keys as a USD animation has samples
+    rig.neuralocks_character.rig_live = True
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    denser = {f: turns(f) for f in still}
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    action = rig.animation_data.nla_tracks["Neuralocks Hair"].strips[0].action
+    at = sorted({round(key.co[0], 3) for curve in scenes.fcurves_of(action) for key in curve.keyframe_points})
+    assert at == [scene.frame_start + i / 2 for i in range(2 * (scene.frame_end - scene.frame_start) + 1)], at
+    for f in still:
+        assert apart(turns(f), denser[f]) < SAME
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    scene.neuralocks.subframes = 1
 
     scene.neuralocks.output = str(folder / "bakes" / "hair.usdc")
     assert bpy.ops.neuralocks.export_skel() == {"FINISHED"}
