@@ -2,13 +2,14 @@
 """Finished frames beside the output: whatever lies there already, one line or a clean start."""
 
 import errno
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from usd.baking.spool import Spool, _remove
+from usd.baking.spool import Spool, _remove, fingerprint
 
 
 def test_a_damaged_mark_means_a_fresh_start(tmp_path):
@@ -163,3 +164,15 @@ def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
 def test_a_folder_made_for_an_output_that_did_not_come_is_gone(tmp_path):
     Spool(tmp_path / "new" / "bake.usdc", "a").close()
     assert not list(tmp_path.iterdir())
+
+
+def test_a_shot_edited_at_the_same_size_is_another_one(tmp_path):
+    """Frames of the shot as it was before must not be gone on from."""
+    shot = tmp_path / "shot.usda"
+    shot.write_text("a = 1")
+    os.utime(shot, ns=(10**18, 10**18))
+    before = fingerprint([shot], {})
+    assert fingerprint([shot], {}) == before
+    shot.write_text("a = 2")
+    os.utime(shot, ns=(10**18, 10**18 + 10**6))
+    assert fingerprint([shot], {}) != before
