@@ -23,7 +23,12 @@ def report_lines(report: dict) -> list[str]:
         turned = report["most_turned"]
         line = f"held poses: no joint is turned more than '{turned['joint']}', by {turned['degrees']:.0f} degrees in the mean"
         lines.append(
-            line + ("; look at it, and train with another --seed if it stands out" if turned["degrees"] > 60 else "")
+            line
+            + (
+                "; if it stands out and many chains fan out below it, name these with --chains, else train with another --seed"
+                if turned["degrees"] > 60
+                else ""
+            )
         )
     for name, words in (("network", "network"), ("optimised", "direct optimisation"), ("rigid", "carried rigidly")):
         if f"penetration_{name}" in report:

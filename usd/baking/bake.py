@@ -102,7 +102,7 @@ def bake(
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
-    inputs = {"model": _digest(strand_model), "material": look.log_ratios().tolist()}
+    inputs = {"model": _digest(strand_model), "material": asdict(look)}
 
     def poser(items: list[StageGroom]) -> GroomPoser:
         return GroomPoser(items, strand_model, look, **options)

@@ -75,7 +75,7 @@ def simulate(
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"volume": float(volume), "loop": loop}
-    inputs = {"strands": count, "material": look.log_ratios().tolist(), "codes": codes, **options}
+    inputs = {"strands": count, "material": asdict(look), "codes": codes, **options}
 
     def poser(items: list[StageGroom]) -> _SimulatedPoser:
         return _SimulatedPoser(*items, codes, shot.first, look, count, **options, progress=progress)

@@ -262,5 +262,6 @@ def demo_command(
         typer.echo(f"{name}: {path}{took}")
 
 
-_IN_ORDER = "demo inspect bake join preview evaluate simulate import grow body train export".split()
-app.registered_commands.sort(key=lambda each: _IN_ORDER.index(each.name))  # of first need, as help lists them
+# As help lists them: of first need, and then the rest.
+for first in reversed("demo inspect bake join preview evaluate simulate import grow body train export".split()):
+    app.registered_commands.sort(key=lambda each: each.name != first)
