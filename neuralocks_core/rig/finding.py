@@ -6,7 +6,7 @@ import fnmatch
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import carrier, leaf
-from neuralocks_core.character import Character
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_hair
@@ -17,6 +17,10 @@ UNNAMED = 3
 """Joints in a row that drive skin below a head may be hair, whatever they are called."""
 CAP = 0.7
 """Share of the head's width and depth that skin must cover to be a cap."""
+
+
+FAN = 3
+"""Chains that hang from one joint: fewer may be a branching one."""
 
 
 class NoHairChains(NeuralocksError):
@@ -136,7 +140,10 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
             todo += below
             continue
         strange = len(tree) > 1 and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
-        if not hair and (worn or not strange) or used[tree[1:]].any() and _is_cap(character, joint, meshes):
+        holds = used[tree[1:]].any() and (
+            _is_cap(character, joint, meshes) or _only_shares(skeleton, joint, used, meshes)
+        )
+        if not hair and (worn or not strange) or holds:
             todo += below
         else:
             tops.append(joint)
@@ -153,6 +160,13 @@ def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Sk
     if used[joint] or len(on) != 1 or used[on[0]] or not riders(skeleton, on[0], used):
         return []
     return [] if any(_is_cap(character, rider, meshes) for rider in riding) else riding
+
+
+def _only_shares(skeleton: Skeleton, joint: int, used: np.ndarray, meshes: list[SkinnedMesh]) -> bool:
+    """Whether chains fan out from a joint to which smoothed weights give a part of their roots, but no skin of its own."""
+    fan = [child for child in skeleton.children[joint] if used[skeleton.below(child)].any()]
+    only = np.arange(len(skeleton.names)) == joint
+    return len(fan) >= FAN and not any((mesh.weight_on(only) > 0.55).any() for mesh in meshes)
 
 
 def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:

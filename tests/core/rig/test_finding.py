@@ -158,6 +158,27 @@ def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
     assert find_chains(who, [head, tails, _ring(who, "Hair", 0.2)]).names == ("Hair", "Hair_1", "Hair_2")
 
 
+@pytest.mark.parametrize("share", [0.5, 0.01])
+def test_a_holder_that_smoothed_weights_give_a_share_of_the_roots_is_no_bone(share):
+    """One stroke of a smoothing brush must not make a hairdo one chain that swings over the skull."""
+    tails = [
+        tail(f"{side}_tail", 3, at=(x, 1.6, -0.1), parent="Hair") for side, x in (("l", -0.1), ("m", 0), ("r", 0.1))
+    ]
+    who = character([("Hair", "head", (0, 1.6, 0)), *sum(tails, [])])
+    names = [f"{side}_tail_{i}" for side in "lmr" for i in (1, 2)]
+    mesh = skin(who, {name: np.eye(3) * 0.1 + [0, 1.7 - 0.1 * int(name[-1]), -0.1] for name in names})
+    holder = np.full_like(mesh.joint_indices, [n.endswith("/Hair") for n in who.skeleton.names].index(True))
+    shares = np.where([[name.endswith("_1")] for name in names for _ in range(3)], share, 0.0)
+    mesh = replace(
+        mesh,
+        joint_indices=np.hstack([mesh.joint_indices, holder]),
+        joint_weights=np.hstack([mesh.joint_weights - shares, shares]),
+    )
+    assert sorted(find_chains(who, [mesh]).names) == sorted(names)
+    own = skin(who, {"Hair": np.eye(3) * 0.01 + [0, 1.6, 0]})
+    assert "Hair" in find_chains(who, [mesh, own]).names
+
+
 def _ring(who, joint, size=1.0):
     """Skin around the head, which a joint drives."""
     points = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1)
