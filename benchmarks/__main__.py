@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-SCRIPTS = ("inference", "bake_speed", "bend_twist", "resolve", "reference_speed", "rig_speed")
+SCRIPTS = ("inference", "bake_speed", "bend_twist", "resolve", "reference_speed", "rig_speed", "optimiser")
 
 
 def main() -> int:

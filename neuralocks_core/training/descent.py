@@ -42,17 +42,6 @@ class Schedule:
         return self.rate * min(1.0, (step + 1) / max(self.warm_up, 1)) * (self.floor + (1 - self.floor) * cosine)
 
 
-def muon(net: torch.nn.Module, rate: float, decay: float) -> list[torch.optim.Optimizer]:
-    """Muon for the matrices of a network, AdamW for the rest.
-
-    Its steps are as large as AdamW's, so that one rate does for both.
-    """
-    matrices = [p for p in net.parameters() if p.ndim == 2]
-    rest = [p for p in net.parameters() if p.ndim != 2]
-    options = {"lr": rate, "weight_decay": decay}
-    return [torch.optim.Muon(matrices, adjust_lr_fn="match_rms_adamw", **options), torch.optim.AdamW(rest, **options)]
-
-
 @dataclass(frozen=True)
 class Descended:
     """Where a descent stands: steps taken, share of the budget used (0..1), running means of the losses."""

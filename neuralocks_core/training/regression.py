@@ -21,9 +21,10 @@ from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.network_sizes import K
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.training.descent import Descended, Schedule, descend, muon
+from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.muon import muon
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
 

@@ -14,7 +14,8 @@ from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
-from neuralocks_core.training.descent import Schedule, descend, muon
+from neuralocks_core.training.descent import Schedule, descend
+from neuralocks_core.training.muon import muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report

@@ -8,7 +8,7 @@ torch = pytest.importorskip("torch")
 
 from neuralocks_core.errors import NeuralocksError  # noqa: E402
 from neuralocks_core.training import checkpoint  # noqa: E402
-from neuralocks_core.training.descent import muon  # noqa: E402
+from neuralocks_core.training.muon import muon  # noqa: E402
 
 NAN = np.float32(np.nan)
 
