@@ -26,8 +26,8 @@ def one_of_alike(prim: Usd.Prim, seats: list[Seat], notes: list[str]) -> Seat:
     Raises:
         NeuralocksError: several are as likely.
     """
-    kin = max(kinship(prim, seat.rig) for seat in seats)
-    likely = _sharing_a_name(prim, [seat for seat in seats if kinship(prim, seat.rig) == kin])
+    kin = max(kinship(prim, seat.rig.source.prim) for seat in seats)
+    likely = _sharing_a_name(prim, [seat for seat in seats if kinship(prim, seat.rig.source.prim) == kin])
     best = min(likely, key=lambda seat: (seat.way, seat.distance))
     others = [seat for seat in likely if seat is not best and not one_person(best.rig, seat.rig)]
     near = CLEARLY * best.distance + 1e-4

@@ -25,6 +25,8 @@ from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
 from .seat_notes import lies_off_skin, not_pinned, upside_down
 
+ON_HEAD = 0.3
+"""Roots no farther than this, and than half the trunk is long, from a head are on it, whatever else is there [m]."""
 REACH = 1.0
 """Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
 ALIKE = 2e-3
@@ -144,6 +146,11 @@ def off_head(found: Attachment) -> bool:
     return own not in (None, found.character.head) and found.character.head != head_by_name(found.rig)
 
 
+def on_head(prim: Usd.Prim, found: Attachment) -> bool:
+    """Whether the roots are where the head of a human is, about the carrying joint."""
+    return _away(some_ends(prim), found.character, found.to_bind) <= max(ON_HEAD, _trunk(found.rig) / 2)
+
+
 def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     nearest = min(seat.distance for seat in seats)
@@ -169,8 +176,7 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     roots = some_ends(prim)
 
     def away(rig: StageRig, to_bind: np.ndarray) -> float:
-        head_at = rig.character.canonical_to_bind[:3, 3]
-        return float(np.median(np.linalg.norm(transformed(roots, to_bind) - head_at, axis=1)))
+        return _away(roots, rig.character, to_bind)
 
     when = moment(prim)
     places = {rig.path: ways(rig, None, placement, when) for rig in able}
@@ -183,8 +189,8 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
     least = min(distance for distance, _ in far)
     close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
-    kin = max(kinship(prim, rig) for _, rig in close)
-    close = [(distance, rig) for distance, rig in close if kinship(prim, rig) == kin]
+    kin = max(kinship(prim, rig.source.prim) for _, rig in close)
+    close = [(distance, rig) for distance, rig in close if kinship(prim, rig.source.prim) == kin]
     nearest, rig = close[0]
     out_of_reach = nearest > _reach(rig)
     if len(close) > 1 and not out_of_reach:
@@ -198,6 +204,11 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
     far = nearest if out_of_reach else 0.0
     return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
+
+
+def _away(roots: np.ndarray, character: Character, to_bind: np.ndarray) -> float:
+    """Distance of roots (n, 3) of a prim from a character's head, in the median [m]."""
+    return float(np.median(np.linalg.norm(transformed(roots, to_bind) - character.canonical_to_bind[:3, 3], axis=1)))
 
 
 def _reach(rig: StageRig) -> float:

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 from pxr import Usd
 
@@ -18,6 +19,7 @@ from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far, unusable_skeleton
 from .other_curves import other_hair
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
+from .unusable import Unusable, find_unusable, lies_on
 
 
 class HairSearch:
@@ -76,15 +78,14 @@ class HairSearch:
         """What carries the curves of a prim; None where they are another skeleton's, or no hair.
 
         Raises:
-            NeuralocksError: as `attach`; or the curves are named, and bound to a skeleton that cannot be used.
+            NeuralocksError: as `attach`; or the curves are named, and those of a skeleton that cannot be used.
         """
         path, bound = str(prim.GetPath()), bound_skeleton(prim)
         if bound and not self._forced and all(rig.path != bound for rig in (*self.rigs, *self._others)):
             # On another's head it would be skinned by its own skeleton once more.
-            if self._named:
-                raise NeuralocksError(unusable_skeleton(path, bound))
-            self._unusable.append(unusable_skeleton(path, bound))
-            return None
+            return self._without(unusable_skeleton(path, bound, bound=True))
+        if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
+            return self._without(unusable_skeleton(path, own.path, bound=False))
         if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
             self._notes.append(another_carries(path, other))
             return None
@@ -107,3 +108,29 @@ class HairSearch:
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found
+
+    def _without(self, why: str) -> None:
+        """Leave out the curves of a skeleton that cannot be used.
+
+        Raises:
+            NeuralocksError: they are named.
+        """
+        if self._named:
+            raise NeuralocksError(why)
+        self._unusable.append(why)
+
+    def _unusable_below(self, prim: Usd.Prim, placement: Placement) -> Unusable | None:
+        """The skeleton that cannot be used on whose character the curves lie."""
+        if not self._unread:
+            return None
+        rigs = [*self.rigs, *self._others]
+        try:
+            found = attach(prim, rigs, placement, self._head, [])
+        except NeuralocksError:  # not clear, or none of them
+            found = None
+        return lies_on(prim, found, rigs, self._unread, placement)
+
+    @cached_property
+    def _unread(self) -> list[Unusable]:
+        rigs = [*self.rigs, *self._others]
+        return find_unusable(rigs[0].source.prim.GetStage(), {rig.path for rig in rigs})

@@ -182,9 +182,9 @@ def beginnings(rig: StageRig) -> list[float]:
     return [first, start] if first < start <= last else [first]
 
 
-def kinship(prim: Usd.Prim, rig: StageRig) -> int:
+def kinship(prim: Usd.Prim, skeleton: Usd.Prim) -> int:
     """How many of their parents a groom and a skeleton share."""
-    return prim.GetPath().GetCommonPrefix(rig.source.prim.GetPath()).pathElementCount
+    return prim.GetPath().GetCommonPrefix(skeleton.GetPath()).pathElementCount
 
 
 def some_ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = None) -> np.ndarray:

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Skeletons that cannot be used, and the hair that lies on their characters: without a binding it is as near to a neighbour's
+head as two people stand, and must not be taken for that one's.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdSkel
+from scipy.spatial import cKDTree
+
+from neuralocks_core.anatomy.humanoid import NoHead, find_humanoid
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import transformed
+
+from ..border.placement import Placement
+from ..border.units import Border
+from ..border.values import as_names, as_numbers
+from ..skel.source import StageRig, find_skeletons
+from ..skel.surface import drawn, find_skins, geom_bind, rest_value
+from .attach import ALIKE, Attachment, on_head
+from .seat import NEAR, either_ends, kinship, off_skin
+
+
+@dataclass(frozen=True)
+class Unusable:
+    """A skeleton that cannot be read, as far as it can be.
+
+    Attributes:
+        prim: the Skeleton.
+        headless: whether no joint is named like a head: it may be a hat's, or a face's, on a head that another one moves.
+        skins: per mesh, its points at rest in the stage, in its place, where its skeleton stands, and as bound [m].
+    """
+
+    prim: Usd.Prim = field(repr=False)
+    headless: bool
+    skins: list[cKDTree] = field(repr=False)
+
+    @property
+    def path(self) -> str:
+        """Of the prim."""
+        return str(self.prim.GetPath())
+
+
+def find_unusable(stage: Usd.Stage, usable: set[str]) -> list[Unusable]:
+    """The skeletons of a stage that are none of the usable ones, given by their paths."""
+    prims = [prim for prim in find_skeletons(stage) if str(prim.GetPath()) not in usable]
+    skins, border = find_skins(stage) if prims else {}, Border.of(stage)
+    return [Unusable(prim, _headless(prim), _skins(prim, skins, border)) for prim in prims]
+
+
+def lies_on(
+    prim: Usd.Prim,
+    found: Attachment | None,
+    rigs: list[StageRig],
+    unusable: list[Unusable],
+    placement: Placement,
+) -> Unusable | None:
+    """On the character of which skeleton that cannot be used curves without a binding lie, rather than on one that can.
+
+    Skin tells; where there is none, or as much of it, among whose prims the curves are.
+
+    Args:
+        prim: the curves.
+        found: what else would carry them; None where nothing does, or several as likely.
+        rigs: the skeletons that can be used.
+        unusable: those that cannot.
+        placement: where the curves stand.
+    """
+    if found is None or found.far or on_head(prim, found):
+        # A hat or a face without a head joint takes no hair from the head below it.
+        unusable = [each for each in unusable if not each.headless]
+    if not unusable:
+        return None
+    carriers, border = [found.rig] if found else rigs, rigs[0].border
+    sides = either_ends(prim)
+    seated = np.inf
+    if found and found.rig.skins:
+        seated = min(off_skin(roots, found.rig, found.to_bind) for roots in sides)
+    placed = [transformed(roots, border.to_core @ placement.reference) for roots in sides]
+    known = max(kinship(prim, rig.source.prim) for rig in carriers)
+    for each in sorted(unusable, key=lambda each: -kinship(prim, each.prim)):
+        away, kin = min(_off(roots, each.skins) for roots in placed), kinship(prim, each.prim) > known
+        if seated <= NEAR:  # on a skin that can be used, too
+            its = away + ALIKE < seated or kin and away <= seated + ALIKE
+        else:
+            its = kin or away <= NEAR
+        if its:
+            return each
+    return None
+
+
+def _off(roots: np.ndarray, skins: list[cKDTree]) -> float:
+    """Distance of roots (n, 3) from the nearest of some skins, in the median [m]; infinite where none is near."""
+    far = [float(np.median(tree.query(roots, distance_upper_bound=2 * NEAR)[0])) for tree in skins]
+    return min(far, default=np.inf)
+
+
+def _headless(prim: Usd.Prim) -> bool:
+    joints = UsdSkel.Skeleton(prim).GetJointsAttr()
+    try:
+        names = as_names(joints, joints.Get())
+        place = {name: index for index, name in enumerate(names)}
+        parents = [place.get(name.rpartition("/")[0], -1) for name in names]
+        # Where they are is not asked: that may be just what is wrong.
+        return not names or "head" not in find_humanoid(names, parents)
+    except NoHead:
+        return True
+    except NeuralocksError:  # of another type than names
+        return True
+
+
+def _skins(prim: Usd.Prim, skins, border: Border) -> list[cKDTree]:
+    found = []
+    for mesh in skins.get(str(prim.GetPath()), ()):
+        with suppress(NeuralocksError):  # what is wrong with it does not matter here
+            attribute = UsdGeom.Mesh(mesh).GetPointsAttr()
+            points = as_numbers(attribute, "point3f[]", rest_value(attribute))
+            points = points[np.isfinite(points).all(axis=1)]
+            if not len(points) or not drawn(mesh):
+                continue
+            bound = transformed(points, geom_bind(mesh))
+            found.append(cKDTree(transformed(points, border.to_core @ Placement(mesh).reference)))
+            found.append(cKDTree(transformed(bound, border.to_core @ Placement(prim).reference)))
+            found.append(cKDTree(transformed(bound, border.to_core)))
+    return found
