@@ -64,14 +64,23 @@ def find_chains(
     return measured_chains(character, sorted(tops), meshes)
 
 
-def left_out(character: Character, meshes: list[SkinnedMesh], chains: HairChains) -> list[int]:
+def left_out(
+    character: Character, meshes: list[SkinnedMesh], chains: HairChains | None = None, least: int = UNNAMED
+) -> list[int]:
     """First joints of chains below the head that may be hair, but move with none: of names that say nothing, in a mesh that the
     body drives, too.
+
+    Args:
+        character: skeleton and head.
+        meshes: the skinned meshes.
+        chains: those that were found; None where there are none.
+        least: of so many joints in a row that drive skin.
     """
     skeleton, found = character.skeleton, []
     drives = driving(skeleton, meshes)
     face = np.array([says_face(name) for name in skeleton.names])
-    moved = np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
+    tops = [] if chains is None else chains.joints[chains.roots]
+    moved = np.any([np.zeros(len(face), bool), *map(skeleton.below, tops)], axis=0)
 
     def in_a_row(joint: int) -> int:
         return int(drives[joint]) + max(map(in_a_row, skeleton.children[joint]), default=0)
@@ -80,10 +89,20 @@ def left_out(character: Character, meshes: list[SkinnedMesh], chains: HairChains
     while todo:
         joint = todo.pop(0)
         if not face[joint] and drives[joint] and not ((face | moved) & skeleton.below(joint)).any():
-            found += [joint] if in_a_row(joint) >= UNNAMED else []
+            found += [joint] if in_a_row(joint) >= least else []
         elif not face[joint] and not moved[joint]:
             todo += skeleton.children[joint]
     return sorted(found)
+
+
+def of_the_body(character: Character, meshes: list[SkinnedMesh] | None) -> np.ndarray:
+    """Which joints (J,) bool drive a mesh that a joint outside the head drives, too."""
+    body, outside = np.zeros(len(character.skeleton.names), bool), ~character.skeleton.below(character.head)
+    for mesh in meshes or ():
+        drives = mesh.driven_by(len(body))
+        if (drives & outside).any():
+            body |= drives
+    return body
 
 
 def fits(name: str, pattern: str) -> bool:
@@ -118,12 +137,7 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
     """First joints of the subtrees that are hair by their names or by what they drive."""
     skeleton, head = character.skeleton, character.head
     names, children = skeleton.names, skeleton.children
-    used, body = driving(skeleton, meshes), np.zeros(len(names), bool)
-    outside = ~skeleton.below(head)
-    for mesh in meshes or ():
-        drives = mesh.driven_by(len(names))
-        if (drives & outside).any():
-            body |= drives
+    used, body = driving(skeleton, meshes), of_the_body(character, meshes)
     tops, todo = [], [(joint, False) for joint in children[head]]
     while todo:
         joint, worn = todo.pop()

@@ -22,7 +22,7 @@ from ..border.placement import Placement
 from ..border.stage_files import OTHERS, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
-from ..rig.outside import left_out_notes, outside_notes
+from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
@@ -100,7 +100,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         ]
     curves = find_curves(stage)
     told = any(recorded_cuts(prim) is not None for prim in curves)
-    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils)} for rig in rigs]
+    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils, bool(curves))} for rig in rigs]
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig, read)
@@ -145,13 +145,14 @@ def _rig(rig: StageRig) -> dict:
     }
 
 
-def _chains(rig: StageRig, spoils: list[str]) -> list[dict]:
-    """Hair joints of rigged mesh hair; none is nothing to report."""
+def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
+    """Hair joints of rigged mesh hair; where there are none, what may be some is told, less readily beside `strands`."""
+    meshes = core_meshes(rig)
     try:
-        meshes = core_meshes(rig)
         chains = assemble_rig(rig.character, meshes).chains
         check_orients(rig, chains)
     except NoHairChains:
+        spoils += unnamed_notes(rig, meshes, strands)
         return []
     except NeuralocksError as error:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")

@@ -5,7 +5,7 @@ import numpy as np
 
 from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import left_out
+from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.hair_names import says_hair_alone
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
@@ -53,3 +53,25 @@ def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChai
     if found[1:]:
         what, they = f"'{found[0]}' and {len(found) - 1} more are", "they are"
     return [f"{source.path}: {what} not moved; if {they} hair, name all that is to move with --chains"]
+
+
+def unnamed_notes(source: StageRig, meshes: list[SkinnedMesh], strands: bool) -> list[str]:
+    """The note on what drives skin below the head, where none of it was found to be hair, and why it was not.
+
+    Args:
+        source: the character.
+        meshes: its skinned meshes in the core's axes.
+        strands: its stage has hair of another kind, so that only what looks much like a chain is worth a note.
+    """
+    found = left_out(source.character, meshes, least=UNNAMED if strands else 1)
+    if not found:
+        return []
+    first, body = leaf(source.source.names[found[0]]), of_the_body(source.character, meshes)
+    what, they = f"'{first}' drives", "it is"
+    if found[1:]:
+        what, they = f"'{first}' and {len(found) - 1} more drive", "they are"
+    why = "the body drives that mesh, too" if body[found[0]] else "it is a single joint"
+    return [
+        f"{source.path}: {what} skin below the head, but no name says hair and {why}; if {they} hair, name all that is to move in "
+        f"neuralocks rig inspect and rig train, with --chains {first}"
+    ]

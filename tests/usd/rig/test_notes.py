@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
@@ -270,6 +270,56 @@ def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
     expected = [f"/Who/Rig: {told}"] if told else []
     assert chain_notes(hair, None) == expected and chain_notes(hair, ["hair_0"]) == []
     assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "drives", "told"),
+    [
+        ("cable", [0, 2, 3, 4, 2, 3, 4, 0, 0], "the body drives that mesh, too; if it is hair"),
+        ("cable", [2, 2, 2, 1, 1, 1, 1, 1, 1], None),  # of a mesh of its own it is found
+        ("ear", [0, 2, 3, 4, 2, 3, 4, 0, 0], None),
+    ],
+)
+def test_chains_of_other_names_are_told_where_none_is_found(edited, name, drives, told):
+    """With the names to choose them by, and as far as they are like hair where the stage has some of another kind."""
+    head = "hips/head"
+    tail = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
+
+    def change(stage):
+        _named("hips", head, *tail, f"{tail[-1]}/end")(stage)
+        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set(drives)
+
+    shot = edited(change)
+
+    def notes():
+        return [note for note in inspect(shot)["spoils"] if "below the head, but" in note]
+
+    assert len(notes()) == bool(told)
+    if not told:
+        return
+    (note,) = notes()
+    assert note.startswith(f"/Who/Rig: '{name}_0' drives skin below the head, but no name says hair and {told}")
+    assert len(read_rigged_hair(shot, chains=[note.rpartition("--chains ")[2]]).rig.chains) == 3
+    stage = Usd.Stage.Open(str(shot))
+    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
+    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
+    curves.CreateCurveVertexCountsAttr([2])
+    stage.Save()
+    assert notes() == [note]
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([0, 1, 2, 3, 2, 3, 0, 0, 0])
+    stage.Save()
+    assert notes() == []
+
+
+def test_a_single_joint_that_drives_a_mesh_of_its_own_is_told(edited):
+    def change(stage):
+        head = "hips/head"
+        _named("hips", head, f"{head}/lobe", f"{head}/b1", f"{head}/b2", f"{head}/b3")(stage)
+
+    (note,) = [note for note in inspect(edited(change))["spoils"] if "below the head, but" in note]
+    assert note.startswith(
+        "/Who/Rig: 'lobe' and 2 more drive skin below the head, but no name says hair and it is a single"
+    )
 
 
 @pytest.mark.parametrize("locks", [["pony"], ["hair_0", "pony"]])
