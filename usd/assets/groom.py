@@ -3,7 +3,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
@@ -21,16 +20,13 @@ from ..border.placement import Placement
 from ..border.stage_files import LAYERS, check_not_input, open_stage, write_stage
 from ..border.units import Border
 from ..shot.curves import find_curves, read_groom
-from ..skel.surface import rest_primvar
+from ..shot.notes import few
+from .beside import Beside, Primvar, read_beside
 from .prims import POLYLINES, Spline, author_curves
 
 USD = (*LAYERS, ".usdz")
-KEPT = ("st", "displayColor", "displayOpacity")
-"""Primvars of imported curves that go on with them, besides all that begin with `groom_`."""
 BELOW = 0.02
 """How far below the lowest root the middle of a head lies, at least [m]."""
-OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
-"""Those that say what wrote the file."""
 
 
 @dataclass(frozen=True)
@@ -40,22 +36,12 @@ class Authored:
     Attributes:
         groom: the strands.
         spline: how a renderer interpolates them.
-        primvars: what other tools put on them.
+        beside: what else they have.
     """
 
     groom: Groom
     spline: Spline = POLYLINES
-    primvars: tuple["Primvar", ...] = ()
-
-
-class Primvar(NamedTuple):
-    """The arguments of `UsdGeomPrimvarsAPI.CreatePrimvar`, and the value."""
-
-    name: str
-    kind: Sdf.ValueTypeName
-    interpolation: str
-    size: int
-    value: object
+    beside: Beside = Beside()
 
 
 def import_groom(source, out, unit: str | float | None = None, up: str | None = None) -> tuple[list[Groom], list[str]]:
@@ -80,7 +66,7 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
         from neuralocks_core import formats
 
         groom, look, notes = formats.read_with_look(source, unit, up)
-        found = [Authored(groom, primvars=_primvars(look))]
+        found = [Authored(groom, beside=Beside(_primvars(look)))]
     write_grooms(out, found)
     return [each.groom for each in found], notes
 
@@ -111,9 +97,7 @@ def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> 
         Usd.ModelAPI(root).SetKind("component")
         stage.SetDefaultPrim(root.GetPrim())
         for each in grooms:
-            curves = author_groom(stage, _free_path(stage, each.groom.name), each.groom, each.spline)
-            for *arguments, value in each.primvars:
-                UsdGeom.PrimvarsAPI(curves).CreatePrimvar(*arguments).Set(value)
+            each.beside.author(author_groom(stage, _free_path(stage, each.groom.name), each.groom, each.spline))
 
     return write_stage(as_path(path, "path"), author)
 
@@ -175,37 +159,6 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
     return tuple(found)
 
 
-def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple["Primvar", ...]:
-    """Those that go on with the curves, as far as they fit them; with a note on the others."""
-    found = []
-    sizes = {
-        "uniform": {groom.strand_count},
-        "vertex": {len(groom.points)},
-        "varying": _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points)),
-    }
-    for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
-        name, scope, each = primvar.GetPrimvarName(), str(primvar.GetInterpolation()), primvar.GetElementSize()
-        if name in OWN or not (str(name).startswith("groom_") or name in KEPT):
-            continue
-        value = rest_primvar(primvar)
-        fits = np.shape(value)[:1] in [(many * each,) for many in sizes.get(scope, ())]
-        if value is not None and (scope == "constant" or fits):
-            found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
-        else:
-            notes.append(
-                f"{prim.GetPath()}: primvars:{name} ({scope}) does not fit {groom.strand_count} strands of "
-                f"{len(groom.points)} points; left out"
-            )
-    return tuple(found)
-
-
-def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
-    """How many varying values curves of so many points in all may have: one for each end of a segment."""
-    sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
-    # Pinned curves are drawn through their first and last points, too; not all tools count segments there.
-    return sizes | ({points} if curves.GetWrapAttr().Get() == UsdGeom.Tokens.pinned else set())
-
-
 @names_damage
 def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
     stage = open_stage(source)
@@ -213,15 +166,15 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     border = Border.of(stage)
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
-    found, notes = [], []
+    found, notes, left = [], [], []
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
-        found.append(Authored(groom, Spline(*tokens), _read_primvars(prim, groom, notes)))
+        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left)))
     if not found:
         raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
-    return found, notes
+    return found, notes + few(left, "primvars and materials are not imported like that")
 
 
 def _free_path(stage: Usd.Stage, name: str) -> str:

@@ -76,7 +76,19 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
 def drawn(prim: Usd.Prim) -> bool:
     """Whether a renderer shows the prim, at any time."""
     imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
-    return imageable.ComputePurpose() not in unseen and _ever_visible(prim)
+    return imageable.ComputePurpose() not in unseen and ever_visible(prim)
+
+
+def ever_visible(prim: Usd.Prim) -> bool:
+    """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
+    switches = []
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if above.IsA(UsdGeom.Imageable):
+            switches.append(UsdGeom.Imageable(above).GetVisibilityAttr())
+        above = above.GetParent()
+    times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
+    return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
 
 
 def bound_skeleton(prim: Usd.Prim) -> str | None:
@@ -189,18 +201,6 @@ def _body(mesh: StageMesh, to_bind: np.ndarray, knots: dict[str, list[float]]) -
         for knot in knots[name]
     }
     return Body(*mesh.in_bind(to_bind), mesh.indices, mesh.weights, shapes)
-
-
-def _ever_visible(prim: Usd.Prim) -> bool:
-    """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
-    switches = []
-    above = prim
-    while above and not above.IsPseudoRoot():
-        if above.IsA(UsdGeom.Imageable):
-            switches.append(UsdGeom.Imageable(above).GetVisibilityAttr())
-        above = above.GetParent()
-    times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
-    return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
 
 
 def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | None:

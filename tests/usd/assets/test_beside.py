@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What goes on with the strands of curves that are imported from USD."""
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from usd.assets.groom import import_groom
+
+from ..shots import Recipe, write_shot
+
+
+@pytest.fixture
+def imported(tmp_path):
+    """Imports a shot in which a function changed the stage; the curves' prim, its stage and the notes."""
+
+    def make(change):
+        source = write_shot(tmp_path, Recipe(bound="own", strands=3, vertices=4, unit=0.01, up="Z"))
+        stage = Usd.Stage.Open(str(source))
+        change(stage)
+        stage.GetRootLayer().Save()
+        _, notes = import_groom(source, tmp_path / "groom.usda")
+        new = Usd.Stage.Open(str(tmp_path / "groom.usda"))
+        return new.GetPrimAtPath("/Groom/Hair"), new, notes
+
+    return make
+
+
+def test_purpose_and_visibility_go_on_also_those_of_the_prims_above(imported):
+    def change(stage):
+        UsdGeom.Imageable(stage.GetPrimAtPath("/Hero")).CreatePurposeAttr("render")
+        UsdGeom.Imageable(stage.GetPrimAtPath("/Hero")).MakeInvisible()
+
+    prim, _stage, notes = imported(change)
+    assert UsdGeom.Imageable(prim).ComputePurpose() == "render" and not notes
+    assert UsdGeom.Imageable(prim).ComputeVisibility() == UsdGeom.Tokens.invisible
+
+
+@pytest.mark.parametrize("switched", [False, True])
+def test_what_is_shown_at_some_time_is_shown(imported, switched):
+    """And what says nothing of purpose and visibility goes on saying nothing."""
+
+    def change(stage):
+        if switched:
+            seen = UsdGeom.Imageable(stage.GetPrimAtPath("/Hero/Hair")).CreateVisibilityAttr()
+            seen.Set("invisible", 1)
+            seen.Set("inherited", 3)
+
+    prim, _stage, notes = imported(change)
+    shown = UsdGeom.Imageable(prim)
+    assert not shown.GetPurposeAttr().HasAuthoredValue() and not shown.GetVisibilityAttr().HasAuthoredValue()
+    assert not notes
+
+
+def test_constant_primvars_of_the_prims_above_go_on(imported):
+    """As renderers read them: the nearest counts, and only constant ones come down."""
+    names = Sdf.ValueTypeNames
+
+    def change(stage):
+        above = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Hero"))
+        above.CreatePrimvar("displayColor", names.Color3fArray, "constant").Set([(0.5, 0.25, 0.125)])
+        above.CreatePrimvar("look", names.String, "constant").Set("above")
+        above.CreatePrimvar("speckle", names.FloatArray, "uniform").Set([1, 2, 3])
+        own = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Hero/Hair"))
+        own.CreatePrimvar("look", names.String, "constant").Set("own")
+        own.CreatePrimvar("clump", names.IntArray, "uniform").Set([7, 8, 9])
+        own.CreatePrimvar("melanin", names.FloatArray, "vertex").Set(np.linspace(0, 1, 12).tolist())
+
+    prim, _stage, notes = imported(change)
+    api = UsdGeom.PrimvarsAPI(prim)
+    color = api.GetPrimvar("displayColor")
+    assert (color.GetInterpolation(), list(color.Get())) == ("constant", [(0.5, 0.25, 0.125)])
+    assert api.GetPrimvar("look").Get() == "own" and not api.GetPrimvar("speckle")
+    assert (api.GetPrimvar("clump").GetInterpolation(), list(api.GetPrimvar("clump").Get())) == ("uniform", [7, 8, 9])
+    assert np.allclose(np.array(api.GetPrimvar("melanin").Get()), np.linspace(0, 1, 12)) and not notes
+    assert not any(primvar.GetPrimvarName().startswith("skel:") for primvar in api.GetPrimvars())
+
+
+def test_what_does_not_go_on_is_told(imported):
+    """Positions of another unit and axis, files that are named, and what shades the hair."""
+    names = Sdf.ValueTypeNames
+
+    def change(stage):
+        own = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Hero/Hair"))
+        own.CreatePrimvar("Pref", names.Point3fArray, "vertex").Set([(0, 0, 1)] * 12)
+        own.CreatePrimvar("map", names.Asset, "constant").Set("./map.png")
+        own.CreatePrimvar("few", names.FloatArray, "uniform").Set([1])
+        material = UsdShade.Material.Define(stage, "/Hero/Brown")
+        UsdShade.MaterialBindingAPI.Apply(stage.GetPrimAtPath("/Hero")).Bind(material)
+
+    prim, stage, notes = imported(change)
+    assert sorted(notes) == [
+        "/Hero/Hair: its material /Hero/Brown is not imported; bind one to the new groom",
+        "/Hero/Hair: primvars:Pref (point3f[]) is of the space of its file; left out",
+        "/Hero/Hair: primvars:few (uniform) does not fit 3 strands of 12 points; left out",
+        "/Hero/Hair: primvars:map names files, which are not found from everywhere; left out",
+    ]
+    assert not any(UsdGeom.PrimvarsAPI(prim).HasPrimvar(name) for name in ("Pref", "map", "few"))

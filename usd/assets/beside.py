@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What imported curves have beside their strands: primvars, purpose and visibility, their own or of the prims above."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from neuralocks_core import rest_copy
+from neuralocks_core.groom import Groom
+
+from ..skel.surface import ever_visible, rest_primvar
+
+KNOWN = ("st", "displayColor", "displayOpacity")
+"""Primvars that go on with the curves whatever their type, besides all that begin with `groom_`."""
+OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
+"""Those that say what wrote the file."""
+READ = ("widths", rest_copy.NAME)
+"""Those that are read into the groom."""
+OF_A_SPACE = (Sdf.ValueRoleNames.Point, Sdf.ValueRoleNames.Vector, Sdf.ValueRoleNames.Normal, Sdf.ValueRoleNames.Frame)
+"""Roles of values that belong to the space which the curves come from."""
+
+
+class Primvar(NamedTuple):
+    """The arguments of `UsdGeomPrimvarsAPI.CreatePrimvar`, and the value."""
+
+    name: str
+    kind: Sdf.ValueTypeName
+    interpolation: str
+    size: int
+    value: object
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What stands beside a groom's strands.
+
+    Attributes:
+        primvars: what other tools put on them.
+        purpose: the token of UsdGeomImageable.
+        visible: whether they are ever shown.
+    """
+
+    primvars: tuple[Primvar, ...] = ()
+    purpose: str = "default"
+    visible: bool = True
+
+    def author(self, curves: UsdGeom.BasisCurves) -> None:
+        """Give it to curves."""
+        for *arguments, value in self.primvars:
+            UsdGeom.PrimvarsAPI(curves).CreatePrimvar(*arguments).Set(value)
+        if self.purpose != UsdGeom.Tokens.default_:
+            curves.CreatePurposeAttr(self.purpose)
+        if not self.visible:
+            curves.CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+
+
+def read_beside(prim: Usd.Prim, groom: Groom, notes: list[str]) -> Beside:
+    """What goes on with curves; with notes on what does not.
+
+    Args:
+        prim: the curves.
+        groom: as they were read.
+        notes: what a user should know is added here.
+    """
+    primvars = _read_primvars(prim, groom, notes)
+    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+    if material:
+        notes.append(f"{prim.GetPath()}: its material {material.GetPath()} is not imported; bind one to the new groom")
+    return Beside(primvars, str(UsdGeom.Imageable(prim).ComputePurpose()), ever_visible(prim))
+
+
+def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Primvar, ...]:
+    found, path = [], prim.GetPath()
+    sizes = {
+        "uniform": {groom.strand_count},
+        "vertex": {len(groom.points)},
+        "varying": _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points)),
+    }
+    for primvar in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance():
+        name, scope, each = str(primvar.GetPrimvarName()), str(primvar.GetInterpolation()), primvar.GetElementSize()
+        if not primvar.HasAuthoredValue() or name in OWN + READ or name.startswith("skel:"):
+            continue
+        value = rest_primvar(primvar)
+        fits = np.shape(value)[:1] in [(many * each,) for many in sizes.get(scope, ())]
+        if value is None or scope != "constant" and not fits:
+            notes.append(
+                f"{path}: primvars:{name} ({scope}) does not fit {groom.strand_count} strands of "
+                f"{len(groom.points)} points; left out"
+            )
+        elif why := "" if name.startswith("groom_") or name in KNOWN else _stays(primvar.GetTypeName()):
+            notes.append(f"{path}: primvars:{name} {why}; left out")
+        else:
+            found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
+    return tuple(found)
+
+
+def _stays(kind: Sdf.ValueTypeName) -> str:
+    """Why values of a type do not go on to another file, where units and axes are others; '' if they do."""
+    if kind.scalarType == Sdf.ValueTypeNames.Asset:
+        return "names files, which are not found from everywhere"
+    if kind.role in OF_A_SPACE or str(kind.scalarType).startswith(("matrix", "frame")):
+        return f"({kind}) is of the space of its file"
+    return ""
+
+
+def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
+    """How many varying values curves of so many points in all may have: one for each end of a segment."""
+    sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
+    # Pinned curves are drawn through their first and last points, too; not all tools count segments there.
+    return sizes | ({points} if curves.GetWrapAttr().Get() == UsdGeom.Tokens.pinned else set())
