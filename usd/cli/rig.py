@@ -122,9 +122,9 @@ def bake(
             strength=strength,
             cuts=cut_codes(cuts),
             joints=pairs(joint, "--joint"),
+            tell=note,
             progress=progress,
         )
-    note(result.notes)
     if as_json:
         print_json(vars(result))
     else:

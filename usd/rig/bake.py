@@ -3,6 +3,7 @@
 the network.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -66,6 +67,7 @@ def bake_rig(
     strength: float = 1.0,
     cuts=None,
     joints: dict[str, str] | None = None,
+    tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> RigBakeResult:
     """Bake the hair joints of a shot.
@@ -84,6 +86,7 @@ def bake_rig(
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
         cuts: time codes from which the character is elsewhere and its hair starts anew; found by itself if None.
         joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        tell: called with the notes that are known before hair is turned, then with the others.
         progress: called with (done, total, message).
 
     Raises:
@@ -104,24 +107,36 @@ def bake_rig(
     codes = _with_samples(hair, moved, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     carried = CarriedHair(model, moved, hair.source.character, clip)
-    turns = hair.source.authored_turns(moved, _turns(hair, carried, clip, codes, strength, progress))
-    notes = [
-        *_renamed(trained, model.chains),
-        *_resized(source.path, size),
-        *rigged_notes(hair.source, model.spec.pose_joints),
-        *_name_notes(source),
-        *mirrored_notes(hair.source, hair.rig.chains),
-        *_held(hair, carried.carriers, turns),
-    ]
+    notes = [*_renamed(trained, model.chains), *_resized(source.path, size)]
+    notes += _known(hair, moved, wanted, model, loop, cuts is None)
     if strength != 1 and not model.dynamic:
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
+    if tell:
+        tell(notes)
+    turns = hair.source.authored_turns(moved, _turns(hair, carried, clip, codes, strength, progress))
+    late = _held(hair, carried.carriers, turns)
     animation = write_rig_layer(hair, moved, shot, out, codes, turns)
-    notes += hair.source.loop_notes(wanted, moved) if loop else []
-    notes += on_twos(hair.source, model.spec.pose_joints) if model.dynamic else []
-    if (loop or cuts is None) and model.dynamic:
-        notes += hair.source.cut_notes(loop)
-    notes += asked_notes(hair.stage, [hair.source], wanted) + out_of_place(hair.stage, out)
-    return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes)
+    late += [note for note in hair.source.notes if note not in notes]  # of poses between those of the clip
+    late += out_of_place(hair.stage, out)
+    if tell:
+        tell(late)
+    return RigBakeResult(out, source.path, animation, len(model.chains), len(codes), notes + late)
+
+
+def _known(
+    hair: RiggedHair, moved: np.ndarray, wanted: list[float], model: RigModel, loop: bool, find_cuts: bool
+) -> list[str]:
+    """What a user should know before joints `moved` (N,) are turned at time codes."""
+    rig, read = hair.source, model.spec.pose_joints
+    return [
+        *rigged_notes(rig, read),
+        *_name_notes(rig.source),
+        *mirrored_notes(rig, hair.rig.chains),
+        *(rig.loop_notes(wanted, moved) if loop else []),
+        *(on_twos(rig, read) if model.dynamic else []),
+        *(rig.cut_notes(loop) if (loop or find_cuts) and model.dynamic else []),
+        *asked_notes(hair.stage, [rig], wanted),
+    ]
 
 
 def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHair, RigModel, np.ndarray, float]:
