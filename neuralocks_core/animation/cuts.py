@@ -4,6 +4,7 @@
 import numpy as np
 
 from neuralocks_core.motion import Clip
+from neuralocks_core.stepped import Stepped
 
 JUMP = 0.4
 """A step is a cut if it ends farther [m] than this from where the motion before it, and the motion after it, would have
@@ -12,7 +13,7 @@ _TURN = np.radians(72.0)
 """The same for the joint's rotation [rad]."""
 _LONGEST = 0.1
 """Longer steps [s] are no cuts: in that time people may come anywhere."""
-_APART = 0.2
+APART = 0.2
 """Steps that would be cuts, but have another one nearer [s], are none: motion too fast for its rate, or stepped animation."""
 
 
@@ -22,9 +23,25 @@ def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     A step is a cut if neither the motion before nor the motion after it explains it. Several in a row are none: those are
     damaged samples, or motion too fast for its rate.
     """
+    jumps, alone = _jumps(clip, joint)
+    return jumps[alone]
+
+
+def find_flashes(clip: Clip, joint: int) -> np.ndarray:
+    """Times (C,) [s] of the first sample after each step that would be a cut, but has another one within `APART`: the hair is
+    flung there. None of animation that holds its poses, whose hair does not feel the steps.
+    """
+    jumps, alone = _jumps(clip, joint)
+    return jumps[~alone] if len(jumps) and not len(Stepped.of(clip, [joint]).held) else np.zeros(0)
+
+
+def _jumps(clip: Clip, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (C,) [s] of the first sample after each step that the motion around it does not explain, and which of them have no
+    other one near, (C,) bool.
+    """
     times = clip.times
     if len(times) < 3:
-        return np.zeros(0)
+        return np.zeros(0), np.zeros(0, bool)
     places, turns = clip.joints[:, joint, :3, 3], clip.joints[:, joint, :3, :3]
     span = np.diff(times)
     speed = np.diff(places, axis=0) / span[:, None]
@@ -41,8 +58,8 @@ def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
     jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)
     found = np.flatnonzero(jumped)
-    crowded = (np.diff(found) == 1) | (np.diff(times[1:][found]) < _APART)
+    crowded = (np.diff(found) == 1) | (np.diff(times[1:][found]) < APART)
     alone = np.ones(len(found), bool)
     alone[1:] &= ~crowded
     alone[:-1] &= ~crowded
-    return times[1:][found[alone]]
+    return times[1:][found], alone

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
-from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -100,20 +100,32 @@ class StageRig:
         return notes
 
     def cut_notes(self, loop: bool = False) -> list[str]:
-        """Where the hair starts anew, if it does anywhere; of a loop, in which it never does, where it ought to."""
-        cuts = self.clip.cuts
-        if loop and "head" in self.character.humanoid:  # it was read as if it had none
-            cuts = find_cuts(self.clip, self.character.head)
-        if not len(cuts):
+        """Where the hair starts anew, if it does anywhere, and where it does not, though the head leaps; of a loop, in which it
+        never does, where it ought to.
+        """
+        if "head" not in self.character.humanoid:
             return []
-        codes = self.time_codes[np.searchsorted(self.clip.times, cuts - 1e-9)]
-        named = ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
+        # A loop was read as if it had none.
+        cuts = find_cuts(self.clip, self.character.head) if loop else self.clip.cuts
+        flashes = [] if loop else find_flashes(self.clip, self.character.head)
         what = (
             "a loop has no cuts, so the hair is flung there; leave out --loop, or repair the animation"
             if loop
             else "the hair starts anew there (--cuts says where)"
         )
-        return [f"{self.path}: its head is put elsewhere at {named}; {what}"]
+        notes = [f"{self.path}: its head is put elsewhere at {self._named(cuts)}; {what}"] if len(cuts) else []
+        if len(flashes):
+            every = self._named(np.union1d(cuts, flashes))
+            notes.append(
+                f"{self.path}: its head leaps at {self._named(flashes)}, less than {APART:g} s from one leap to the next, so these "
+                f"are no cuts and the hair is flung; if they are, name them all (--cuts {every}), else repair the animation"
+            )
+        return notes
+
+    def _named(self, times: np.ndarray) -> str:
+        """The time codes of samples of the clip [s], as `--cuts` takes them."""
+        codes = self.time_codes[np.searchsorted(self.clip.times, times - 1e-9)]
+        return ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
 
     @cached_property
     def skins(self) -> list[cKDTree]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.animation.cuts import find_cuts, find_flashes
 from neuralocks_core.animation.random_motion import KINDS, scripted_clip
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.motion import Clip
@@ -58,16 +58,20 @@ def test_motion_and_damaged_samples_are_no_cuts():
     who, t, joints = walking()
     assert not len(find_cuts(Clip(t, joints), who.head))
     joints[20, who.head, 0, 3] += 3
-    assert not len(find_cuts(Clip(t, joints), who.head))
+    damaged = Clip(t, joints)
+    assert not len(find_cuts(damaged, who.head)) and find_flashes(damaged, who.head) == pytest.approx(t[[20, 21]])
     for kind in KINDS:
-        assert not len(find_cuts(scripted_clip(who, kind, 4.0, 24.0), who.head)), kind
+        clip = scripted_clip(who, kind, 4.0, 24.0)
+        assert not len(find_cuts(clip, who.head)) and not len(find_flashes(clip, who.head)), kind
 
 
 def test_stepped_animation_has_no_cuts():
     """On twos, at a run: every second step stands still, every other one is large."""
     who, t, joints = walking(24)
+    joints[:] = joints[np.arange(len(t)) // 2 * 2]
     joints[:, who.head, 0, 3] += 10 * (np.arange(len(t)) // 2 * 2) / 24
-    assert not len(find_cuts(Clip(t, joints), who.head))
+    clip = Clip(t, joints)
+    assert not len(find_cuts(clip, who.head)) and not len(find_flashes(clip, who.head))
 
 
 @pytest.mark.parametrize("short", ["before", "after"])
@@ -87,7 +91,9 @@ def test_jumps_that_follow_each_other_within_a_fifth_of_a_second_are_none(apart,
     who, t, joints = walking(rate=60)
     joints[30:, who.head, 0, 3] += 1
     joints[30 + apart :, who.head, 0, 3] += 1
-    assert len(find_cuts(Clip(t, joints), who.head)) == cuts
+    clip = Clip(t, joints)
+    assert len(find_cuts(clip, who.head)) == cuts
+    assert find_flashes(clip, who.head) == pytest.approx(t[[30, 30 + apart]][: 2 - cuts])
 
 
 def test_a_metre_between_samples_far_apart_is_no_cut():

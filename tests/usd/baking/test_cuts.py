@@ -60,6 +60,25 @@ def test_hair_starts_anew_after_a_cut(bakes):
         assert code == LAST or np.abs(none - after).max() > 1e-3
 
 
+def test_cuts_that_follow_each_other_at_once_are_told_with_what_makes_them_some(tmp_path, shots, model):
+    """Three frames of a flash: the hair would be flung twice, and nothing would say so."""
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "flash.usda"))
+    layer.TransferContent(Sdf.Layer.FindOrOpen(str(shots[0])))
+    stage = Usd.Stage.Open(layer)
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    for code in range(CUT + 3, LAST + 1):
+        places = np.array(motion.GetTranslationsAttr().Get(code))
+        places[0, 0] -= 3
+        motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(places), code)
+    layer.Save()
+    told = "/Hero/Rig: its head leaps at 13,16, less than 0.2 s from one leap to the next"
+    (note,) = [note for note in inspect(layer.realPath)["spoils"] if "its head" in note]
+    assert note.startswith(told) and "(--cuts 13,16)" in note
+    assert note in bake(layer.realPath, tmp_path / "out.usdc", model).notes
+    given = bake(layer.realPath, tmp_path / "given.usdc", model, cuts=[13, 16])
+    assert not any("its head" in note for note in given.notes)
+
+
 def test_velocities_do_not_span_a_cut(bakes):
     """Else motion blur would draw the hair over the whole way."""
     for code in (CUT - 2, CUT - 1, CUT, CUT + 1):
