@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from usd.baking.bake import bake
 from usd.baking.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
+from usd.shot.stage import read_shot
 
-from ..shots import samples, write_shot
+from ..shots import Recipe, samples, write_shot
 
 SHOT = """#usda 1.0
 (
@@ -117,3 +118,41 @@ def test_the_extent_holds_hair_that_grows_wider_over_the_shot(tmp_path, still_mo
     baked = bake(path, tmp_path / "a.usdc", still_model, frames="1").path
     points, extent = samples(baked, "points", "extent", at=1)
     np.testing.assert_allclose(extent, [points.min(axis=0) - 0.25, points.max(axis=0) + 0.25], atol=1e-5)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_the_extent_holds_the_width_of_hair_in_the_unit_of_its_points(tmp_path, still_model, unit):
+    """Under a scale of its own, too."""
+    path = write_shot(tmp_path, Recipe(unit=unit, bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    curves.AddScaleOp().Set((2, 2, 2))
+    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.asarray(curves.GetPointsAttr().Get()) / 2))
+    curves.GetWidthsAttr().Set([0.04 / unit])
+    stage.Save()
+    baked = bake(path, tmp_path / "a.usdc", still_model, frames="1").path
+    points, extent = (values * unit for values in samples(baked, "points", "extent", at=1))
+    np.testing.assert_allclose(extent, [points.min(axis=0) - 0.02, points.max(axis=0) + 0.02], atol=1e-5)
+
+
+@pytest.mark.parametrize("bound", ["mesh", "none"])
+def test_a_moving_cache_gets_its_shape_at_rest_in_its_own_space(tmp_path, still_model, bound):
+    """In centimetres, Z up, of a character that stands turned and elsewhere: what takes the points there does not commute."""
+    place = np.eye(4)
+    place[:3, :3], place[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], [2, 0.5, -1]
+    path = write_shot(tmp_path, Recipe(unit=0.01, up="Z", place=place, bound=bound, frames=9))
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.array(points.Get())
+    plain = bake(path, tmp_path / "plain.usdc", still_model, frames="7:8").path
+    seen = {code: samples(plain, "points", at=code) for code in (7, 8)}
+    assert np.abs(seen[7] - rest).max() > 1
+    points.Clear()
+    for code, values in seen.items():
+        points.Set(Vt.Vec3fArray.FromNumpy(values), code)
+    stage.Save()
+    (item,) = read_shot(path).grooms
+    out = bake(path, tmp_path / "out.usdc", still_model, frames="1:9").path
+    np.testing.assert_allclose(samples(out, "points"), rest, atol=1e-3)
+    np.testing.assert_allclose(samples(out, "points", at=7), seen[7], atol=1e-3)
+    np.testing.assert_allclose(read_shot(out).grooms[0].groom.points, item.groom.points, atol=1e-5)

@@ -85,3 +85,15 @@ def test_before_the_first_sample_hair_is_at_rest(tmp_path, model):
     path = bake(write_shot(tmp_path), tmp_path / "bake.usdc", model, frames="-2:1").path
     for code in (-2, -1, 0):
         assert not samples(path, "velocities", at=code).any()
+
+
+@pytest.mark.parametrize("frames", [2, 3])
+def test_where_there_is_room_for_one_frame_only_velocities_are_the_way_to_it(tmp_path, model, frames):
+    """A clip of two frames, whose last has but the one before it; and half frames beside the ends of one of three."""
+    shot = write_shot(tmp_path, Recipe(frames=frames))
+    path = bake(shot, tmp_path / "bake.usdc", model, frames=f"1:{frames}", subframes=2).path
+    at = {code: samples(path, "points", at=code).astype(float) for code in np.arange(1, frames + 0.1, 0.5)}
+    for code, low in {2: {1: 1, 2: 1}, 3: {1.5: 1.5, 2.5: 1.5}}[frames].items():
+        moving = (at[low + 1] - at[low]) * 24
+        assert np.abs(moving).max() > 0.05
+        np.testing.assert_allclose(samples(path, "velocities", at=code), moving, atol=1e-3)

@@ -12,7 +12,7 @@ from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel.surface import bound_skeleton
 
-from ..shots import HEAD, JOINTS, Recipe, write_shot
+from ..shots import CENTRE, HEAD, JOINTS, Recipe, samples, write_shot
 
 
 def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_model):
@@ -107,3 +107,72 @@ def test_a_body_that_is_not_posed_as_its_mesh_asks_is_told(tmp_path, method, abo
     for notes in (read_shot(path).notes, inspect(path)["spoils"]):
         told = [note for note in notes if note.startswith("/Hero/Skin: its skinningMethod is dualQuaternion")]
         assert len(told) == (method == "dualQuaternion")
+
+
+def test_hair_that_is_bound_mirrored_is_the_hair_that_it_shows(tmp_path, model):
+    """As the other half of a symmetric hairdo is bound: its points, widths and motion are those of hair without a mirror."""
+    path = write_shot(tmp_path, Recipe(strands=6, vertices=5))
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/Hero/Hair").GetAttribute("widths").Set([0.02])
+    stage.Save()
+    plain = bake(path, tmp_path / "plain.usdc", model)
+    (before,) = read_shot(path).grooms
+    hair, place = stage.GetPrimAtPath("/Hero/Hair"), Gf.Matrix4d().SetScale((-0.5, 0.5, 0.5))
+    curves = UsdGeom.BasisCurves(hair)
+    curves.GetPointsAttr().Set(
+        [Gf.Vec3f(place.GetInverse().Transform(Gf.Vec3d(p))) for p in curves.GetPointsAttr().Get()]
+    )
+    curves.GetWidthsAttr().Set([2 * width for width in curves.GetWidthsAttr().Get()])
+    UsdSkel.BindingAPI(hair).GetGeomBindTransformAttr().Set(place)
+    stage.Save()
+    (item,) = read_shot(path).grooms
+    np.testing.assert_allclose(item.groom.points, before.groom.points, atol=1e-6)
+    np.testing.assert_allclose(item.groom.widths, before.groom.widths, rtol=1e-6)
+    mirrored = bake(path, tmp_path / "mirrored.usdc", model)
+    for code in (1, 5, 9):
+        for name, near in (("points", 1e-5), ("velocities", 1e-3)):
+            shown, expected = (samples(out.path, name, at=code) for out in (mirrored, plain))
+            np.testing.assert_allclose(shown, expected, atol=near)
+        points, extent = samples(mirrored.path, "points", "extent", at=code)  # no binding scales widths
+        np.testing.assert_allclose(extent, [points.min(axis=0) - 0.02, points.max(axis=0) + 0.02], atol=1e-6)
+
+
+def test_hair_below_a_mirror_has_its_own_points_where_it_rests(tmp_path, model):
+    path = write_shot(tmp_path, Recipe(bound="mesh", strands=6, vertices=5))
+    stage = Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    curves.AddScaleOp().Set((-0.7, 0.7, 0.7))
+    rest = np.asarray(curves.GetPointsAttr().Get()) / np.float32([-0.7, 0.7, 0.7])
+    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(rest))
+    stage.Save()
+    out = bake(path, tmp_path / "out.usdc", model, frames="1:5").path
+    np.testing.assert_array_equal(samples(out, "points", at=1), rest)
+    assert np.abs(samples(out, "points", at=5) - rest).max() > 0.01
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_open_mesh_of_left_handed_faces_faces_outward(tmp_path, still_model, mirrored):
+    """Its form does not tell its sides, as that of a ball does: hair must be pushed out of it, not through."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", strands=20))
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin"))
+    points = np.asarray(mesh.GetPointsAttr().Get())
+    corners = np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 4)
+    cap = corners[(points[corners][..., 1] > CENTRE[1] + 0.07).all(axis=1)]
+    mesh.GetFaceVertexCountsAttr().Set([4] * len(cap))
+    mesh.GetFaceVertexIndicesAttr().Set(cap.ravel().tolist())
+    stage.Save()
+    right = read_rigs(path)[0].character.body
+    if mirrored:  # by its binding, which turns faces round once more
+        place = Gf.Matrix4d().SetScale((-1, 1, 1))
+        mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy((points * [-1, 1, 1]).astype(np.float32)))
+        UsdSkel.BindingAPI(mesh).GetGeomBindTransformAttr().Set(place)
+    else:
+        mesh.GetFaceVertexIndicesAttr().Set(cap[:, ::-1].ravel().tolist())
+    mesh.CreateOrientationAttr("leftHanded")
+    stage.Save()
+    (rig,) = read_rigs(path)
+    assert not any("inside out" in note for note in rig.notes)
+    for body in (right, rig.character.body):
+        a, b, c = (body.points[body.triangles[:, corner]] for corner in range(3))
+        assert (np.cross(b - a, c - a)[:, 1] > -1e-9).all() and (np.cross(b - a, c - a)[:, 1] > 1e-6).any()
