@@ -83,9 +83,9 @@ class HairSearch:
         path, bound = str(prim.GetPath()), bound_skeleton(prim)
         if bound and not self._forced and all(rig.path != bound for rig in (*self.rigs, *self._others)):
             # On another's head it would be skinned by its own skeleton once more.
-            return self._without(unusable_skeleton(path, bound, bound=True))
+            return self._without(path, bound, bound=True)
         if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
-            return self._without(unusable_skeleton(path, own.path, bound=False))
+            return self._without(path, own.path, bound=False)
         if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
             self._notes.append(another_carries(path, other))
             return None
@@ -109,12 +109,13 @@ class HairSearch:
             self.carriers.append(found.rig)
         return found
 
-    def _without(self, why: str) -> None:
+    def _without(self, path: str, skeleton: str, bound: bool) -> None:
         """Leave out the curves of a skeleton that cannot be used.
 
         Raises:
             NeuralocksError: they are named.
         """
+        why = unusable_skeleton(path, skeleton, bound, self._named)
         if self._named:
             raise NeuralocksError(why)
         self._unusable.append(why)

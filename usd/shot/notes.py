@@ -125,13 +125,13 @@ def another_carries(path: str, rig: StageRig) -> str:
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
-def unusable_skeleton(path: str, own: str, bound: bool) -> str:
-    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it."""
+def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> str:
+    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it. Why it is
+    refused, where its user named it.
+    """
     how, unbound = ("is bound to", "unbind the hair and ") if bound else ("lies on the character of", "")
-    return (
-        f"{path}: {how} {own}, which cannot be used, and is left out with it; mend that skeleton, or {unbound}name another for it "
-        "with --groom and --skeleton"
-    )
+    fact = "cannot be used, as neuralocks inspect explains" if named else "cannot be used, and is left out with it"
+    return f"{path}: {how} {own}, which {fact}; mend that skeleton, or {unbound}name another for it with --groom and --skeleton"
 
 
 def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
