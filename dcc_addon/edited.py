@@ -32,6 +32,8 @@ class Written(NamedTuple):
         places: the object's transforms (4, 4) then, its own and in the world.
         modifiers: names of its modifiers.
         rest: the rest shape, (P, 3) float32.
+        spare: (P, 3) float32, memory to read the points into that are there now. It is kept, as that of `points` is, from
+            frame to frame: large memory that is asked for anew costs more than what is done in it.
     """
 
     of: tuple
@@ -39,6 +41,7 @@ class Written(NamedTuple):
     places: tuple[np.ndarray, np.ndarray]
     modifiers: tuple[str, ...]
     rest: np.ndarray
+    spare: np.ndarray
 
 
 class Followed(NamedTuple):
@@ -62,7 +65,23 @@ def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them and its rest shape (P, 3)."""
     curves.write(hair.data, points)
     of, places = (identity(hair), identity(hair.data)), (matrix(hair.matrix_basis), world)
-    session.written[hair.name_full] = Written(of, points.copy(), places, tuple(hair.modifiers.keys()), rest)
+    before = session.written.get(hair.name_full)
+    if before is not None and before.of == of and before.points.shape == points.shape:
+        kept, spare = before.points, before.spare
+        np.copyto(kept, points)
+    else:
+        kept, spare = points.copy(), np.empty_like(points)
+    session.written[hair.name_full] = Written(of, kept, places, tuple(hair.modifiers.keys()), rest, spare)
+
+
+def intact(hair) -> bool:
+    """Whether the hair has the curves that were written to last, with as many points, each of which then has a rest shape;
+    points that were joined to it may have none.
+    """
+    before, data = session.written.get(hair.name_full), hair.data
+    if before is None or before.of != (identity(hair), identity(data)):
+        return False
+    return len(before.points) == len(data.points)
 
 
 def touched(hair) -> bool:
@@ -73,7 +92,7 @@ def touched(hair) -> bool:
     if before is None or before.of[0] != identity(hair):
         return False
     if len(before.points) == len(data.points):
-        if np.array_equal(curves.shown(data), before.points):
+        if np.array_equal(curves.shown(data, before.spare), before.points):
             session.written[hair.name_full] = before._replace(modifiers=tuple(hair.modifiers.keys()))
             return not curves.has_rest(data)
         if before.of[1] == identity(data):

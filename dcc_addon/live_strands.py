@@ -2,6 +2,7 @@
 """Live strands: the points of one hair object for the frame that is shown, a function of the scene as it is now."""
 
 import zlib
+from functools import lru_cache
 from typing import NamedTuple
 
 import bpy
@@ -104,7 +105,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         show_rest(hair)
         return
     points = prepared.hair.points(*wanted)
-    curves.keep_rest(hair.data)
+    curves.keep_rest(hair.data, edited.intact(hair))
     mute_deformers(hair)
     edited.write(hair, points, place, prepared.rest)
     joined.remember(hair, prepared.made_of[0])
@@ -222,7 +223,15 @@ def _arrived(name: str) -> None:
 
 def material(settings) -> np.ndarray:
     """Log-ratios (4,) of the sliders, read as a bake reads them."""
-    return Material.parse(material_words(settings)).log_ratios()
+    return _log_ratios(*material_words(settings))
+
+
+@lru_cache
+def _log_ratios(*words: str) -> np.ndarray:
+    """Log-ratios (4,) of a material in words. Between two frames nobody moves a slider."""
+    found = Material.parse(words).log_ratios()
+    found.flags.writeable = False
+    return found
 
 
 def typed(settings, name: str) -> float:

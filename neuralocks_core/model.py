@@ -7,6 +7,7 @@ import stat
 import zipfile
 import zlib
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -55,8 +56,9 @@ class ModelFile:
         return [f"{self.path}: {fact}; train longer, or with other options"]
 
 
+@cache
 def shipped(kind: str = "strands") -> Path:
-    """Path of the model that is used when none is named.
+    """Path of the model that is used when none is named; looked for once, for live hair asks in every frame.
 
     Raises:
         NeuralocksError: this installation does not hold it.
