@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from neuralocks_core.deformation.following import Following
-from neuralocks_core.deformation.scratch import Scratch
+from neuralocks_core.deformation.scratch import Scratch, in_turn
 from neuralocks_core.strands.arclength import arc_lengths
 
 if TYPE_CHECKING:
@@ -145,25 +145,26 @@ class Carrier:
         rest = self._groom.points[self._ends[start] : self._ends[stop]]
         block = self._blocks[start // BLOCK] if self._blocks else None
         columns = block.columns if block else np.transpose
-        points, placed = _scratch.arrays(*[columns(rest).shape] * 2)
-        points[:] = columns(rest)
+        (points,) = _scratch.arrays(columns(rest).shape)
+        across = (3, *[1] * (points.ndim - 1))
+        if onto is None:
+            np.subtract(columns(rest), placing.centre.reshape(across), out=points)
+        else:
+            points[:] = columns(rest)
         moved = block.moved(displacement, start % BLOCK, points) if block else displacement.reshape(-1, 3).T
         if onto is None:
-            for axis, centre in zip(points, placing.centre):
-                axis -= centre
             points += moved
-            _times(placing.linear, points, placed)
-            for axis, place, origin in zip(columns(out), placed, placing.origin):
-                np.add(place, origin, out=axis)
+            np.add(_placed(placing.linear, points), placing.origin.reshape(across), out=columns(out))
             return
         if placing is not None:
-            moved = _times(placing.linear, moved, placed)
+            moved = _placed(placing.linear, moved)
         np.add(columns(onto), moved, out=columns(out))
         if self._negative_zero:  # -0 + 0 is +0: the one value that adding nothing changes
             np.copyto(columns(out), columns(onto), where=moved == 0)
 
 
-def _times(matrix: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """A matrix (3, 3) times vectors (3, ...)."""
-    np.matmul(matrix, vectors.reshape(3, -1), out=out.reshape(3, -1))
-    return out
+def _placed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """A matrix (3, 3) times vectors (3, ...); valid until this thread's next step."""
+    (result,) = in_turn.arrays(vectors.shape)
+    np.matmul(matrix, vectors.reshape(3, -1), out=result.reshape(3, -1))
+    return result

@@ -10,16 +10,13 @@ import numpy as np
 
 from neuralocks_core.deformation import spans
 from neuralocks_core.deformation.lengths import keep_lengths, keep_lengths_of_any
-from neuralocks_core.deformation.scratch import Scratch
+from neuralocks_core.deformation.scratch import Scratch, in_turn
 from neuralocks_core.deformation.turning import Coils
 
 WIDEST = spans.NODES + 4
 """Strands are laid out as a grid where each own vertex depends on at most so many network vertices over all strands."""
 
-BASE = 1
-"""The step from an own vertex's first network vertex to the one that it lies nearest to, as a rule."""
-
-_scratch, _network = Scratch(), Scratch()
+_scratch = Scratch()
 
 
 class Following:
@@ -62,59 +59,71 @@ class Following:
         """
         stop = start + len(displacement)
         fine, ends = self._fine[start:stop], self._ends[start : stop + 1]
-        (result,) = _scratch.arrays(points.shape)
+        result, spare = _scratch.arrays(*[points.shape] * 2)
+        if self._each:
+            if not fine.all():
+                self._means.put(displacement, start, result, spare)
+            if fine.any():
+                coils = self._coils.moved(displacement[fine], start).reshape(3, -1, self._each).transpose(0, 2, 1)
+                result[..., fine] = np.diff(coils, axis=1, prepend=np.float32(0.0))
+            return keep_lengths(points, result, spare, ~fine)
         if not fine.all():
             self._means.put(displacement, start, slice(ends[0], ends[-1]), result)
         counts = np.diff(ends)
         if fine.any():
-            coils = fine if self._each else np.repeat(fine, counts)
-            result[..., coils] = self.columns(self._coils.moved(displacement[fine], start))
-        if self._each:
-            keep_lengths(points, result, ~fine)
-        else:
-            keep_lengths_of_any(points, result, counts, ~fine)
+            result[:, np.repeat(fine, counts)] = self._coils.moved(displacement[fine], start)
+        keep_lengths_of_any(points, result, counts, ~fine)
         return result
 
 
 class _Alike:
-    """Means in strands of V vertices each.
+    """Means in strands of V vertices each, as steps from one vertex to the next: these are what `keep_lengths` works on.
 
     Args:
-        first: (N, V) first network vertex that an own vertex is a mean of.
+        first: (N, V) first network vertex that an own vertex is a mean of, the root of the network's.
         weights: (N V, spans.NODES) of it and the next ones.
     """
 
     def __init__(self, first: np.ndarray, weights: np.ndarray) -> None:
         weights = weights.reshape(*first.shape, spans.NODES).T
-        low, late = first.min(axis=0), first.T - first.min(axis=0)[:, None]
-        reach = late.max(axis=1) + spans.NODES
-        # From the first to the last own vertex that needs it: a network vertex of each, and its weights (V', N). Few own
-        # vertices need more than four. All weights of a vertex add up to one: those of BASE, which all need, are not kept.
-        self._base, self._terms = low + BASE, []
-        for step in range(reach.max()):
-            if step == BASE:
-                continue
-            needed = np.flatnonzero(reach > step)
-            own = slice(needed[0], needed[-1] + 1)
-            term = np.zeros((own.stop - own.start, len(first)), np.float32)
-            for node in range(spans.NODES):
-                np.copyto(term, weights[node, own], where=late[own] + node == step)
-            self._terms.append((own, low[own] + step, term))
+        # A vertex moves further than the root by a share of each of the network's steps up to it: all of those before its
+        # first network vertex, and of the next three the weights of what lies beyond.
+        beyond, first = np.cumsum(weights[:0:-1], axis=0, dtype=float)[::-1], first.T
 
-    def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
-        """Into `result` (3, V, n), of strands from `start` on."""
+        def share(own: slice, step: np.ndarray) -> np.ndarray:
+            late = step - first[own]
+            result = (late < 0).astype(float)
+            for node in range(spans.NODES - 1):
+                np.copyto(result, beyond[node, own], where=late == node)
+            return result
+
+        # The network's steps that own steps depend on, from the first of any strand to the last of any strand: a number of
+        # each, and its shares (V', N). Few own steps depend on more than four.
+        low, high = first[:-1].min(axis=1), first[1:].max(axis=1) + spans.NODES - 2
+        self._terms = []
+        for late in range((high - low).max() + 1):
+            needed = np.flatnonzero(low + late <= high)
+            begin, end = needed[0], needed[-1] + 1
+            of = low[begin:end] + late
+            term = share(slice(begin + 1, end + 1), of[:, None]) - share(slice(begin, end), of[:, None])
+            self._terms.append((begin, end, of, term.astype(np.float32, order="C")))
+
+    def put(self, displacement: np.ndarray, start: int, result: np.ndarray, spare: np.ndarray) -> None:
+        """Into `result` (3, V, n), of strands from `start` on; `spare` is of the same shape, memory."""
         count, vertices = displacement.shape[:2]
-        network, base, spare = _network.arrays((3, vertices, count), *[result.shape] * 2)
+        network, steps = in_turn.arrays((3, vertices, count), (3, vertices - 1, count))
         network[:] = displacement.transpose(2, 1, 0)
-        network.take(self._base, axis=1, out=base, mode="clip")
-        so_far = base
-        for own, of, weights in self._terms:
-            part = spare[:, own]
-            network.take(of, axis=1, out=part, mode="clip")
-            part -= base[:, own]
-            part *= weights[:, start : start + count]
-            np.add(so_far[:, own], part, out=result[:, own])
-            so_far = result
+        np.subtract(network[:, 1:], network[:, :-1], out=steps)
+        result[:, 0] = network[:, 0]
+        whole = result[:, 1:]
+        for number, (begin, end, of, shares) in enumerate(self._terms):
+            part = spare.reshape(-1)[: 3 * len(of) * count].reshape(3, len(of), count)
+            steps.take(of, axis=1, out=part, mode="clip")
+            if number:
+                part *= shares[:, start : start + count]
+                whole[:, begin:end] += part
+            else:
+                np.multiply(part, shares[:, start : start + count], out=whole)
 
 
 class _Varied:

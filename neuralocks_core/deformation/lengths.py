@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neuralocks_core.deformation.scratch import Scratch
+from neuralocks_core.deformation.scratch import Scratch, in_turn
 
 TINY = np.float32(1e-24)
 """[m^2] Keeps edges of no length finite, and is too little to change others."""
@@ -13,8 +13,8 @@ TINY = np.float32(1e-24)
 _scratch = Scratch()
 
 
-def keep_lengths(points: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> None:
-    """Change displacements so that no edge is longer or shorter than at rest.
+def keep_lengths(points: np.ndarray, steps: np.ndarray, spare: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Displacements with which no edge is longer or shorter than at rest.
 
     From the root on, each edge keeps about the direction it was moved to, and the hair its way. Where nothing is moved
     nothing changes, bit for bit, and a strand depends on itself alone.
@@ -23,34 +23,37 @@ def keep_lengths(points: np.ndarray, moved: np.ndarray, smooth: np.ndarray) -> N
 
     Args:
         points: (3, V, N) float32 [m] vertices at rest of N strands of V vertices.
-        moved: (3, V, N) float32 [m] their displacement, changed in place.
+        steps: (3, V, N) float32 [m] how much further each vertex is displaced than the one before it, and the root as a
+            whole; overwritten.
+        spare: (3, V, N) float32, memory.
         smooth: (N,) bool, strands whose edges point along their way; those of a coil point all around.
+
+    Returns:
+        (3, V, N) float32 [m], in the memory of `steps` or `spare`.
     """
-    vertices, strands = points.shape[1:]
-    vectors, numbers = (3, max(vertices - 1, 0), strands), (max(vertices - 1, 0), strands)
-    before, edges, drift, other, lengths, squared, scale, along, spare = _scratch.arrays(*[vectors] * 4, *[numbers] * 5)
+    edges, other = steps[:, 1:], spare[:, 1:]
+    before, drift, lengths, squared, scale, along = in_turn.arrays(*[edges.shape] * 2, *[edges.shape[1:]] * 4)
     np.subtract(points[:, 1:], points[:, :-1], out=before)
-    np.subtract(moved[:, 1:], moved[:, :-1], out=edges)
     edges += before
     _dot(before, before, lengths)
     _measure(edges, lengths, squared, scale)
-    # Where lengths alone would put each vertex, seen from where it was moved to. Along the hair that does not matter,
-    # to its side it takes the hair off its way, into the head even: so much each edge turns back.
-    np.subtract(scale, np.float32(1.0), out=spare)
-    spare *= smooth
-    np.multiply(edges, spare, out=drift)
+    # Where lengths alone would put each vertex, seen from where it was moved to: the sum of (scale - 1) edge. Along the
+    # hair that does not matter, to its side it takes the hair off its way, into the head even: so much each edge turns
+    # back. With `along` times its own edge being what of a vertex's drift is along the hair, an edge without the drift of
+    # its ends to the side is, but for its length, edge_i (1 + along_i) - edge_(i-1) along_(i-1).
+    scale -= np.float32(1.0)
+    scale *= smooth
+    np.multiply(edges, scale, out=drift)
     drift, other = _add_up(drift, other)
     _dot(drift, edges, along)
     along /= squared
-    drift -= np.multiply(edges, along, out=other)
-    edges *= scale
-    edges -= drift
-    edges[:, 1:] += drift[:, :-1]
+    np.multiply(edges, along, out=other)
+    edges += other
+    edges[:, 1:] -= other[:, :-1]
     _measure(edges, lengths, squared, scale)
     edges *= scale
     edges -= before
-    edges, _ = _add_up(edges, other)
-    np.add(moved[:, :1], edges, out=moved[:, 1:])
+    return _add_up(steps, spare)[0]
 
 
 def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth: np.ndarray) -> None:
@@ -59,19 +62,31 @@ def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarra
     Args:
         points: (3, P) float32 [m] vertices at rest of consecutive strands.
         moved: (3, P) float32 [m] their displacement, changed in place.
-        counts: (N,) vertices of each strand, at least one.
+        counts: (N,) vertices of each strand.
         smooth: (N,) bool, as above.
     """
     # Strands of about the same number of vertices together; the last vertex is repeated: an edge of no length.
     starts, alike = np.cumsum(counts) - counts, np.frexp(counts)[1]
-    for size in np.unique(alike):
+    # Of each strand, where its root comes to lie in what is kept, and how far from one vertex the next.
+    column, across = np.empty((2, len(counts)), np.intp)
+    kept, end = [], 0
+    for size in np.unique(alike[counts > 0]):
         some = np.flatnonzero(alike == size)
         last = counts[some] - 1
-        place = np.arange(last.max() + 1)[:, None]
-        grid, own = starts[some] + np.minimum(place, last), place <= last
-        kept = moved[:, grid]
-        keep_lengths(points[:, grid], kept, smooth[some])
-        moved[:, grid[own]] = kept[:, own]
+        grid = starts[some] + np.minimum(np.arange(last.max() + 1)[:, None], last)
+        rest, spare, steps = _scratch.arrays(*[(3, *grid.shape)] * 3)
+        points.take(grid, axis=1, out=rest, mode="clip")
+        moved.take(grid, axis=1, out=spare, mode="clip")
+        steps[:, 0] = spare[:, 0]
+        np.subtract(spare[:, 1:], spare[:, :-1], out=steps[:, 1:])
+        kept.append(keep_lengths(rest, steps, spare, smooth[some]).reshape(3, -1).copy())
+        column[some], across[some] = end + np.arange(len(some)), len(some)
+        end += grid.size
+    if not kept:
+        return
+    vertex = np.arange(moved.shape[1]) - np.repeat(starts, counts)
+    source = np.repeat(column, counts) + vertex * np.repeat(across, counts)
+    np.concatenate(kept, axis=1).take(source, axis=1, out=moved, mode="clip")
 
 
 def _measure(edges: np.ndarray, lengths: np.ndarray, squared: np.ndarray, scale: np.ndarray) -> None:

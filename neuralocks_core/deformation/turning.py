@@ -21,18 +21,19 @@ class Coils:
         vertices = rest.shape[1]
         chosen = fine[strand]
         own, strand, place = own[chosen], (np.cumsum(fine) - 1)[strand[chosen]], place[chosen]
-        self._rest = np.ascontiguousarray(rest[fine])
+        moving = rest[fine]
+        self._edges = np.diff(moving, axis=1).transpose(2, 0, 1).copy()
         # How many of them come before a strand of all N, and before each of their own vertices.
         self._before = np.concatenate([[0], np.cumsum(fine)])
-        self._ends = np.searchsorted(strand, np.arange(len(self._rest) + 1))
+        self._ends = np.searchsorted(strand, np.arange(len(moving) + 1))
         segment = np.clip(place.astype(np.int32), 0, vertices - 2)
         share = np.clip(place - segment, 0.0, 1.0)[:, None]
-        flat, at = self._rest.reshape(-1, 3).astype(np.float64), strand * vertices + segment
-        self._residual = (own - (flat[at] * (1.0 - share) + flat[at + 1] * share)).astype(np.float32)
-        self._share, self._segment = share.astype(np.float32), at.astype(np.int32)
+        flat, at = moving.reshape(-1, 3).astype(np.float64), strand * vertices + segment
+        self._residual = (own - (flat[at] * (1.0 - share) + flat[at + 1] * share)).T.astype(np.float32, order="C")
+        self._share, self._segment = share[:, 0].astype(np.float32), at.astype(np.int32)
 
     def moved(self, displacement: np.ndarray, start: int) -> np.ndarray:
-        """Displacement (P', 3) [m] of their own vertices.
+        """Displacement (3, P') [m] of their own vertices.
 
         Args:
             displacement: (n, K, 3) [m] of the network's vertices of the next n of them.
@@ -42,68 +43,85 @@ class Coils:
         last = first + len(displacement)
         own = slice(self._ends[first], self._ends[last])
         segment = self._segment[own] - np.int32(first * displacement.shape[1])
-        return turned(self._rest[first:last], displacement, segment, self._share[own], self._residual[own])
+        return turned(self._edges[:, first:last], displacement, segment, self._share[own], self._residual[:, own])
 
 
 def turned(
-    rest: np.ndarray, displacement: np.ndarray, segment: np.ndarray, weight: np.ndarray, residual: np.ndarray
+    edges: np.ndarray, displacement: np.ndarray, segment: np.ndarray, share: np.ndarray, residual: np.ndarray
 ) -> np.ndarray:
     """Displacement of own vertices: that of the polyline at their place, and their distance from it turned.
 
     It is turned by the smallest rotations that take the polyline's rest segments to the deformed ones.
 
     Args:
-        rest, displacement: (N, K, 3) float32 [m].
+        edges: (3, N, K - 1) float32 [m], segments at rest.
+        displacement: (N, K, 3) float32 [m].
         segment: (P,) first vertex of the segment each own vertex lies at, counted through all strands.
-        weight: (P, 1) float32 share of the way to the next vertex.
-        residual: (P, 3) float32 [m] from the polyline to the own vertex, at rest.
+        share: (P,) float32 of the way to the next vertex.
+        residual: (3, P) float32 [m] from the polyline to the own vertex, at rest.
 
     Returns:
-        (P, 3) float32 [m].
+        (3, P) float32 [m].
     """
-    steps = np.zeros_like(displacement)
-    np.subtract(displacement[:, 1:], displacement[:, :-1], out=steps[:, :-1])
-    moved = displacement.reshape(-1, 3).take(segment, axis=0)
-    moved += weight * steps.reshape(-1, 3).take(segment, axis=0)
-    turns = _turns(rest, steps).reshape(-1, 4)
-    turn = turns.take(segment, axis=0)
-    turn += weight * (turns.take(segment + 1, axis=0) - turn)
-    x, y, z, w = np.ascontiguousarray(turn.T)
-    a, b, c = np.ascontiguousarray(residual.T)
+    network = displacement.transpose(2, 0, 1).copy()
+    steps = np.zeros_like(network)
+    np.subtract(network[:, :, 1:], network[:, :, :-1], out=steps[:, :, :-1])
+    moved = _at(network, segment)
+    moved += share * _at(steps, segment)
+    turns = _turns(edges, steps[:, :, :-1])
+    turn = _at(turns, segment)
+    turn += share * (_at(turns, segment + 1) - turn)
     # A quaternion of any length turns r by 2 (w q x r + q x (q x r)) / |q|^2: nothing where q is zero.
-    once = y * c - z * b, z * a - x * c, x * b - y * a
-    scale = np.float32(2.0) / np.maximum(x * x + y * y + z * z + w * w, np.float32(1e-12))
-    moved[:, 0] += scale * (w * once[0] + y * once[2] - z * once[1])
-    moved[:, 1] += scale * (w * once[1] + z * once[0] - x * once[2])
-    moved[:, 2] += scale * (w * once[2] + x * once[1] - y * once[0])
+    once = _cross(turn[:3], residual)
+    twice = _cross(turn[:3], once)
+    once *= turn[3]
+    twice += once
+    twice *= np.float32(2.0) / np.maximum(_dot(turn, turn), np.float32(1e-12))
+    moved += twice
     return moved
 
 
-def _turns(rest: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _turns(edges: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Smallest rotations of the segments at rest to the deformed ones, blended at each vertex.
 
     Blended, so that what lies off the polyline is not torn where two segments meet.
 
     Args:
-        rest: (N, K, 3) [m].
-        steps: (N, K, 3) [m], difference of displacement along each segment (last row unused).
+        edges: (3, N, K - 1) [m], segments at rest.
+        steps: (3, N, K - 1) [m], difference of displacement along each.
 
     Returns:
-        (N, K, 4) float32 quaternions x y z w, not of unit length, x y z exactly zero where nothing moved.
+        (4, N, K) float32 quaternions x y z w, not of unit length, x y z exactly zero where nothing moved.
     """
-    edges = rest[:, 1:] - rest[:, :-1]
-    # One array a coordinate: three to a row leave a processor's vectors mostly empty.
-    a, b, c = np.ascontiguousarray(edges.transpose(2, 0, 1))
-    p, q, r = np.ascontiguousarray((edges + steps[:, :-1]).transpose(2, 0, 1))
-    lengths = np.sqrt((a * a + b * b + c * c) * (p * p + q * q + r * r))
+    now = edges + steps
+    lengths = np.sqrt(_dot(edges, edges) * _dot(now, now))
     # Half way between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
-    segment = np.empty((4, *a.shape), np.float32)
-    segment[0], segment[1], segment[2] = b * r - c * q, c * p - a * r, a * q - b * p
-    segment[3] = lengths + (a * p + b * q + c * r)
-    segment /= np.sqrt(np.maximum((segment * segment).sum(axis=0), np.float32(1e-30)))
-    turns = np.empty((*rest.shape[:2], 4), np.float32)
-    turns[:, 0], turns[:, -1] = segment[:, :, 0].T, segment[:, :, -1].T
-    middle = segment[:, :, :-1] + segment[:, :, 1:]
+    segment = np.empty((4, *lengths.shape), np.float32)
+    segment[:3] = _cross(edges, now)
+    np.add(lengths, _dot(edges, now), out=segment[3])
+    segment /= np.sqrt(np.maximum(_dot(segment, segment), np.float32(1e-30)))
+    turns = np.empty((*segment.shape[:2], segment.shape[2] + 1), np.float32)
+    turns[:, :, 0], turns[:, :, -1] = segment[:, :, 0], segment[:, :, -1]
+    middle = np.add(segment[:, :, :-1], segment[:, :, 1:], out=turns[:, :, 1:-1])
     middle *= np.float32(0.5)
-    turns[:, 1:-1] = middle.transpose(1, 2, 0)
     return turns
+
+
+def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (C, N, K) of vertices (P,), counted through all strands: (C, P)."""
+    return values.reshape(len(values), -1).take(places, axis=1)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors (3, ...), coordinates first: x y z x y of both, so that three products are one call. Strands
+    that are this fine are mostly a few of a groom, and calls are then what costs.
+    """
+    a, b = np.concatenate([a, a[:2]]), np.concatenate([b, b[:2]])
+    result = a[1:4] * b[2:]
+    result -= a[2:] * b[1:4]
+    return result
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (...) of vectors (C, ...), coordinates first."""
+    return np.einsum("c...,c...->...", a, b)
