@@ -30,9 +30,9 @@ from .rigging import posture, rigging
 from .unkeyed import Unkeyed
 from .watched import watched
 
-BLOCK, MANY = 16, 6000
-"""Frames whose poses are made channels together, at most, and joints in all of these: each frame then costs little, and all
-of them about a slice of work.
+BLOCK, MANY = 128, 6000
+"""Frames whose poses are made channels together, at most, and joints in all of these: each frame then costs little, since what
+is done to so few numbers costs as much for one frame as for all, and all of them about a slice of work.
 """
 
 
@@ -169,14 +169,14 @@ class _Recording:
         with watched(self._scene, layer, tracked) as any_hidden:
             if any_hidden:  # shape keys among these are still those of another frame
                 step(self._scene, self.frames[row])
-                armature = named(self.name)
+                armature, tracked = named(self.name), [named(name) for name in self._tracked]
             with working_in(self._scene, layer):
-                self._read(row, armature)
+                self._read(row, armature, tracked)
         if (row + 1) % self._block == 0 or row == len(self.frames) - 1:
             self._store(row - row % self._block, row + 1)
 
-    def _read(self, row: int, armature) -> None:
-        """Read the frame that the scene shows."""
+    def _read(self, row: int, armature, tracked: list) -> None:
+        """Read the frame that the scene shows, of the armature and the objects that it carries, bodies last."""
         graph = self._context.evaluated_depsgraph_get()
         evaluated = armature.evaluated_get(graph)
         if not evaluated.is_evaluated:
@@ -195,12 +195,13 @@ class _Recording:
             evaluated = armature.evaluated_get(graph)
         self._joints[row % self._block], self._own[row] = self.reader.world(evaluated), self.reader.own(evaluated)
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
-        for other in self._tracked:
-            self._places[other][row] = world(named(other), graph)
-        values = [body_reader.shape_values(find(body), graph) for body in self._bodies]
+        for name, other in zip(self._tracked, tracked, strict=True):
+            self._places[name][row] = world(other, graph)
+        bodies = tracked[len(tracked) - len(self._bodies) :]
+        values = [body_reader.shape_values(body, graph) for body in bodies]
         self._shapes.append(np.concatenate([np.zeros(0), *values]))
         if row in self._looked:
-            self._bodies_at[row] = [body_drawn.drawn(find(body), graph) for body in self._bodies]
+            self._bodies_at[row] = [body_drawn.drawn(body, graph) for body in bodies]
 
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.anatomy.standing import standing
 from neuralocks_core.character import Character, Skeleton, sizes_shown
 from neuralocks_core.errors import NeuralocksError
@@ -52,8 +52,12 @@ class RigArrays:
             raise NeuralocksError(f"{self.name}: it has no bone '{self.head_bone}'; choose the head bone again")
         return {"head": self.paths[self.bones.index(self.head_bone)]}
 
-    def humanoid(self):
-        """Which bone is which; the error says it in the words of the panel."""
+    def humanoid(self) -> Humanoid:
+        """Which bone is which, found once; the error says it in the words of the panel."""
+        return self._humanoid
+
+    @cached_property
+    def _humanoid(self) -> Humanoid:
         if not self.bones:
             raise NeuralocksError(f"{self.name}: the armature has no bones; choose the armature that moves the body")
         try:
