@@ -37,8 +37,8 @@ class Stood(NamedTuple):
 def remember(hair, rest: int) -> None:
     """Note how hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
     written = session.written[hair.name_full]
-    root = np.array(hair.data.attributes[curves.REST].data[0].vector, np.float32)
-    session.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
+    # Not read from Blender, which copies all of an attribute that its evaluated hair shares before anybody may look at it.
+    session.stood[identity(hair)] = Stood(written.points, written.places[1], written.rest[0], rest)
 
 
 def forget(hair) -> None:

@@ -8,6 +8,7 @@ be seen. `docs/deviations.md` says why.
 """
 
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from operator import index
 
 import numpy as np
@@ -96,7 +97,7 @@ class BoundarySpec:
         """Numbers per history bin."""
         return 3 * ((self.linear != "none") + 1 + self.chest)
 
-    @property
+    @cached_property
     def slices(self) -> dict[str, slice]:
         """Where pose, gravity, shape, material and history lie in the vector."""
         sizes = {

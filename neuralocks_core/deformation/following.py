@@ -65,7 +65,8 @@ class Following:
                 self._means.put(displacement, start, result, spare)
             if fine.any():
                 coils = self._coils.moved(displacement[fine], start).reshape(3, -1, self._each).transpose(0, 2, 1)
-                result[..., fine] = np.diff(coils, axis=1, prepend=np.float32(0.0))
+                coils[:, 1:] -= coils[:, :-1].copy()
+                result[..., fine] = coils
             return keep_lengths(points, result, spare, ~fine)
         if not fine.all():
             self._means.put(displacement, start, slice(ends[0], ends[-1]), result)
