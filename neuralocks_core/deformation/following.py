@@ -118,6 +118,7 @@ class _Alike:
         result[:, 0] = network[:, 0]
         whole = result[:, 1:]
         for number, (begin, end, of, shares) in enumerate(self._terms):
+            # One piece of memory, or `take` would fill a copy first.
             part = spare.reshape(-1)[: 3 * len(of) * count].reshape(3, len(of), count)
             steps.take(of, axis=1, out=part, mode="clip")
             if number:
