@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from . import rotations
 from .animated import animated
 from .lookup import identified, identity
+from .relations import found_anew
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
@@ -177,6 +178,14 @@ def without(armature):
                 track.is_solo = True
         if armature is not None:
             rotations.give_back(armature, turned)
+            if not _others_play(armature):
+                found_anew()  # what was looked at meanwhile had no keys
+
+
+def _others_play(armature) -> bool:
+    """Whether anything else than the hair's tracks is animation of this armature."""
+    data = armature.animation_data
+    return bool(data) and (bool(data.action) or any(not t.mute and t.name not in HAIR for t in data.nla_tracks))
 
 
 def _unstar(track) -> None:

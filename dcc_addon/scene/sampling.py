@@ -26,6 +26,7 @@ from .carried import bodies_of, hairs_of
 from .layers import layer_of, working_in
 from .lookup import find, named
 from .placing import world
+from .relations import found_anew
 from .rigging import posture, rigging
 from .unkeyed import Unkeyed
 from .watched import watched
@@ -109,6 +110,7 @@ def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[in
 
 def _sample(context, armature) -> Iterator[tuple[int, int]]:
     """Step through the frames; yields (done, total)."""
+    found_anew()
     recording = _Recording(context, armature)
     total = len(recording.frames)
     yield 0, total

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked keys of hair bones that are all the animation that a character has of its own."""
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, messages
+
+FRAMES = (3, 11, 20)
+
+
+def keyed_on_a_ride(folder: Path) -> None:
+    """The keys of a character that rides on something go on playing after its motion is sampled, which is done without them."""
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    cart = bpy.data.objects.new("Cart", None)
+    scene.collection.objects.link(cart)
+    rig.parent = cart
+    for frame in range(1, 25, 3):
+        cart.location.y = 0.3 * math.sin(frame)
+        cart.keyframe_insert("location", frame=frame)
+    scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def turns() -> list:
+        found = []
+        for frame in FRAMES:
+            scene.frame_set(frame)
+            found.append(np.array(rig.pose.bones["hair.02"].matrix))
+        return found
+
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    keyed = turns()
+    assert apart(keyed[0], keyed[-1]) > 0.01
+    for _ in range(2):
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        gap = max(apart(*pair) for pair in zip(turns(), keyed, strict=True))
+        assert gap < SAME, gap
+    assert not messages(), messages()
