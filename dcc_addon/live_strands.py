@@ -27,6 +27,7 @@ from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
 from .services.motion import TOLERANCE
+from .services.sliders import MATERIAL, MOTION
 from .session import session
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
@@ -99,7 +100,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         sampled.stale = session.wanting = True
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
-    wanted = time, joints, to_local, material(settings), typed(settings, "motion"), settings.resolve
+    wanted = time, joints, to_local, material(settings), typed(settings, MOTION.name), settings.resolve
     prepared = prepare(hair, sampled, wanted, wait)
     if prepared is None:
         show_rest(hair)
@@ -243,7 +244,7 @@ def typed(settings, name: str) -> float:
 
 def material_words(settings) -> list[str]:
     """The sliders as `NAME=VALUE` words of the command line."""
-    return [f"{name}={typed(settings, name):.9g}x" for name in ("bend", "weight", "damping", "clumping")]
+    return [f"{slider.name}={typed(settings, slider.name):.9g}x" for slider in MATERIAL]
 
 
 def rest(hair) -> None:

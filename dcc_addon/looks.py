@@ -8,6 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 from .live_strands import material_words, typed
 from .models import model_path
 from .scene import curves
+from .services.sliders import MOTION
 
 
 class Look(NamedTuple):
@@ -52,4 +53,4 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
 
 def _look(hair) -> Look:
     settings = hair.neuralocks_hair
-    return Look(tuple(material_words(settings)), typed(settings, "motion"), settings.resolve, model_path(hair))
+    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, model_path(hair))

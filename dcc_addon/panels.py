@@ -15,6 +15,7 @@ from .scene.attach import has_cache
 from .scene.muting import off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
+from .services.sliders import SLIDERS
 from .session import session
 
 _findings: dict[tuple, tuple[list, str]] = {}
@@ -120,8 +121,8 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         if off := off_meanwhile(hair):
             words(layout, f"Off meanwhile, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)
-        for name in ("bend", "weight", "damping", "clumping", "motion"):
-            column.prop(own, name, slider=True)
+        for slider in SLIDERS:
+            column.prop(own, slider.name, slider=True)
         row = layout.row()
         row.use_property_split = False
         row.prop(own, "resolve")

@@ -6,6 +6,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty,
 
 from . import background, live
 from .scene.paths import FILE
+from .services.sliders import SLIDERS
 from .session import session
 
 OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}
@@ -103,55 +104,6 @@ class HairSettings(bpy.types.PropertyGroup):
         update=_live_changed,
         **SETTING,
     )
-    bend: FloatProperty(
-        name="Stiffness",
-        description="How strongly strands keep their shape, relative to average hair",
-        default=1.0,
-        min=0.2,
-        max=5.0,
-        soft_min=0.2,
-        soft_max=5.0,
-        update=_look_changed,
-        **SETTING,
-    )
-    weight: FloatProperty(
-        name="Weight",
-        description="How heavy the hair is, relative to average hair",
-        default=1.0,
-        min=0.5,
-        max=2.0,
-        update=_look_changed,
-        **SETTING,
-    )
-    damping: FloatProperty(
-        name="Damping",
-        description="How fast a swing dies out, relative to average hair",
-        default=1.0,
-        min=0.4,
-        max=2.0,
-        update=_look_changed,
-        **SETTING,
-    )
-    clumping: FloatProperty(
-        name="Clumping",
-        description="How strongly neighbouring strands stay together, relative to average hair",
-        default=1.0,
-        min=0.0,
-        max=4.0,
-        update=_look_changed,
-        **SETTING,
-    )
-    motion: FloatProperty(
-        name="Motion",
-        description="How much of the movement shows; at 0 the hair hangs as in a held pose, up to 4, typed in, exaggerates",
-        default=1.0,
-        min=0.0,
-        max=4.0,
-        soft_max=1.0,
-        subtype="FACTOR",
-        update=_look_changed,
-        **SETTING,
-    )
     resolve: BoolProperty(
         name="Keep out of Body",
         description="Push hair out of the body where the motion has brought it in, live and in bakes",
@@ -161,6 +113,20 @@ class HairSettings(bpy.types.PropertyGroup):
     )
     muted: StringProperty(description="Modifiers that are off while the hair is live, as JSON", **KEPT)
     replaced: StringProperty(description="Modifiers that are off while the hair plays a cache, as JSON", **KEPT)
+
+
+for _slider in SLIDERS:
+    HairSettings.__annotations__[_slider.name] = FloatProperty(
+        name=_slider.label,
+        description=_slider.description,
+        default=1.0,
+        min=_slider.low,
+        max=_slider.high,
+        soft_max=_slider.shown,
+        subtype="FACTOR" if _slider.shown < _slider.high else "NONE",
+        update=_look_changed,
+        **SETTING,
+    )
 
 
 class CharacterSettings(bpy.types.PropertyGroup):

@@ -8,6 +8,7 @@ from ..live import refresh
 from ..scene import particles
 from ..scene.attach import check_own
 from ..scene.binding import carrier
+from ..services.sliders import SLIDERS
 from .base import Hardened, shown_armature, shown_hair
 
 
@@ -39,7 +40,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
-    """Put stiffness, weight, damping, clumping and motion back to average"""
+    """Put all sliders back to average"""
 
     bl_idname = "neuralocks.reset_look"
     bl_label = "Reset Hair Look"
@@ -48,8 +49,8 @@ class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
         hair = shown_hair(context)
         check_own(hair)
         settings = hair.neuralocks_hair
-        for name in ("bend", "weight", "damping", "clumping", "motion"):
-            settings.property_unset(name)
+        for slider in SLIDERS:
+            settings.property_unset(slider.name)
         refresh(context.scene)
 
 
