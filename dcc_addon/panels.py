@@ -11,13 +11,16 @@ from neuralocks_core.motion import LOOP_GAP
 
 from .operators.training import job, known_problem
 from .scene.actions import has_keys
-from .scene.attach import has_cache
+from .scene.attach import has_cache, stretched_since
 from .scene.muting import off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .services.sliders import SLIDERS
 from .session import session
 
+STRETCHED = (
+    "Time Stretching was changed since it was baked, and it plays the motion of before; press Bake and Attach again"
+)
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -212,8 +215,11 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("neuralocks.bake_attach", icon="LINKED")
         taking = row.row(align=True)
-        taking.enabled = settings.hair is not None and has_cache(settings.hair)
+        hair = settings.hair
+        taking.enabled = hair is not None and has_cache(hair)
         taking.operator("neuralocks.detach", text="", icon="X")
+        if hair is not None and not hair.neuralocks_hair.live and stretched_since(hair, context.scene):
+            words(layout, f"{hair.name_full}: {STRETCHED}", "ERROR")
 
 
 def findings(armature) -> tuple[list[str], str]:

@@ -2,6 +2,7 @@
 """A baked cache on a hair object: Blender's own modifier plays it, on any machine, without this add-on."""
 
 import os
+from fractions import Fraction
 
 import bpy
 
@@ -44,6 +45,17 @@ def has_cache(thing) -> bool:
         return False
     shown = modifier.show_viewport or modifier.show_render or MODIFIER in off_meanwhile(thing)
     return shown or _original(thing, modifier) is None
+
+
+def stretched_since(thing, scene) -> bool:
+    """Whether time is stretched otherwise in this scene than when what an object plays was baked, which then goes on in step
+    with the body, but in the motion that it was baked for, and ends with its frames.
+    """
+    cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
+    if cache is None:
+        return False
+    drivers = cache.animation_data.drivers if cache.animation_data else ()
+    return "".join(curve.driver.expression for curve in drivers if curve.data_path == "frame") != _in_step(scene)
 
 
 def players(path: str) -> list:
@@ -111,11 +123,17 @@ def _follow_time(cache, scene) -> None:
     """Play the frames that were baked where time is stretched, too: all that is animated, caches as well, is then at
     another frame than the one shown.
     """
-    shown, played = scene.render.frame_map_new, scene.render.frame_map_old
     cache.driver_remove("frame")
-    cache.override_frame = shown != played
-    if cache.override_frame:
-        cache.driver_add("frame").driver.expression = f"frame * {shown} / {played}"
+    expression = _in_step(scene)
+    cache.override_frame = bool(expression)
+    if expression:
+        cache.driver_add("frame").driver.expression = expression
+
+
+def _in_step(scene) -> str:
+    """The frame of a bake of this scene at the frame of its animation, as a driver says it; empty where these are one."""
+    stretch = Fraction(scene.render.frame_map_new, scene.render.frame_map_old)
+    return "" if stretch == 1 else f"frame * {stretch.numerator} / {stretch.denominator}"
 
 
 def _cache_file(path: str):

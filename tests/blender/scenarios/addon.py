@@ -9,6 +9,7 @@ import bpy
 
 from tests.blender import scenes
 from tests.blender.checks import make_live, own_handlers
+from tests.blender.panel import drawn
 
 
 def lifecycle(folder: Path) -> None:
@@ -40,76 +41,42 @@ def _menu_entries() -> list:
     return [function for function in drawn if "dcc_addon" in function.__module__]
 
 
-class _Layout:
-    """Stands in for Blender's layout, which only a window has: what it is asked for must exist in this Blender."""
-
-    def __init__(self, said: list, icon: str = ""):
-        self.said, self.icon = said, icon
-
-    def __getattr__(self, name):
-        known = bpy.types.UILayout.bl_rna.functions[name].parameters
-
-        def asked(*given, **options):
-            assert set(options) <= set(known.keys()), (name, options)
-            if name in ("prop", "prop_search"):
-                assert given[1] in given[0].bl_rna.properties, given
-            if name == "operator":
-                described = getattr(bpy.ops.neuralocks, given[0].split(".")[1]).get_rna_type()
-                self.said.append(options.get("text", described.name))
-                return SimpleNamespace(**dict.fromkeys(described.properties.keys()))
-            if options.get("text") and self.icon in options.get("icon", ""):
-                self.said.append(options["text"])
-            return _Layout(self.said, self.icon)
-
-        return asked
-
-
-def _drawn(icon: str = "") -> list[str]:
-    """Everything that the panels and the menu say now; what stands beside this icon, if one is given."""
-    from dcc_addon import menu, panels
-
-    said = []
-    for cls in (*panels.CLASSES, *menu.CLASSES):
-        cls.draw(SimpleNamespace(layout=_Layout(said, icon)), bpy.context)
-    return said
-
-
 def panel(folder: Path) -> None:
     """The panel can be drawn at every step of an artist's work, and says what is found and what is wrong."""
     from dcc_addon.session import session
 
     scene = bpy.context.scene
-    assert "Find Character and Hair" in _drawn()
+    assert "Find Character and Hair" in drawn()
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     skin = scenes.body(rig)
     scenes.dance(rig)
     scene.neuralocks.armature = rig
-    assert {"Head: head", "Not sampled"} <= set(_drawn())
+    assert {"Head: head", "Not sampled"} <= set(drawn())
     scene.unit_settings.scale_length = 10.0
     assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
-    assert "m wide" in " ".join(_drawn())
+    assert "m wide" in " ".join(drawn())
     scene.unit_settings.scale_length = 1.0
     strands = scenes.hair(rig, 10)
     strands.neuralocks_hair.armature = None
     scene.neuralocks.hair = strands
     attach = "Attach to Character"  # in the menu always
-    assert _drawn().count(attach) == 2
+    assert drawn().count(attach) == 2
     make_live(rig, strands)
-    said = _drawn()
+    said = drawn()
     assert {"24 frames", f"Body: {skin.name}"} <= set(said), said
     assert said.count(attach) == 1
     assert not any("wide" in line or "range" in line for line in said), said
     scene.frame_set(30)
-    assert "frames 1 to 24 only" in " ".join(_drawn())
+    assert "frames 1 to 24 only" in " ".join(drawn())
     rig.neuralocks_character.loop = True
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
     scene.neuralocks.use_scene_range = False
     assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
-    said = " ".join(_drawn())
+    said = " ".join(drawn())
     assert "differs from" in said and "no such" in said and "2 bones" in said, said
     for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
         session.trained = "Hair: said", well
-        assert _drawn(icon).count("Hair: said") == 2
+        assert drawn(icon).count("Hair: said") == 2
 
 
 def words(_folder: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at
+from tests.blender.panel import drawn
 
 
 def attached_again(folder: Path) -> None:
@@ -108,6 +109,40 @@ def taken_off(folder: Path) -> None:
         strands.neuralocks_hair.live = False
         assert deform.show_viewport and deform.show_render, "the hair stays behind its surface"
         assert [modifier.name for modifier in strands.modifiers] == [deform.name] and not messages(), messages()
+
+
+def stretched_since(folder: Path) -> None:
+    """Time that is stretched otherwise since hair was attached is told, with the remedy, which makes the hair what live hair
+    is: the cache goes on in step with the body, in the motion of before, and stands still where that ends.
+    """
+    needs_usd()
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    scene.neuralocks.output = str(folder / "hair.usdc")
+
+    def told() -> bool:
+        said = " ".join(drawn())
+        assert ("Hair: Time Stretching was" in said) == ("press Bake and Attach again" in said), said
+        return "Time Stretching" in said
+
+    attached_once = False
+    for old, new in ((100, 100), (100, 200), (100, 100)):
+        scene.render.frame_map_old, scene.render.frame_map_new = old, new
+        assert told() == attached_once
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
+        attached_once = True
+        assert not told()
+        attached = points_at(strands, 20)
+        strands.neuralocks_hair.live = True
+        assert apart(points_at(strands, 20), attached) < SAME
+        strands.neuralocks_hair.live = False
+        scene.render.frame_map_old, scene.render.frame_map_new = 2 * old, 2 * new
+        assert not told(), "the same stretch in other numbers"
+    scene.render.frame_map_new = 50
+    assert told()
+    assert bpy.ops.neuralocks.detach() == {"FINISHED"} and not told()
 
 
 def drawn_alike(folder: Path) -> None:
