@@ -44,6 +44,7 @@ def on_update(scene, graph):
     """Something was edited: follow a pose made by hand, and notice edited animation."""
     if session.paused:
         return
+    live.forget_gone()
     changed = [update.id for update in graph.updates]
     for thing in changed:
         if isinstance(thing, bpy.types.Mesh):
@@ -83,6 +84,7 @@ def on_load(*_):
 def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
+    live.forget_gone()
     background.request()  # what is half sampled holds on to a scene that is no more
     live.refresh(scene)
     show_rest_left(bpy.data.objects)  # hair as it was before the update that followed a join

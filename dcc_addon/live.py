@@ -7,6 +7,7 @@ import bpy
 
 from . import live_rig, live_strands
 from .scene.layers import elsewhere, graph_of, layer_of
+from .scene.lookup import find
 from .scene.sampling import key_of
 from .session import session
 
@@ -82,6 +83,13 @@ def show_rest(scene) -> None:
         live_strands.show_rest(hair)
     for armature in live_rig.live_armatures(scene):
         live_rig.show_rest(armature)
+
+
+def forget_gone() -> None:
+    """Drop what was told of objects that were renamed or deleted: another one may get such a name."""
+    for told in (session.messages, session.cards):
+        for name in [name for name in told if find(name) is None]:
+            del told[name]
 
 
 def carriers(scene) -> list:

@@ -7,8 +7,9 @@ from unittest.mock import MagicMock, patch
 
 import bpy
 
+from neuralocks_core.errors import NeuralocksError
 from tests.blender import scenes
-from tests.blender.checks import make_live, own_handlers
+from tests.blender.checks import make_live, messages, own_handlers
 from tests.blender.panel import drawn
 
 
@@ -77,6 +78,37 @@ def panel(folder: Path) -> None:
     for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
         session.trained = "Hair: said", well
         assert drawn(icon).count("Hair: said") == 2
+
+
+def told_of_what_is_there(_folder: Path) -> None:
+    """What is told of an object goes with it: after it is renamed or deleted, another one that gets its name is not told of
+    by it, and the same hair is under its new name.
+    """
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    make_live(rig, strands)
+    bpy.ops.neuralocks.report_card()
+    strands.neuralocks_hair.model = "/nowhere.neuralocks"
+    assert "Hair" in messages() and "Hair" in session.cards
+    strands.name = "Locks"
+    bpy.context.view_layer.update()
+    assert set(messages()) == {"Locks"} and not session.cards, messages()
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert "nowhere" in messages()["Locks"]
+    scene.neuralocks.hair = scenes.hair(rig, 10)
+    assert scene.neuralocks.hair.name == "Hair"
+    assert "no such" not in " ".join(drawn())
+    bpy.data.objects.remove(strands)
+    bpy.context.view_layer.update()
+    assert not messages(), messages()
+
+    session.tell("Rig", NeuralocksError("Rig: a bone of it is gone"))  # as sampling beside the artist does
+    rig.name = "Anna"
+    bpy.context.view_layer.update()
+    assert not messages(), messages()
 
 
 def words(_folder: Path) -> None:
