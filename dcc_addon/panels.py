@@ -9,7 +9,7 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
-from .operators.training import job, known_problem
+from .operators.training import job, known_problem, notes
 from .scene.actions import has_keys
 from .scene.attach import has_cache, stretched_since
 from .scene.muting import off_meanwhile
@@ -149,13 +149,21 @@ def _training(layout, settings, kind: str) -> None:
         if session.trained is not None:
             text, well = session.trained
             words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")
+        _notes(layout)
         return
     left = running.seconds_left
     box = layout.box()
     text = f"Training {100 * running.done:.0f} %" + ("" if left is None else f", {max(1, round(left / 60))} min left")
     progress(box, running.done, text)
     words(box, running.message, "NONE")
+    _notes(box)
     box.operator("neuralocks.cancel_training", icon="CANCEL")
+
+
+def _notes(layout) -> None:
+    """What training says of the character, some of which would save its minutes."""
+    for note in notes():
+        words(layout, note, "INFO")
 
 
 class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):

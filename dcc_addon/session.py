@@ -101,6 +101,8 @@ class Session:
     messages: dict[str, str] = field(default_factory=dict)
     trained: tuple[str, bool] | None = None
     """What became of the last training, and whether that is good news."""
+    trained_notes: list[str] = field(default_factory=list)
+    """What else is to be known of it."""
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""

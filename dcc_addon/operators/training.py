@@ -20,6 +20,7 @@ from ..scene.paths import library_of
 from ..scene.redraw import redraw
 from ..scene.save_as import named_here, set_path
 from ..services.names import file_label
+from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
 from ..services.training_job import TrainingJob, default_python
@@ -34,6 +35,11 @@ _trainers = Trainers()
 def job() -> TrainingJob | None:
     """The training that runs or has just ended."""
     return _running[0].job if _running else None
+
+
+def notes() -> list[str]:
+    """What an artist should know of the training that runs, or else of the last one, in the words of the panel."""
+    return _running[0].notes() if _running else session.trained_notes
 
 
 def stop() -> None:
@@ -105,7 +111,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         stop()
         folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
         character = Path(folder.name) / "character.usdc"
-        write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
+        prims = write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
         settings = {
             "kind": self.kind,
             "character": str(character),
@@ -114,8 +120,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
             "head": sampled.character.skeleton.names[sampled.character.head],
         }
-        _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder))
-        session.trained = None
+        _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder, prims))
+        session.trained, session.trained_notes = None, []
         bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
         return f"Training a model for {target.name_full} in the background"
 
@@ -153,11 +159,16 @@ class _Target(NamedTuple):
 
 
 class _Training(NamedTuple):
-    """A process at work, what it is for, and the folder with what it reads."""
+    """A process at work, what it is for, and the folder with what it reads, whose prims are of these objects."""
 
     job: TrainingJob
     target: _Target
     folder: tempfile.TemporaryDirectory
+    prims: dict[str, str]
+
+    def notes(self) -> list[str]:
+        """What it says, of objects and in the words of the panel."""
+        return [for_the_panel(with_objects(note, self.prims)) for note in self.job.notes]
 
 
 def finish() -> str | None:
@@ -180,7 +191,7 @@ def finish() -> str | None:
             set_path(target, setting, running.out)
         _remember()
         message, well = f"{target.name_full}: trained", True
-    session.trained = message, well
+    session.trained, session.trained_notes = (message, well), notes()
     stop()
     refresh(bpy.context.scene)
     return message

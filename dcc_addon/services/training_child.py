@@ -42,6 +42,11 @@ def _printer(stream):
     return say
 
 
+def _tell(notes) -> None:
+    """What somebody should know of the character, or of what was learned."""
+    print(json.dumps({"notes": [str(note) for note in notes]}), flush=True)
+
+
 def _train_strands(settings: dict, say) -> None:
     from usd.models.train import train
 
@@ -57,6 +62,7 @@ def _train_strands(settings: dict, say) -> None:
         {"minutes": minutes},
         head=settings.get("head"),
         rollouts=rollouts,
+        tell=_tell,
         progress=say,
     )
 
@@ -71,6 +77,7 @@ def _train_rig(settings: dict, say) -> None:
         seconds=60 * settings["minutes"],
         chains=settings.get("chains") or None,
         head=settings.get("head"),
+        tell=_tell,
         progress=say,
     )
 

@@ -73,12 +73,14 @@ class TrainingJob:
 
     Attributes:
         done, message: progress from 0 to 1, and the latest line with the gauge.
+        notes: what somebody should know of the character, and in the end of what was learned; each once.
         error: why it failed, in one line; empty otherwise.
         out: the model file that it writes.
     """
 
     def __init__(self, python: str, settings: dict):
         self.done, self.message, self.error, self.out = 0.0, "Starting", "", settings["out"]
+        self.notes: list[str] = []
         self._began = time.monotonic()
         self._cancelled = False
         group = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x00000200}
@@ -144,6 +146,8 @@ class TrainingJob:
                     continue
                 if "error" in said:
                     self.error = str(said["error"])
+                elif "notes" in said:
+                    self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
                 else:
                     self.done = float(said.get("done", self.done))
                     self.message = str(said.get("message", self.message))

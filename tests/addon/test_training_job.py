@@ -12,6 +12,7 @@ CHILD = """
 import json, sys, time
 settings = json.load(sys.stdin)
 print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
+for told in (["/Hair: a", "b"], ["b", "K\xfcche"]): print(json.dumps({"notes": told}), flush=True)
 if settings["out"] == "wait": time.sleep(60)
 if settings["out"] == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
@@ -49,6 +50,7 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
     running = job("well")
     _wait(lambda: not running.running)
     assert running.succeeded and running.message == "half" and running.done == 0.5
+    assert running.notes == ["/Hair: a", "b", "K\xfcche"]
 
 
 def test_training_is_cancelled_at_once(job):

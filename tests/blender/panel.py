@@ -23,6 +23,8 @@ class _Layout:
         self.said, self.icon = said, icon
 
     def __getattr__(self, name):
+        if name not in bpy.types.UILayout.bl_rna.functions:
+            raise AttributeError(name)
         known = bpy.types.UILayout.bl_rna.functions[name].parameters
 
         def asked(*given, **options):

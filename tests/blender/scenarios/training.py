@@ -13,6 +13,7 @@ import bpy
 
 from tests.blender import scenes
 from tests.blender.checks import MODEL, messages, refused
+from tests.blender.panel import drawn
 
 
 def training(folder: Path) -> None:
@@ -32,6 +33,28 @@ def training(folder: Path) -> None:
     strands.neuralocks_hair.live = True
     bpy.context.scene.frame_set(9)
     assert "Hair" not in messages(), messages()
+
+
+def notes_of_a_training(folder: Path) -> None:
+    """What training says of the character is in the panel from its beginning on, of the artist's objects, and stays there when
+    it has ended, until the next one.
+    """
+    from dcc_addon.operators import training as operator
+    from dcc_addon.session import session
+
+    said = ("/Character/Hair_Hair: name it with --head JOINT", "/Character/Rig: has no neck")
+    shown = ("Hair: choose it as Head bone", "Rig: has no neck")
+    strands = _in_training(folder, said)
+    end = time.monotonic() + 60
+    while not operator.notes() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert operator.job().running and operator.notes() == [*shown]
+    assert all(drawn().count(line) == 2 for line in shown), drawn()  # for strands and for bones
+    assert _ended() == ("Hair: trained", True)
+    assert all(drawn("INFO").count(line) == 2 for line in shown), drawn("INFO")
+    assert strands.neuralocks_hair.model
+    _in_training(folder)
+    assert not operator.notes() and _ended() == ("Hair: trained", True) and not session.trained_notes
 
 
 def training_meanwhile(folder: Path) -> None:
@@ -80,9 +103,9 @@ def trained_in_a_shot(folder: Path) -> None:
         wanted.objects = ["Hair"]
     strands = bpy.data.objects["Hair"].override_create()
     assert Path(model_path(strands)).samefile(library / out.name)
-    ended = SimpleNamespace(running=False, succeeded=True, out=str(out), cancel=lambda: None)
+    ended = SimpleNamespace(running=False, succeeded=True, out=str(out), cancel=lambda: None, notes=[])
     exported = SimpleNamespace(cleanup=lambda: None)
-    operator._running.append(operator._Training(ended, operator._Target.of(strands, "strands"), exported))
+    operator._running.append(operator._Training(ended, operator._Target.of(strands, "strands"), exported, {}))
     assert _ended() == (f"{strands.name_full}: trained", True)
     assert Path(model_path(strands)).samefile(out)
 
@@ -118,7 +141,7 @@ def _told(until) -> str:
     return said
 
 
-def _in_training(folder: Path):
+def _in_training(folder: Path, notes=()):
     """Hair of a saved file for which a training of a second runs, which copies a model."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import training_job
@@ -130,6 +153,7 @@ def _in_training(folder: Path):
         "    settings = json.load(sys.stdin)\n"
         "    assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
         "    print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
+        f"    print(json.dumps({{'notes': {list(notes)!r}}}), flush=True)\n"
         "    time.sleep(1)\n"
         f"    shutil.copy({MODEL!r}, settings['out'])\n"
     )
