@@ -64,7 +64,7 @@ def stage(armature) -> None:
     background.inputs[0].default_value = (0.055, 0.06, 0.075, 1)
     background.inputs[1].default_value = 1.0
     scene.world = world
-    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 110, 1.2), ("Rim", (1.4, 1.6, 2.4), 150, 0.6)):
+    for name, where, power, size in (("Key", (-1.6, -2.2, 2.6), 130, 1.2), ("Rim", (1.4, 1.6, 2.4), 55, 0.8)):
         light = bpy.data.lights.new(name, "AREA")
         light.energy, light.size = power, size
         lamp = bpy.data.objects.new(name, light)

@@ -5,10 +5,11 @@
         --python examples/blender_panel.py -- OUT.png
 
 `--model FILE` chooses a model, `--frame N` the frame. Needs a Blender with a window; the packages of the add-on must be
-importable (install the extension, or set PYTHONPATH).
+importable (install the extension, or set PYTHONPATH). Where VIRTUAL_ENV has no torch, the panel says how to get it.
 """
 
 import argparse
+import math
 import os
 import shutil
 import subprocess
@@ -18,9 +19,10 @@ import traceback
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import blender_clip
 import blender_shot
 import bpy
-from mathutils import Quaternion, Vector
+from mathutils import Euler, Vector
 
 
 def options():
@@ -28,7 +30,7 @@ def options():
     parser = argparse.ArgumentParser()
     parser.add_argument("out", type=Path)
     parser.add_argument("--model", default="")
-    parser.add_argument("--frame", type=int, default=90)
+    parser.add_argument("--frame", type=int, default=76)
     parser.add_argument("--strands", type=int)
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
 
@@ -58,16 +60,21 @@ def prepare(wanted) -> None:
 
 
 def _view(area, armature) -> None:
-    space = area.spaces.active
-    space.show_region_ui = True
-    space.shading.type, space.shading.light, space.shading.color_type = "SOLID", "STUDIO", "MATERIAL"
-    space.shading.show_cavity, space.overlay.show_overlays = True, False
+    """Material Preview with the lights of the clip, of the head left of the sidebar."""
+    scene, space = bpy.context.scene, area.spaces.active
+    blender_clip.stage(armature)
+    scene.render.hair_subdiv = 2
+    scene.eevee.use_gtao, scene.eevee.gtao_distance = True, 0.05
+    space.show_region_ui, space.overlay.show_overlays = True, False
+    shading = space.shading
+    shading.type, shading.use_scene_lights, shading.use_scene_world = "MATERIAL", True, False
+    shading.studiolight_intensity = 0.35
     head = armature.matrix_world @ armature.pose.bones[_head(armature)].matrix
     region = space.region_3d
     region.view_perspective = "PERSP"
-    region.view_location = head.to_translation() + Vector((0, 0, 0.0))
-    region.view_rotation = Quaternion((0.62, 0.64, 0.32, 0.31))
-    region.view_distance = 0.62
+    region.view_rotation = Euler((math.radians(84), 0, math.radians(ROUND))).to_quaternion()
+    region.view_location = head.to_translation() + region.view_rotation @ Vector(ASIDE)
+    region.view_distance = 0.56
     for part in area.regions:
         if part.type == "UI" and hasattr(part, "active_panel_category"):
             try:
@@ -94,11 +101,15 @@ def clicks() -> list:
     top = window.height - (side.y + side.height)
     tab, edge = f"mousemove {side.x + side.width - 12} {top + TAB}", f"mousemove {side.x} {top + 400}"
     # The first click may only put the splash screen away.
-    way = ["mousemove 300 500", "click 1", tab, "click 1", edge, "mousedown 1"]
+    way = ["mousemove 120 700", "click 1", tab, "click 1", edge, "mousedown 1"]
     way += [f"mousemove {side.x - step} {top + 400}" for step in (30, 60, 90)] + ["mouseup 1", "mousemove 8 500"]
     return [lambda step=step: subprocess.Popen(["xdotool", *step.split()]) for step in way]
 
 
+ROUND = 36
+"""From how far to the left of the scene's front the view looks [degrees]."""
+ASIDE = (0.04, -0.03, 0)
+"""Where the view looks from the head joint, to its right and up [m]."""
 TAB = 130
 """How far below the top of the sidebar the third tab lies."""
 

@@ -151,9 +151,22 @@ def _skin():
 
 
 def _hair_material():
-    material = _material("Hair", (0.20, 0.075, 0.03, 1), 0.35)
+    material = _material("Hair", (0.20, 0.075, 0.03, 1), 0.55)
     shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     if "Anisotropic" in shader.inputs:
         shader.inputs["Anisotropic"].default_value = 0.6
     material.diffuse_color = (0.30, 0.13, 0.06, 1)
+    _fibres(material.node_tree)
     return material
+
+
+def _fibres(tree) -> None:
+    """For Cycles, hair that light goes through; other engines do not know it, and keep the plain shader."""
+    plain = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    plain.target = "EEVEE"
+    fibre, output = tree.nodes.new("ShaderNodeBsdfHairPrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")
+    output.target, fibre.parametrization = "CYCLES", "MELANIN"
+    values = {"Melanin": 0.6, "Melanin Redness": 0.7, "Roughness": 0.3, "Radial Roughness": 0.45, "Random Color": 0.2}
+    for name, value in values.items():
+        fibre.inputs[name].default_value = value
+    tree.links.new(fibre.outputs[0], output.inputs["Surface"])
