@@ -64,7 +64,8 @@ def _view(area, armature) -> None:
     scene, space = bpy.context.scene, area.spaces.active
     blender_clip.stage(armature)
     scene.render.hair_subdiv = 2
-    scene.eevee.use_gtao, scene.eevee.gtao_distance = True, 0.05
+    if hasattr(scene.eevee, "use_gtao"):  # newer ones shade corners by themselves
+        scene.eevee.use_gtao, scene.eevee.gtao_distance = True, 0.05
     space.show_region_ui, space.overlay.show_overlays = True, False
     shading = space.shading
     shading.type, shading.use_scene_lights, shading.use_scene_world = "MATERIAL", True, False
@@ -107,7 +108,7 @@ def clicks() -> list:
 
 
 ROUND = 36
-"""From how far to the left of the scene's front the view looks [degrees]."""
+"""How far round to the character's left the view stands [degrees]."""
 ASIDE = (0.04, -0.03, 0)
 """Where the view looks from the head joint, to its right and up [m]."""
 TAB = 130
