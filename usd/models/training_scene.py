@@ -29,8 +29,8 @@ from ..shot.lacking import nothing_found
 from ..shot.motion_notes import motion_notes
 from ..shot.notes import first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
+from ..shot.skeletons import read_each_rig
 from ..shot.stage import StageRig, read_rigs
-from ..shot.unnamed_head import read_each_rig
 from ..skel.source import find_skeletons
 
 LIBRARY = "library"

@@ -46,8 +46,8 @@ from ..shot.notes import (
     without_turn,
 )
 from ..shot.recorded import recorded, recorded_cuts, retimed
+from ..shot.skeletons import read_each_rig
 from ..shot.stage import frame_range
-from ..shot.unnamed_head import read_each_rig
 from ..skel.source import StageRig, find_skeletons
 
 

@@ -34,7 +34,7 @@ from .notes import (
     stands_still,
     without_turn,
 )
-from .unnamed_head import read_each_rig
+from .skeletons import read_each_rig
 
 
 @dataclass(frozen=True)
