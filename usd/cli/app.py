@@ -79,8 +79,15 @@ def _options(
 def import_command(
     file: Annotated[Path, typer.Argument(help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves.")],
     out: Out,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m, in, or metres per unit of the file.")] = None,
-    up: Annotated[str | None, typer.Option(help="Upward axis of the file: Y or Z.")] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(
+            help="mm, cm, m, in, or metres per unit of the file; what it says or a scalp suggests if left out."
+        ),
+    ] = None,
+    up: Annotated[
+        str | None, typer.Option(help="Upward axis of the file, Y or Z; the usual one of its format if left out.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Write a hair file as a USD groom."""

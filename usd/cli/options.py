@@ -15,7 +15,9 @@ Grooms = Annotated[
     list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All hair if left out.")
 ]
 Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
-Head = Annotated[str | None, typer.Option("--head", help="Joint that carries hair without a binding.")]
+Head = Annotated[
+    str | None, typer.Option("--head", help="The head joint, where names do not tell; it carries unbound hair.")
+]
 Joints = Annotated[
     list[str] | None,
     typer.Option(

@@ -32,7 +32,9 @@ def train(
             help="Seconds to train, besides simulating (see --clips) and the report; 120, and 75 quasi-static."
         ),
     ] = None,
-    steps: Annotated[int | None, typer.Option(help="Train this many steps instead; repeatable.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Train this many steps instead; the result is then reproducible.")
+    ] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
     bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,

@@ -38,12 +38,15 @@ def train_command(
         list[str] | None, typer.Option(help="BVH or USD motions; made-up motion is always added.")
     ] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
-    steps: Annotated[int | None, typer.Option(help="Steps to train, in place of minutes; repeatable.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Steps to train, in place of minutes; the result is then reproducible.")
+    ] = None,
     begin: Annotated[
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="Begin with what this model has learned, with the 'shipped' one or with 'nothing'.  [default: shipped, where it fits]",
+            help="Begin with what this model has learned, with the 'shipped' one or with 'nothing'.",
+            show_default="shipped, where it fits",
         ),
     ] = None,
     resume: Annotated[

@@ -211,6 +211,12 @@ def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
     assert "mute it to have the shot back. A bake that was stopped goes on" in capsys.readouterr().out
 
 
+def test_help_tells_what_a_training_begins_with_where_nothing_is_said(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    assert status("train", "--help") == 0
+    assert "[default: (shipped, where it fits)]" in capsys.readouterr().out
+
+
 def test_the_version_is_told(capsys):
     assert status("--version") == 0
     assert capsys.readouterr().out.split()[0] == "neuralocks"
