@@ -15,8 +15,9 @@ from .damage import first_line, named
 from .stopping import check
 
 LAYERS = (".usd", ".usda", ".usdc")
-OTHERS = (".fbx", ".vrm", ".glb", ".gltf")
-"""Characters in other formats, which USD reads with plug-ins alone."""
+GLTF = (".vrm", ".glb", ".gltf")
+OTHERS = (".fbx", *GLTF, ".abc", ".blend")
+"""Characters and hair in other formats, which USD reads with plug-ins alone or not at all."""
 
 
 def open_stage(path) -> Usd.Stage:
@@ -47,8 +48,9 @@ def open_stage(path) -> Usd.Stage:
 def _remedy(path: Path) -> str:
     if path.suffix.lower() not in OTHERS:
         return "export it again"
-    by = " (examples/vrm_to_usd.py does)" if path.suffix.lower() != ".fbx" else ""
-    return f"import it into Blender and export USD there{by}"
+    by = " (examples/vrm_to_usd.py does)" if path.suffix.lower() in GLTF else ""
+    first = "open it in Blender" if path.suffix.lower() == ".blend" else "import it into Blender"
+    return f"{first} and export USD there{by}"
 
 
 def used_files(stage: Usd.Stage) -> list[str]:

@@ -158,15 +158,20 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("ending", "how"), [("fbx", "USD there$"), ("vrm", r"vrm_to_usd.py does\)$"), ("glb", "vrm_to_usd")]
+    ("ending", "how"),
+    [
+        ("fbx", "import it into Blender and export USD there$"),
+        ("vrm", r"import it into Blender and export USD there .*vrm_to_usd.py does\)$"),
+        ("glb", "import it into Blender .*vrm_to_usd"),
+        ("abc", "import it into Blender and export USD there$"),
+        ("blend", "open it in Blender and export USD there$"),
+    ],
 )
 def test_a_character_in_another_format_is_told_the_way_to_usd(tmp_path, ending, how):
     path = tmp_path / f"who.{ending}"
     path.write_bytes(b"anything")
     for use in (read_rigged_hair, inspect):
-        with pytest.raises(
-            NeuralocksError, match=f"who.{ending}: not a readable USD file .*import it into Blender .*{how}"
-        ):
+        with pytest.raises(NeuralocksError, match=f"who.{ending}: not a readable USD file .*; {how}"):
             use(path)
 
 
