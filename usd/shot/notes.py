@@ -288,7 +288,7 @@ def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
             f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"
         )
     longest = float(spread.max())
-    if longest > 2.5 or longest < 0.002:
+    if longest > 2.5 or 0 < longest < 0.002:  # points alone tell nothing of a unit
         remedy = border.foreign(prim.GetAttribute("points")) or "; check the stage's metersPerUnit"
         notes.append(f"{path}: the longest strand reaches {longest:.3g} m{remedy}")
     return notes

@@ -244,6 +244,9 @@ def test_strands_too_short_to_move_are_counted_alike_everywhere():
     stage = Usd.Stage.CreateInMemory()
     (said,) = groom_notes(UsdGeom.BasisCurves.Define(stage, "/Hair").GetPrim(), groom, Border.of(stage))
     assert said == "/Hair: 2 of 4 strands have no two distinct points; they follow the head rigidly"
+    dots = Groom("hair", points[:, 0].astype(np.float32), np.ones(4, np.int32))
+    (said,) = groom_notes(UsdGeom.BasisCurves.Define(stage, "/Dots").GetPrim(), dots, Border.of(stage))
+    assert said == "/Dots: 4 of 4 strands have no two distinct points; they follow the head rigidly"
 
 
 def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
