@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from neuralocks_core.rotation import unit
+
 INSIDE_OUT = -0.3
 """Of the volumes that triangles span with the middle of the mesh, sum over sum of sizes: 1 for a ball, 0.5 for a person
 with arms spread, near 0 for hair cards and cloth, whose sides say nothing. Below this the mesh is inside out."""
@@ -16,7 +18,7 @@ def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = (np.asarray(points, float)[corner] for corner in triangles.T)
     face, corners = np.cross(b - a, c - a), triangles.T.ravel()
     total = np.stack([np.bincount(corners, np.tile(part, 3), len(points)) for part in face.T], axis=1)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+    return unit(total)
 
 
 def connected_pieces(faces: np.ndarray, count: int) -> np.ndarray:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rotations as 3x3 matrices, and from and to quaternions (w, x, y, z) and rotation vectors; affine transforms."""
+"""Rotations as 3x3 matrices, and from and to quaternions (w, x, y, z) and rotation vectors; directions and affine transforms."""
 
 import numpy as np
 
@@ -13,6 +13,11 @@ FLAT = 1e-9
 
 class Mirrored(NeuralocksError):
     """A transform has negative scale."""
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of length one; of no length, where they have none."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def to_quaternion(matrices: np.ndarray) -> np.ndarray:

@@ -69,9 +69,9 @@ def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
 
 def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
     """The axis (3,) along which a rest pose, places (J, 3), stands, Y for a head alone; None where it stands along none."""
-    trunk = _direction(places[humanoid["head"]] - places[humanoid["hips"]])
+    trunk = rotation.unit(places[humanoid["head"]] - places[humanoid["hips"]])
     feet = [humanoid[name] for name in FEET if name in humanoid]
-    legs = _direction(places[humanoid["hips"]] - places[feet])  # each, as one may go up and the other down
+    legs = rotation.unit(places[humanoid["hips"]] - places[feet])  # each, as one may go up and the other down
     if not trunk.any() or trunk[1] > UPRIGHT and (legs[:, 1] > -UPRIGHT).all():
         return AXES["Y"]
     for axis in np.concatenate([np.eye(3), -np.eye(3)]):
@@ -85,7 +85,7 @@ def _up_in_motion(world: np.ndarray, humanoid: Humanoid, stands: np.ndarray | No
     places = world[:, :, :3, 3]
     feet = [places[:, humanoid[name]] for name in FEET if name in humanoid]
     low = np.mean(feet, axis=0) if feet else places[:, humanoid["hips"]]
-    body = _direction(places[:, humanoid["head"]] - low)
+    body = rotation.unit(places[:, humanoid["head"]] - low)
     if stands is not None and stands[2] == 1 and (body[:, 2] > MOSTLY).mean() > SELDOM:
         return "Z"
     middle = np.median(body, axis=0)
@@ -102,7 +102,3 @@ def _turned(transforms: np.ndarray, up: np.ndarray) -> np.ndarray:
     turn = np.eye(4)
     turn[:3, :3] = rotation.between(up, AXES["Y"]).round()
     return turn @ transforms
-
-
-def _direction(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -8,6 +8,7 @@ import numpy as np
 
 from neuralocks_core.materials import STRETCH, Material
 from neuralocks_core.motion import G
+from neuralocks_core.rotation import unit
 from neuralocks_core.strands.bends import bends
 
 
@@ -60,4 +61,4 @@ def stretch_energy(lengths: np.ndarray, rest: np.ndarray) -> np.ndarray:
 def curvature(points: np.ndarray) -> np.ndarray:
     """2 Im(q) = 2 sin(angle / 2) n at each inner vertex of strands (..., K, 3) [m]: (..., K - 2, 3), see `bends`."""
     edges = np.diff(np.asarray(points, float), axis=-2)
-    return 2 * bends(edges / np.maximum(np.linalg.norm(edges, axis=-1, keepdims=True), 1e-12))
+    return 2 * bends(unit(edges))

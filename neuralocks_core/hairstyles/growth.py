@@ -9,6 +9,7 @@ import numpy as np
 
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Roots, Scalp
+from neuralocks_core.rotation import unit
 
 DOWN = np.array([0.0, -1.0, 0.0])
 
@@ -174,11 +175,6 @@ def evenly(points: np.ndarray, count: int) -> np.ndarray:
     low, high = np.take_along_axis(share, before, 1), np.take_along_axis(share, before + 1, 1)
     part = np.clip((wanted - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
     return at_vertices(points, before + np.minimum(part, 1 - 1e-7))
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length one."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def smooth(x: np.ndarray) -> np.ndarray:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import DOWN, STEPS, Plan, Site, march, smooth, unit
+from neuralocks_core.hairstyles.growth import DOWN, STEPS, Plan, Site, march, smooth
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
 from neuralocks_core.hairstyles.style import Style
 from neuralocks_core.hairstyles.variation import Variation
+from neuralocks_core.rotation import unit
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.rotation import unit
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
 # forehead, up is in skull heights from the head's centre. From the nape behind and over the ear, the
@@ -91,8 +92,7 @@ class Scalp:
         order.sort()
         order = random.permutation(order)
         normals = vertex_normals(self.points, self.triangles)[self.triangles[triangle[order]]]
-        normal = np.einsum("nc,nci->ni", weight[order], normals)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = unit(np.einsum("nc,nci->ni", weight[order], normals))
         return Roots(place[order], normal, border[order] * 0.1 * self.radius)
 
     def _border_distance(self, places: np.ndarray) -> np.ndarray:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import CHUNK, Site, at_vertices, smooth, unit
+from neuralocks_core.hairstyles.growth import CHUNK, Site, at_vertices, smooth
 from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.rotation import unit
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import Plan, Site, at_vertices, smooth, unit
+from neuralocks_core.hairstyles.growth import Plan, Site, at_vertices, smooth
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.shaping import Shape
+from neuralocks_core.rotation import unit
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.character import Character
 from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.rotation import unit
 from neuralocks_core.skinned_body import Body
 
 CELL = 0.012
@@ -50,8 +51,7 @@ def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
     An ear's two sides welded to one sheet have neither an inside nor an outside: hair 8 cm beside it is pulled in.
     """
-    mean = np.stack([np.bincount(group, part) for part in normals.T], axis=1)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    mean = unit(np.stack([np.bincount(group, part) for part in normals.T], axis=1))
     flattest = np.full(len(mean), np.inf)
     np.minimum.at(flattest, group, (normals * mean[group]).sum(axis=1))
     alone = flattest[group] < FLAT
