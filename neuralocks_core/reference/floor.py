@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.metrics import motion_error, position_error
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.rods import simulate
+from neuralocks_core.reference.solver import simulate
 
 
 @dataclass(frozen=True)

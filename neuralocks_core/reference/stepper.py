@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The time steps of `rods.simulate`, one after the other on a device."""
+"""The time steps of `solver.simulate`, one after the other on a device."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ clumping 240 strands that pull on each other are up to 2.7 mm from where they wo
 
 
 class Stepper:
-    """State of all strands in world space. Private to the reference; `rods.simulate` checks the arguments.
+    """State of all strands in world space. Private to the reference; `solver.simulate` checks the arguments.
 
     Args:
         rods: the strands at rest.

@@ -13,7 +13,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import check_body, check_material
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
-from neuralocks_core.reference.rods import SimulatedHair
+from neuralocks_core.reference.solver import SimulatedHair
 from neuralocks_core.reference.stepper import REACH
 from neuralocks_core.warp_device import start_warp
 
@@ -34,21 +34,21 @@ def simulate_xpbd(
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> SimulatedHair:
-    """Simulate strands by XPBD on the energies of `rods.simulate`, with one iteration in each of many substeps.
+    """Simulate strands by XPBD on the energies of `solver.simulate`, with one iteration in each of many substeps.
 
     It starts from the rest shape (there is no equilibrium solve) and has no ties between neighbours. Edges stretch by
     what one pass leaves; stiffness holds as far as the substeps carry it.
 
     Args:
         rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, device, progress: as in
-            `rods.simulate`.
+            `solver.simulate`.
         substeps: in a frame.
 
     Returns:
-        As `rods.simulate`; residual is NaN (nothing is solved for), iterations are the substeps.
+        As `solver.simulate`; residual is NaN (nothing is solved for), iterations are the substeps.
 
     Raises:
-        NeuralocksError: as `rods.simulate`.
+        NeuralocksError: as `solver.simulate`.
     """
     if not (np.isfinite(dt) and dt > 0) or substeps < 1:
         raise NeuralocksError(f"dt {dt}, substeps {substeps}: must be positive")
