@@ -189,6 +189,8 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
+    if facts["type"] == UsdGeom.Tokens.cubic:
+        facts |= {"basis": str(curves.GetBasisAttr().Get()), "wrap": str(curves.GetWrapAttr().Get())}
     found, to_bind, drawn, joint = None, border.to_core @ placement.reference, False, {}
     if search is not None:
         try:

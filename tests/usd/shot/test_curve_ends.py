@@ -132,4 +132,6 @@ def test_first_points_that_lie_on_the_skin_are_roots(tmp_path, model, basis):
         paths.append(bake(path, tmp_path / f"{wrap}.usdc", model).path)
         told = [note for note in read_shot(path).notes if note.endswith("set their wrap to pinned")]
         assert len(told) == (wrap == "nonperiodic")
+        (facts,) = inspect(path)["grooms"]
+        assert [facts[name] for name in ("type", "basis", "wrap")] == ["cubic", basis, wrap]
     assert np.array_equal(world_points(paths[0], 5.0), world_points(paths[1], 5.0))
