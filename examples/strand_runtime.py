@@ -12,6 +12,7 @@ there the median tells whether the runtime is right, and tips differ by millimet
 import argparse
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -161,9 +162,17 @@ def clip_codes(stage: Usd.Stage, samples: list[float]) -> list[float]:
     return sorted({*codes, *(float(code) for a, b in gaps for code in range(math.ceil(a), math.ceil(b)))})
 
 
-def shares(stage: Usd.Stage, prim: str) -> list[np.ndarray]:
-    """Where the vertices of each of the groom's strands lie on it as modelled: shares of its length, from 0 to 1."""
+def curves_at(stage: Usd.Stage, prim: str) -> UsdGeom.BasisCurves:
+    """The groom of a stage; ends where it has none there."""
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
+    if not curves:
+        file = stage.GetRootLayer().GetDisplayName()
+        sys.exit(f"{file}: has no curves {prim}; FOLDER and BAKED must both be made of SHOT")
+    return curves
+
+
+def shares(curves: UsdGeom.BasisCurves) -> list[np.ndarray]:
+    """Where the vertices of each of the groom's strands lie on it as modelled: shares of its length, from 0 to 1."""
     ends = np.cumsum(curves.GetCurveVertexCountsAttr().Get())[:-1]
     strands = np.split(np.array(curves.GetPointsAttr().Get(), dtype=float), ends)
     lengths = [np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))) for points in strands]
@@ -182,9 +191,9 @@ def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float
     files = json.loads((folder / "description.json").read_text("utf-8"))["grooms"]["files"]
     stage, result, found = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), []
     for name, facts in files.items():
+        at, curves = shares(curves_at(stage, facts["prim"])), curves_at(result, facts["prim"])
         runtime, motion = Runtime(folder, name, material), Motion(stage, joints_of(facts))
         boundary = runtime.model["boundary"]
-        curves, at = UsdGeom.BasisCurves(result.GetPrimAtPath(facts["prim"])), shares(stage, facts["prim"])
         for code in curves.GetPointsAttr().GetTimeSamples():
             now = code / stage.GetTimeCodesPerSecond()
             places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
