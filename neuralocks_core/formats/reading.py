@@ -23,6 +23,10 @@ LARGEST_FILE = 4 * 2**30
 
 SCALP = 0.16
 """Width of a narrow scalp [m]."""
+NARROW, WIDE = 0.1, 0.3
+"""Widths [m] below and above which a scalp is told to be none of a person's: the hair may be a part of a head's, or have
+another unit than was taken.
+"""
 
 WIDEST = 0.005
 """A hair wider than this [m] says that the file's thickness is in another unit than its points."""
@@ -159,13 +163,17 @@ def _likely_unit(extent: float, units=(1.0, 0.01, 0.001)) -> float:
 
 
 def _taken(scalp: float, unit: float) -> str:
-    """Which unit was taken and how wide it makes the scalp; and how wide inches would, where that suits a narrow one better."""
+    """Which unit was taken and how wide it makes the scalp, whether that is odd, and how wide inches would, where they suit a
+    narrow one better.
+    """
     inch = UNITS["in"]
     if scalp <= 0:
         return f"took 1 {_name(unit)}, which suits hair"
-    told = f"took 1 {_name(unit)}, by which the scalp is {100 * scalp * unit:.3g} cm wide"
-    narrow = unit < inch and _likely_unit(scalp, (unit, inch)) == inch
-    return f"{told}, narrow; in inches {100 * scalp * inch:.3g} cm" if narrow else told
+    width = scalp * unit
+    odd = ", narrow" if width < NARROW else ", more than a head" if width > WIDE else ""
+    told = f"took 1 {_name(unit)}, by which the scalp is {100 * width:.3g} cm wide{odd}"
+    inches = unit < inch and _likely_unit(scalp, (unit, inch)) == inch
+    return f"{told}; in inches {100 * scalp * inch:.3g} cm" if inches else told
 
 
 def _name(unit: float) -> str:

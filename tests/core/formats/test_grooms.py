@@ -92,7 +92,8 @@ def test_hair_that_its_formats_unit_makes_too_large_is_told(folder, unit, words)
     [
         (0.01, "took 1 cm, by which the scalp is 17 cm wide; --unit"),
         (0.0254, "took 1 cm, by which the scalp is 6.69 cm wide, narrow; in inches 17 cm; --unit"),
-        (0.3048, "took 1 m, by which the scalp is 55.8 cm wide; --unit"),
+        (0.003, "took 1 mm, by which the scalp is 5.67 cm wide, narrow; --unit"),
+        (0.3048, "took 1 m, by which the scalp is 55.8 cm wide, more than a head; --unit"),
         (0.1, "took 1 cm, by which the scalp is 1.7 cm wide, narrow; in inches 4.32 cm; --unit"),
     ],
 )
