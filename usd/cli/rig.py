@@ -71,6 +71,7 @@ def train(
             skeleton=skeleton,
             joints=pairs(joint, "--joint"),
             command=shlex.join(["neuralocks", *sys.argv[1:]]),
+            early=True,
             tell=note,
             progress=progress,
         )

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
 from neuralocks_core.progress import Progress
@@ -31,6 +32,7 @@ def train_rig(
     skeleton: str | None = None,
     joints: dict[str, str] | None = None,
     command: str = "",
+    early: bool = False,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ):
@@ -46,6 +48,7 @@ def train_rig(
         material: fields of `rig.rods.RigMaterial`.
         chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
+        early: write the model before its report is measured, too, which takes minutes: who stops that has the model.
         tell: called with notes for the user before the training, whose minutes some of them would save.
         progress: called with (done, total, message).
 
@@ -78,16 +81,34 @@ def train_rig(
     else:
         from neuralocks_core.training.rig.static import train_static as train
     chosen = {name: value for name, value in options.items() if value is not None}
-    model = train(hair.rig, values, seed=seed, progress=progress, **chosen)
-    if command:
-        model.training["command"] = command
-    model.training["character"] = character.name
-    who = hair.source.character
-    read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
-    model.training["facing"] = round(who.facing_angle, 3)
-    model.training["reads"] = {name: leaf(path) for name, path in read.items()}
-    model.save(out)
+    written = False
+
+    def write(model) -> None:
+        nonlocal written
+        model.training.update(_card(hair.source.character, model, character.name))
+        if command:
+            model.training["command"] = command
+        model.save(out)
+        written = True
+
+    try:
+        model = train(hair.rig, values, seed=seed, keep=write if early else None, progress=progress, **chosen)
+    except KeyboardInterrupt:
+        if written and tell:
+            tell([f"{out}: is written, without the report that was being measured"])
+        raise
+    write(model)
     return model
+
+
+def _card(who: Character, model, name: str) -> dict:
+    """What the model's card tells of the character that it was trained for."""
+    read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
+    return {
+        "character": name,
+        "facing": round(who.facing_angle, 3),
+        "reads": {name: leaf(path) for name, path in read.items()},
+    }
 
 
 def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:

@@ -6,6 +6,7 @@ after the same history.
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -58,6 +59,7 @@ def train_dynamic(
     clip_seconds: float = 4.0,
     batch: int = 256,
     report_poses: int = 1000,
+    keep: Callable[[RigModel], None] | None = None,
     progress: Progress | None = None,
 ) -> RigModel:
     """Train the dynamic network of one rig.
@@ -72,6 +74,7 @@ def train_dynamic(
         clip_seconds: length of each [s].
         batch: pairs of consecutive samples a step.
         report_poses: held-out poses of the report, which also compares with spring bones in motion; 0 leaves it out.
+        keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
     """
     torch.manual_seed(seed)
@@ -124,6 +127,8 @@ def train_dynamic(
         "material": asdict(material),
     }
     model = net.model(rig.chains, training)
+    if keep:
+        keep(model)
     if report_poses:
         middle = (learned + 1000) // 2
         held_poses, in_motion = within(say, learned, middle), within(say, middle, 1000)

@@ -4,6 +4,7 @@ section 4.4).
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -42,6 +43,7 @@ def train_static(
     seed: int = 0,
     batch: int = 32,
     report_poses: int = 1000,
+    keep: Callable[[RigModel], None] | None = None,
     progress: Progress | None = None,
 ) -> RigModel:
     """Train the quasi-static network of one rig.
@@ -54,6 +56,7 @@ def train_static(
         seed: decides poses and first weights.
         batch: poses a step.
         report_poses: held-out poses of the report; 0 leaves it out.
+        keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
     """
     torch.manual_seed(seed)
@@ -83,6 +86,8 @@ def train_static(
         "material": asdict(material),
     }
     model = net.model(rig.chains, training)
+    if keep:
+        keep(model)
     if report_poses:
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000)))
     return model

@@ -6,8 +6,11 @@ import sys
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig import RigModel
 from usd.models.train import train
 from usd.rig.train import train_rig
+
+from ..rig_shots import small_shot
 
 
 @pytest.mark.parametrize("package", ["torch", "onnx", "warp"])
@@ -39,3 +42,23 @@ def test_numbers_that_no_training_can_use_are_refused(tmp_path, given, said):
     with pytest.raises(NeuralocksError) as caught:
         train_rig(tmp_path / "none.usda", tmp_path / "m.neuralocks", **given)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("early", [True, False])
+@pytest.mark.parametrize("kind", ["static", "dynamic"])
+def test_who_stops_while_the_report_is_measured_keeps_the_model(tmp_path, monkeypatch, kind, early):
+    """It takes minutes, and what it measures is learned by then. A button that cancels leaves nothing."""
+    pytest.importorskip("torch")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"neuralocks_core.training.rig.{kind}.static_report", stop)
+    out, told, dynamic = tmp_path / "m.neuralocks", [], kind == "dynamic"
+    small = {"steps": 2, "hidden": 4, "early": early, "command": "made so", "clips": 2 if dynamic else None}
+    with pytest.raises(KeyboardInterrupt):
+        train_rig(small_shot(tmp_path / "who.usda"), out, dynamic=dynamic, tell=told.extend, **small)
+    assert out.exists() == early == any("is written, without the report" in note for note in told)
+    if early:
+        kept = RigModel.load(out)
+        assert kept.training["command"] == "made so" and kept.training["character"] == "who.usda" and not kept.report
