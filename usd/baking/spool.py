@@ -40,7 +40,7 @@ class Spool:
     def __init__(self, out: Path, fingerprint: str):
         self.out = out
         self._sure: set[Path] = set()  # frames written or looked through by this process
-        self.folder = out.parent / f".{out.name}.baking"
+        self.folder = _folder(out)
         try:
             self._made = make_way(out)
         except OSError as error:
@@ -113,7 +113,7 @@ class Spool:
 
     def close(self) -> None:
         """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
-        if any(self.folder.glob("*.frame")):
+        if kept(self.out):
             self._lock.release()
         else:
             self.discard()
@@ -134,6 +134,15 @@ class Spool:
 
     def _path(self, groom: int, time_code: float) -> Path:
         return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+
+
+def kept(out: Path) -> int:
+    """How many finished frames of an interrupted bake lie beside its output, counted for each groom or batch."""
+    return sum(1 for _ in _folder(out).glob("*.frame"))
+
+
+def _folder(out: Path) -> Path:
+    return out.parent / f".{out.name}.baking"
 
 
 def _is_file(path: Path) -> bool:

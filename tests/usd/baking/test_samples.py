@@ -65,6 +65,19 @@ def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "bake.usdc"}
 
 
+def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
+    shot, out = write_shot(tmp_path, Recipe(frames=40, strands=2000, vertices=16)), tmp_path / "bake.usdc"
+    command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while len(list(tmp_path.glob(".bake.usdc.baking/*.frame"))) < 3 and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate()[1]
+    assert process.returncode == 130 and not out.exists(), "the bake was over before it could be stopped"
+    done = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
+    assert said.endswith(f"note: the same command goes on from here, with {done} frames done\nstopped\n")
+
+
 def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model):
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
 
