@@ -23,7 +23,7 @@ from .carrying import carried_by, carrying_joint, head_by_name, joint_shares, sp
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
-from .seat_notes import lies_off_skin, not_pinned, upside_down
+from .seat_notes import astray, lies_off_skin, not_pinned, upside_down
 
 ON_HEAD = 0.3
 """Roots no farther than this, and than half the trunk is long, from a head are on it, whatever else is there [m]."""
@@ -82,7 +82,7 @@ def attach(
     if rig is not None:
         to_bind = rig.to_bind @ geom_bind(prim)
         joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
-        notes += turned or spread_over(rig, path, joint, shares)
+        notes += turned or [*astray(prim, rig, to_bind), *spread_over(rig, path, joint, shares)]
         found = Attachment(
             rig=rig,
             character=carried_by(rig, joint),

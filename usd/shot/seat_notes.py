@@ -14,6 +14,8 @@ from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends
 
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
+ASTRAY = 0.3
+"""Bound hair farther from skin than this [m], on a person, is not where its author has put it: hats and wigs are nearer."""
 LEVEL = 0.001
 """Points nearer to skin than this [m] are all alike: skins are only as smooth as their triangles."""
 
@@ -27,6 +29,19 @@ def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[s
         f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {rig.path}"
         f"{rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
         "check that it was made for this pose"
+    ]
+
+
+def astray(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:
+    """The note on hair whose own binding puts it far from the skin, as a wrong unit or bind transform does."""
+    if not rig.skins:
+        return []
+    far = off_skin(some_ends(prim), rig, to_bind)
+    if far <= ASTRAY * rig.character.times_human:
+        return []
+    return [
+        f"{prim.GetPath()}: its skel binding puts its roots {far:.2g} m from the skin of {rig.path}; "
+        "check its unit and primvars:skel:geomBindTransform"
     ]
 
 

@@ -80,3 +80,18 @@ def test_skin_without_faces_tells_nothing_of_short_strands(tmp_path):
     mesh.GetFaceVertexIndicesAttr().Set([])
     stage.Save()
     assert not _from_to(path, (CENTRE, RADIUS), (CENTRE, RADIUS + 0.01), turned=True)
+
+
+def test_bound_hair_far_from_the_skin_is_told(tmp_path):
+    """A wrong unit or bind transform: the joint is right, so nothing else shows that it moves about a point beside the body."""
+    path = write_shot(tmp_path, Recipe(bound="own"))
+    assert not any("geomBindTransform" in note for note in read_shot(path).notes)
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    points.Set(Vt.Vec3fArray.FromNumpy(np.array(points.Get()) + np.float32([5, 0, 0])))
+    stage.Save()
+    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+        told = [note for note in notes if "geomBindTransform" in note]
+        assert len(told) == 1 and told[0].startswith(
+            "/Hero/Hair: its skel binding puts its roots 4.8 m from the skin of"
+        )
