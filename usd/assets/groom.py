@@ -17,7 +17,7 @@ from neuralocks_core.strands.strand_set import root_uv
 from ..border.arrays import floats, integers, row_matrix
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.stage_files import LAYERS, check_not_input, open_stage, write_stage
+from ..border.stage_files import LAYERS, OTHERS, check_not_input, open_stage, write_stage
 from ..border.units import Border
 from ..shot.curves import find_curves, read_groom
 from ..shot.notes import few
@@ -60,7 +60,7 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
         NeuralocksError: the source cannot be read or the target not be written.
     """
     source, out = as_path(source, "source"), as_path(out, "out")
-    if source.suffix.lower() in USD:
+    if source.suffix.lower() in (*USD, *OTHERS):
         found, notes = _read_usd(source, out, unit, up)
     else:
         from neuralocks_core import formats

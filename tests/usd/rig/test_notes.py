@@ -9,6 +9,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
+from usd.assets.groom import import_groom
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.stage import chain_notes, check_patterns, read_rigged_hair, rigged_notes
@@ -170,7 +171,7 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
 def test_a_character_in_another_format_is_told_the_way_to_usd(tmp_path, ending, how):
     path = tmp_path / f"who.{ending}"
     path.write_bytes(b"anything")
-    for use in (read_rigged_hair, inspect):
+    for use in (read_rigged_hair, inspect, lambda path: import_groom(path, tmp_path / "groom.usda")):
         with pytest.raises(NeuralocksError, match=f"who.{ending}: not a readable USD file .*; {how}"):
             use(path)
 
