@@ -30,7 +30,7 @@ import numpy as np
 from real_grooms import on_head
 
 from neuralocks_core import metrics
-from neuralocks_core.animation.random_motion import KINDS, WILD, scripted_clip
+from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, scripted_clip
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
@@ -133,7 +133,9 @@ def main() -> None:
     parser.add_argument("--static", help="a model trained without history, with the same budget")
     parser.add_argument("--character", default=CHARACTER, help="examples/shot/body.usdc if left out")
     parser.add_argument("--style", action="append")
-    parser.add_argument("--kind", action="append", choices=(*KINDS, *WILD), help="all but spin and tumble if left out")
+    parser.add_argument(
+        "--kind", action="append", choices=(*KINDS, *WILD, *FOREIGN), help="all but spin, tumble and bang if left out"
+    )
     parser.add_argument("--motion", action="append", default=[], help="BVH or USD clips in place of the scripted ones")
     parser.add_argument("--seconds", type=float, default=8.0, help="of each file")
     parser.add_argument("--groom", action="append", default=[], help="hair files in place of grown hair")

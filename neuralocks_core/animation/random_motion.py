@@ -17,6 +17,8 @@ from neuralocks_core.motion import Clip, G
 KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
 WILD = ("spin", "tumble")
 """Rarer and farther from standing: dancing and falling, which models learn but are not judged by unless asked."""
+FOREIGN = ("bang",)
+"""Headbanging, which no random clip shows: how a model answers to motion unlike what it learned."""
 REST = 0.3
 """[s] A random clip begins still, so that hair at rest is its true beginning."""
 
@@ -53,7 +55,7 @@ def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: f
     """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
 
     Raises:
-        NeuralocksError: the kind is none of KINDS or WILD.
+        NeuralocksError: the kind is none of KINDS, WILD or FOREIGN.
     """
     if kind not in _GESTURES:
         raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(_GESTURES)}")
@@ -232,6 +234,16 @@ def _tumble(puppet: Puppet, dice: _Dice) -> None:
     puppet.turn_about(dice.between(0.0, 1.4), curve[:, None] * dice.direction() * angle)
 
 
+def _bang(puppet: Puppet, dice: _Dice) -> None:
+    """The bent head is thrown down and up over and over, by trunk and neck."""
+    times, start = puppet.times, dice.start(0.3)
+    rate, beats, size = dice.between(0.8, 2.2), dice.between(3, 8), dice.between(0.25, 0.7)
+    bent = pulse(times, start, 0.5, max(0.0, beats / rate - 1.0), 0.5)[:, None] * SIDE
+    beat = swing(times, start, beats, rate)[:, None] * SIDE
+    puppet.turn_neck(size * beat + dice.between(-0.1, 0.4) * bent)
+    puppet.bend_spine(dice.between(0.0, 0.5) * size * beat + dice.between(0.0, 0.9) * bent)
+
+
 _GESTURES = {
     "shake": _shake,
     "turn": _turn,
@@ -246,4 +258,5 @@ _GESTURES = {
     "hold": _hold,
     "spin": _spin,
     "tumble": _tumble,
+    "bang": _bang,
 }

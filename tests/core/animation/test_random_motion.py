@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.animation.random_motion import KINDS, random_clip, scripted_clip
+from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, random_clip, scripted_clip
 from tests.core.rigs import HEAD, person
 
 TURNS = {"shake": 12, "turn": 12, "nod": 12, "bow": 30, "tilt": 12, "hold": 12}
@@ -71,3 +71,12 @@ def test_a_tumble_lays_the_body_down_about_a_point_that_stays():
     pivot = 0.55 * 1.4
     at = root[:, :3, 3] + pivot * root[:, :3, 1]
     assert np.ptp(at, axis=0).max() < 1e-9
+
+
+def test_headbanging_is_hard_and_no_random_clip_learns_from_it():
+    clip = scripted_clip(person(), "bang")
+    pitch = np.arcsin(-clip.joints[:, HEAD, 1, 2])
+    beats = np.sum((np.diff(np.sign(np.diff(pitch))) < 0) & (pitch[1:-1] > 0.5))
+    assert np.ptp(pitch) > 1.0 and 4 <= beats <= 7
+    assert 5.0 < acceleration(clip).max() < 60.0  # below the 6 g beyond which a model sees no more
+    assert not set(FOREIGN) & {*KINDS, *WILD}
