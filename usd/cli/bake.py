@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks bake`, `neuralocks join` and `neuralocks simulate`."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..border.stopping import stopped
-from .command import counted, note, print_json
+from .command import counted, note, noting_when_stopped, print_json
 from .options import (
     AsJson,
     Cuts,
@@ -59,7 +56,7 @@ def bake_command(
     from ..baking.bake import bake
     from .progress import progress_bar
 
-    with _telling_how_to_go_on(out), progress_bar("baking") as progress:
+    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("baking") as progress:
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
@@ -116,7 +113,7 @@ def simulate_command(
     from ..baking.simulate import simulate
     from .progress import progress_bar
 
-    with _telling_how_to_go_on(out), progress_bar("simulating") as progress:
+    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("simulating") as progress:
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,
@@ -125,18 +122,12 @@ def simulate_command(
     _bake_report(result, as_json)
 
 
-@contextmanager
-def _telling_how_to_go_on(out: Path) -> Iterator[None]:
-    """After Ctrl-C: nobody would look for frames in a folder whose name is hidden."""
-    try:
-        yield
-    except BaseException:
-        if stopped():
-            from ..baking.spool import kept
+def _how_to_go_on(out: Path) -> list[str]:
+    """Nobody would look for frames in a folder whose name is hidden."""
+    from ..baking.spool import kept
 
-            if frames := kept(out):
-                note([f"the same command goes on from here, with {counted(frames, 'frame')} done"])
-        raise
+    frames = kept(out)
+    return [f"the same command goes on from here, with {counted(frames, 'frame')} done"] if frames else []
 
 
 def _bake_report(result, as_json: bool) -> None:

@@ -7,6 +7,8 @@ import inspect
 import json
 import os
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import typer
@@ -14,7 +16,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.json_values import plain
 
-from ..border.stopping import deferred, stoppable
+from ..border.stopping import deferred, stoppable, stopped
 
 
 def command_of(app: typer.Typer):
@@ -107,6 +109,17 @@ def note(notes) -> None:
     """Print what a user should know."""
     for text in notes:
         one_line(f"note: {text}")
+
+
+@contextmanager
+def noting_when_stopped(notes: Callable[[], list[str]]) -> Iterator[None]:
+    """In this block, Ctrl-C also prints what a user should know of the work that is left."""
+    try:
+        yield
+    except BaseException:
+        if stopped():
+            note(notes())
+        raise
 
 
 def counted(number: int, thing: str) -> str:

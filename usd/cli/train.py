@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks train`."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +8,7 @@ import typer
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..border.stopping import stopped
-from .command import note
+from .command import note, noting_when_stopped
 from .options import Head, Joints, Out, Seed, Skeleton, pairs
 
 SEVERAL = ("--groom", "--motion")
@@ -84,7 +81,7 @@ def train_command(
     from .progress import progress_bar
 
     settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
-    with _telling_how_to_go_on(out), progress_bar("training") as progress:
+    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, rollouts=rollouts, processes=processes,
@@ -93,16 +90,12 @@ def train_command(
     typer.echo(str(path))
 
 
-@contextmanager
-def _telling_how_to_go_on(out: Path) -> Iterator[None]:
-    """After Ctrl-C: what a training has kept is thrown away by one that begins anew."""
-    try:
-        yield
-    except BaseException:
-        if stopped():
-            from neuralocks_core.training.work import work_folder
+def _how_to_go_on(out: Path) -> list[str]:
+    """What a training has kept is thrown away by one that begins anew."""
+    from neuralocks_core.training.work import work_folder
 
-            with suppress(NeuralocksError):  # nothing kept yet
-                work_folder(out, resume=True)
-                note(["the same command with --resume goes on from here, without it it begins anew"])
-        raise
+    try:
+        work_folder(out, resume=True)
+    except NeuralocksError:  # nothing kept yet
+        return []
+    return ["the same command with --resume goes on from here, without it it begins anew"]
