@@ -15,6 +15,7 @@ from neuralocks_core.hairstyles.scalp import Scalp, from_head
 from neuralocks_core.hairstyles.shaping import shaped
 from neuralocks_core.hairstyles.style import Style
 from neuralocks_core.hairstyles.variation import Variation
+from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.strands.strand_set import root_uv
 
 STYLES = {**loose.STYLES, **tied.STYLES}
@@ -24,6 +25,8 @@ MOST_STRANDS = 150_000
 
 __all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "from_head", "grow"]
 
+_ROOTS, _AXES = 80, 430
+"""Thousandths of the work of many strands after which their roots are placed, and their axes grown."""
 _ROOT_WIDTH, _TIP_WIDTH = 9e-5, 5e-5  # [m], real hair
 
 
@@ -34,6 +37,7 @@ def grow(
     seed: int = 0,
     body: tuple[np.ndarray, np.ndarray] | Obstacle | None = None,
     variation: int = 0,
+    progress: Progress | None = None,
 ) -> Groom:
     """Grow a hairstyle.
 
@@ -45,6 +49,7 @@ def grow(
         body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made of them,
             which is worth keeping for several styles; without one, a usual head, neck and shoulders.
         variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
+        progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: an unknown style, no scalp, a strand count out of range, or a variation below 0.
@@ -63,11 +68,14 @@ def grow(
     chosen, varied = STYLES[style], Variation.numbered(variation, style) if variation else None
     if varied:
         chosen = chosen.varied(varied)
+    say = progress or silent
+    say(0, 1000, "placing roots")
     site = _site(chosen, scalp, count, random, size)
+    say(_ROOTS, 1000, "growing")
     axis = chosen.axis(site, scalp, obstacle)
     if varied:
         axis = varied.trimmed(axis, site)
-    points = shaped(axis, site, chosen.shape, obstacle, size)
+    points = shaped(axis, site, chosen.shape, obstacle, size, within(say, _AXES, 1000))
     if varied:
         points = varied.pressed(points, obstacle, size)
     if chosen.shape.vertices == STEPS:

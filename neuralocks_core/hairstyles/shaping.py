@@ -9,6 +9,7 @@ import numpy as np
 
 from neuralocks_core.hairstyles.growth import CHUNK, Site, at_vertices, smooth
 from neuralocks_core.hairstyles.obstacle import Obstacle
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rotation import unit
 
 
@@ -38,7 +39,9 @@ class Shape:
     """How far single strands stray."""
 
 
-def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size: float) -> np.ndarray:
+def shaped(
+    axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size: float, progress: Progress = silent
+) -> np.ndarray:
     """(S, shape.vertices, 3) float32 [m]: strands grown along `axis` (S, K, 3), their roots unmoved.
 
     Args:
@@ -47,10 +50,12 @@ def shaped(axis: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size:
         shape: what to do.
         obstacle: what they keep out of.
         size: head radius in units of 0.1 m.
+        progress: called with (done, total, message).
     """
     gathered = _clumped(axis, site, shape.clumping, size)
     points = np.empty((len(axis), shape.vertices, 3), np.float32)
     for start in range(0, len(axis), CHUNK):
+        progress(start, len(axis), "shaping")
         part = slice(start, start + CHUNK)
         points[part] = _swung(gathered[part], site.rows(part), shape, obstacle, size)
     points[:, 0] = axis[:, 0]

@@ -14,11 +14,15 @@ from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
+from neuralocks_core.progress import Progress, silent, within
 
 from ..border.stage_files import check_not_input
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from .groom import write_groom
+
+_SEEN, _GROWN = 120, 930
+"""Thousandths of the work of many strands after which the head is looked at, and the hair grown."""
 
 
 def grow(
@@ -32,6 +36,7 @@ def grow(
     skeleton: str | None = None,
     head: str | None = None,
     tell: Callable[[list[str]], None] | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Grow a hairstyle on the head of a USD character and write it as a USD groom, in the unit and axis of its file.
 
@@ -44,6 +49,7 @@ def grow(
         variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
         skeleton, head: as for `bake`.
         tell: called with notes for the user.
+        progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
@@ -54,7 +60,11 @@ def grow(
     check_not_input(out, rig.source.prim.GetStage())
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
-    return write_groom(out, Barber(rig.character).grow(style, count, seed, variation), rig.border)
+    say = progress or silent
+    say(0, 1000, "looking at the head")
+    groom = Barber(rig.character).grow(style, count, seed, variation, within(say, _SEEN, _GROWN))
+    say(_GROWN, 1000, f"writing {out.name}")
+    return write_groom(out, groom, rig.border)
 
 
 class Barber:
@@ -65,9 +75,9 @@ class Barber:
             raise NeuralocksError("character: hair needs a head to grow on; give a character with skin, or a groom")
         self.character = character
 
-    def grow(self, style: str, count: int, seed: int, variation: int = 0) -> Groom:
+    def grow(self, style: str, count: int, seed: int, variation: int = 0, progress: Progress | None = None) -> Groom:
         """A groom in bind-world metres."""
-        groom = grow_style(style, self._scalp, count, seed, self._obstacle, variation)
+        groom = grow_style(style, self._scalp, count, seed, self._obstacle, variation, progress)
         return replace(groom, points=(groom.points @ self.character.facing).astype(np.float32))
 
     @cached_property

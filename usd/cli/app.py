@@ -238,10 +238,14 @@ def grow_command(
 ) -> None:
     """Grow a hairstyle on a character and write it as a USD groom."""
     from ..assets.grow import grow
+    from .progress import progress_bar
 
-    typer.echo(
-        str(grow(style, character, out, count, seed, variation=variation, skeleton=skeleton, head=head, tell=note))
-    )
+    with progress_bar("growing") as progress:
+        path = grow(
+            style, character, out, count, seed,
+            variation=variation, skeleton=skeleton, head=head, tell=note, progress=progress,
+        )  # fmt: skip
+    typer.echo(str(path))
 
 
 @command("demo")
