@@ -10,17 +10,20 @@ _BLOCK = 1 << 16
 """Words whose sum is taken at a time: half a megabyte stays in a core's cache."""
 
 
-def write_frame(path: Path, points: np.ndarray) -> None:
-    """Write points (P, 3) at once under the final name. Raises OSError."""
+def write_frame(path: Path, points: np.ndarray, spare: Path | None = None) -> None:
+    """Write points (P, 3) at once under the final name, over a spare file where one is given. Raises OSError."""
     numbers = np.ascontiguousarray(points, np.float32).reshape(-1)
     even = len(numbers) // 2 * 2
     odd = np.zeros(2 * (len(numbers) - even), np.float32)
     odd[:1] = numbers[even:]
     total = sum(int(part.view(np.uint64).sum()) for part in (numbers[:even], odd))
     part = path.with_suffix(".part")
-    with open(part, "wb") as file:
+    if spare is not None:
+        os.replace(spare, part)
+    with open(part, "wb" if spare is None else "r+b") as file:
         for data in (numbers[:even], odd, _checksum(total)):
             file.write(data.data)
+        file.truncate()
     os.replace(part, path)
 
 

@@ -23,7 +23,7 @@ from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
 from .header import relative, repeat_metadata
 from .override import deliver
-from .sample_layer import Lagging, SampleLayer
+from .sample_layer import SampleLayer, in_order
 from .spool import Spool, fingerprint
 
 
@@ -86,7 +86,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
             with named(out):
                 _copy_prim(prim, file.layer)
             if prim.path in plan:
-                for _ in _copy_samples(prim.path, plan[prim.path], file, Lagging(frame)):
+                for _ in _copy_samples(prim.path, plan[prim.path], file, frame):
                     done += 1
                     say(done, total, str(prim.path))
         file.close()
@@ -226,25 +226,19 @@ def _copy_info(source: Sdf.Spec, target: Sdf.Spec, without=()) -> None:
             target.SetInfo(name, source.GetInfo(name))
 
 
-def _copy_samples(groom: Sdf.Path, sources: dict[float, _Part], file: SampleLayer, order: Lagging) -> Iterator[float]:
-    """Samples of a groom, which yield their time codes as they are copied."""
-
+def _copy_samples(groom: Sdf.Path, sources: dict[float, _Part], file: SampleLayer, frame: float) -> Iterator[float]:
+    """Samples of a groom; yields the time codes of the points as they are copied."""
     code, part = next(iter(sources.items()))
     count = len(part.value(groom, code, "points"))
     counts = {"extent": 2, "points": count, "velocities": count}
-
-    def put(code: float, *names: str) -> None:
+    for name, code in in_order(list(sources), frame, part.samples_of(groom, "velocities")):
         part = sources[code]
-        there = [name for name in names if part.samples_of(groom, name)]
-        file.put(groom, code, {name: part.value(groom, code, name, counts[name]) for name in there})
-
-    for code in sources:
-        put(code, "extent", "points")
-        for late in order.after(code):
-            put(late, "velocities")
-        yield code
-    for late in order.rest():
-        put(late, "velocities")
+        names = [
+            other for other in (["extent", "points"] if name == "points" else [name]) if part.samples_of(groom, other)
+        ]
+        file.put(groom, code, {other: part.value(groom, code, other, counts[other]) for other in names})
+        if name == "points":
+            yield code
 
 
 def _below(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:

@@ -25,22 +25,23 @@ from .spool import Spool
 
 
 class OverrideWriter:
-    """Writes samples, in the order they come, to a new crate file.
+    """Writes samples, in the order they come, to a crate file.
 
     What the file holds depends on nothing but the shot and the samples: no date, no machine, no timing.
 
     Args:
-        part: file to write now.
+        file: to write to.
         out: its final name, to which the shot's path is relative.
         shot: what is overridden.
         codes: all time codes of the bake.
     """
 
-    def __init__(self, part: Path, out: Path, shot: Shot, codes: list[float]):
-        self._file = SampleLayer(part, out)
+    def __init__(self, file: SampleLayer, out: Path, shot: Shot, codes: list[float]):
+        self._file = file
         self._reach: dict[Sdf.Path, np.float32] = {}  # how far hair reaches beyond its points, in the prim's own units
-        with named(out):
-            write_header(self._file.layer, shot.stage, shot.border, shot.path, out, codes)
+        if not file.saved:
+            with named(out):
+                write_header(file.layer, shot.stage, shot.border, shot.path, out, codes)
 
     def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
         """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
@@ -48,6 +49,8 @@ class OverrideWriter:
         self._reach[path] = max(
             np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
         )
+        if layer.GetAttributeAtPath(path.AppendProperty("points")):
+            return  # by the bake that this one goes on with
         over = over_prim(layer, item.prim)
         record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
         if item.attachment.skinned:

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new crate file that is written sample by sample: its memory does not grow with their number."""
+"""A crate file that is written sample by sample: its memory does not grow with their number."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from pxr import Sdf, Vt
 
+from neuralocks_core.files import cannot_write
+
 from ..border.damage import named
+from .save_log import SaveLog
 
 SAVE_EVERY = 32 << 20
 """Bytes of samples held before they are saved."""
@@ -14,60 +19,80 @@ SAVE_EVERY = 32 << 20
 class SampleLayer:
     """A layer with time samples of arrays of vectors, which are saved now and then.
 
+    When depends on nothing but the samples: so a file is the same, whether it was written at once or gone on with.
+
     Args:
         part: file to write now.
         out: its final name, which errors tell.
+        log: of the file, which makes it one to go on with; none if left out.
+        puts: how many samples are in it already; 0 writes a new file.
 
     Attributes:
         layer: for all that is no sample.
+        saved: how many samples are in the file and its log.
     """
 
-    def __init__(self, part: Path, out: Path):
-        self._out = out
-        part.unlink(missing_ok=True)
-        with named(out):
+    def __init__(self, part: Path, out: Path, log: SaveLog | None = None, puts: int = 0):
+        self._part, self._out, self._log, self._puts = part, out, log, puts
+        self.saved, self._held = puts, 0
+        with self._named():
+            if puts:
+                self.layer = Sdf.Layer.FindOrOpen(str(part))
+                return
+            part.unlink(missing_ok=True)
             self.layer = Sdf.Layer.CreateNew(str(part), {"format": "usdc"})
-        self._held = 0
+            if log is not None:
+                log.begin()
 
     def put(self, prim: Sdf.Path, time_code: float, values: dict[str, Vt.Vec3fArray]) -> None:
         """Add a time sample to each of some attributes of a prim."""
-        with named(self._out):
+        with self._named():
             for name, array in values.items():
                 self.layer.SetTimeSample(prim.AppendProperty(name), float(time_code), array)
                 self._held += 12 * len(array)
+            self._puts += 1
             if self._held >= SAVE_EVERY:
                 self._save()
 
     def close(self) -> None:
         """Write what is held."""
-        with named(self._out):
+        with self._named():
             self._save()
         self.layer = None
 
     def _save(self) -> None:
         self.layer.Save()
-        self._held = 0
+        if self._log is not None:
+            self._log.add(self._part, self._puts)
+        self.saved, self._held = self._puts, 0
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            with named(self._out):
+                yield
+        except OSError as error:
+            raise cannot_write(self._out, error) from None
 
 
-class Lagging:
+def in_order(codes: Sequence[float], frame: float, velocities: bool = True) -> Iterator[tuple[str, float]]:
     """The order in which a groom's samples come: the velocity of a time code after the points of the two frames that
-    follow it and are written, which it is made of where they are computed at all.
+    follow it, which it is made of where they are computed at all.
 
     A file is thus the same whether it was baked at once or joined of parts.
 
     Args:
+        codes: ascending time codes.
         frame: time codes from one frame to the next.
+        velocities: whether there are any.
+
+    Yields:
+        "points" or "velocities", and the time code.
     """
-
-    def __init__(self, frame: float):
-        self._lag, self._waiting = 2 * frame - 1e-6, []
-
-    def after(self, code: float) -> list[float]:
-        """Whose velocities come now that the points of `code`, later than any before, are written."""
-        due = [c for c in self._waiting if c + self._lag <= code]
-        self._waiting = [*self._waiting[len(due) :], code]
-        return due
-
-    def rest(self) -> list[float]:
-        """Whose velocities come last."""
-        return self._waiting
+    waiting = list(codes) if velocities else []
+    for code in codes:
+        yield "points", code
+        while waiting and waiting[0] + 2 * frame - 1e-6 <= code:
+            yield "velocities", waiting.pop(0)
+    for code in waiting:
+        yield "velocities", code

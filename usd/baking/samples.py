@@ -5,8 +5,11 @@ Each sample is a pure function of the shot and its time code. So order, chunks, 
 the file.
 """
 
+import hashlib
 import math
 import shutil
+from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
@@ -22,9 +25,10 @@ from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
 from .override import OverrideWriter, deliver
-from .sample_layer import Lagging
+from .sample_layer import SAVE_EVERY, SampleLayer
 from .spool import Spool, fingerprint, program_files, unsaved_digest
 from .stencils import Stencils
+from .uses import Uses
 from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
@@ -95,23 +99,31 @@ def _carried(item: StageGroom) -> list:
 
 
 def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
-    writer = OverrideWriter(spool.layer_path, spool.out, shot, codes)
     plans = [[Stencils(item, codes, shot.first, velocities) for item in items] for items in batched]
-    needed = [sorted(set().union(*(plan.codes for plan in some))) for some in plans]
+    uses = Uses(plans)
+    there = spool.go_on(hashlib.sha256(repr(codes).encode()).hexdigest(), uses.spent)
+    file = SampleLayer(spool.layer_path, spool.out, spool.log, there)
+    writer = OverrideWriter(file, spool.out, shot, codes)
+    needed = [uses.codes(number) for number in range(len(plans))]
     # A frame of a batch is posed once, and written for each of its grooms.
-    total = sum((2 * len(items) - 1) * len(codes) for items, codes in zip(batched, needed, strict=True))
-    done, resumed = 0, 0
+    total = sum((2 * len(items) - 1) * len(some) for items, some in zip(batched, needed, strict=True))
+    done, resumed, begin = 0, 0, 0
+
+    def forget() -> None:
+        for frame in uses.used_up(file.saved):
+            spool.forget(*frame)
+
     say(0, total, "reading")
     with WriteBehind() as behind:
         for number, (items, some) in enumerate(zip(batched, plans, strict=True)):
-            ends = np.cumsum([0, *(item.point_count for item in items)])
-            stores = [
-                _Store(spool, writer, item, plan, number, int(first)) for item, plan, first in zip(items, some, ends)
-            ]
+            stores, first = [], 0
+            for item, plan in zip(items, some, strict=True):
+                stores.append(_Store(spool, writer, item, plan, number, first, max(0, there - begin)))
+                begin, first = begin + len(plan.puts), first + item.point_count
             behind.put(stores[0].open, velocities, facts)
             made = None
             for code in needed[number]:
-                if spool.holds(number, code, ends[-1]):
+                if uses.over(number, code, there) or spool.holds(number, code, first):
                     resumed += sum(code in plan.wanted for plan in some)
                 else:
                     if made is None:
@@ -119,12 +131,11 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
                         say(done, total, items[0].path)  # the time left is reckoned from here on
                     # At once: points that waited for it would lie in memory beside those of the next frame.
                     spool.write(number, code, made.points(code))
-                behind.put(stores[0].frame, code)
+                behind.put(stores[0].put, code, forget)
                 done += len(items)
                 say(done, total, items[0].path)
-            behind.put(stores[0].finish)
             for store in stores[1:]:
-                behind.put(store.whole, velocities, facts)
+                behind.put(store.whole, velocities, facts, forget)
                 done += len(needed[number])
                 say(done, total, store.item.path)
         behind.put(writer.close)
@@ -133,45 +144,46 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
 
 
 class _Store:
-    """Writes one groom's points frame by frame, and velocities once both sides are there.
+    """Writes one groom's samples as the frames that they are made of come.
 
     Args:
         spool, writer: from where, to where.
         item: the groom.
-        plan: which time codes.
+        plan: which samples.
         number: its batch.
         first: its first point among those of the batch.
+        there: how many samples need not be written.
     """
 
-    def __init__(self, spool: Spool, writer: OverrideWriter, item: StageGroom, plan: Stencils, number: int, first: int):
+    def __init__(
+        self,
+        spool: Spool,
+        writer: OverrideWriter,
+        item: StageGroom,
+        plan: Stencils,
+        number: int,
+        first: int,
+        there: int,
+    ):
         self._spool, self._writer, self.item, self._plan = spool, writer, item, plan
         self._number, self._first = number, first
-        self._order = Lagging(item.attachment.rig.border.frame)
+        self._left = deque(plan.puts[there:])
 
     def open(self, velocities: bool, facts: dict) -> None:
         """Before the first frame."""
         self._writer.groom(self.item, velocities, facts)
 
-    def whole(self, velocities: bool, facts: dict) -> None:
-        """All of it, where all points are in the spool."""
+    def put(self, code: float, done: Callable[[], None]) -> None:
+        """Write the samples that need no frame after `code`, which are in the spool; `done` is called after each."""
+        while self._left and max(self._left[0][2], default=code) <= code:
+            name, at, _ = self._left.popleft()
+            self._writer.sample(self.item, at, name, self._points(at) if name == "points" else self._velocities(at))
+            done()
+
+    def whole(self, velocities: bool, facts: dict, done: Callable[[], None]) -> None:
+        """All of it, where all frames are in the spool."""
         self.open(velocities, facts)
-        for code in self._plan.codes:
-            self.frame(code)
-        self.finish()
-
-    def frame(self, code: float) -> None:
-        """The next time code in the list, whose points are in the spool."""
-        if code in self._plan.wanted:
-            self._writer.sample(self.item, code, "points", self._points(code))
-            self._differences(self._order.after(code))
-
-    def finish(self) -> None:
-        """Write what waits for frames that are not among those wanted."""
-        self._differences(self._order.rest())
-
-    def _differences(self, codes: list[float]) -> None:
-        for code in codes if self._plan.velocities else ():
-            self._writer.sample(self.item, code, "velocities", self._velocities(code))
+        self.put(math.inf, done)
 
     def _rows(self) -> Iterator[slice]:
         first, end = self._first, self._first + self.item.point_count
@@ -201,13 +213,14 @@ class _Store:
 
 def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bool) -> None:
     """Refuse a bake for which the disk has no room, beside the frames that are there already, to go on from."""
-    size, left = 0.0, 0
-    for number, items in enumerate(batched):
-        points = sum(item.point_count for item in items)
-        frame = 12 * points
-        left += frame * sum(spool.seems_to_hold(number, code, points) for code in codes)
-        # Every frame's points twice, in the spool and in the layer, and its velocities in the layer.
-        size += 1.03 * frame * (2 + velocities) * len(codes)
+    size, left = 0.0, spool.size()
+    for items in batched:
+        frame = 12 * sum(item.point_count for item in items)
+        # Frames stay until a save, of what velocities are made of up to two frames later; or until another groom's turn.
+        near = 5 * items[0].attachment.rig.border.frame
+        waiting = SAVE_EVERY / frame + max(bisect_right(codes, code + near) - place for place, code in enumerate(codes))
+        kept = min(waiting, len(codes)) if len(items) == 1 else len(codes)
+        size += 1.03 * frame * ((1 + velocities) * len(codes) + kept)
     if size - left > (free := shutil.disk_usage(spool.folder).free):
         spool.close()
         raise NeuralocksError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished frames on disk beside the output, so that a killed bake goes on where it stopped."""
+"""Finished frames, and the layer that is made of them, on disk beside the output: a killed bake goes on where it stopped."""
 
 import hashlib
 import json
@@ -8,6 +8,7 @@ import re
 import shutil
 import stat
 import uuid
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,9 +19,13 @@ from neuralocks_core.files import cannot_write, make_way, remove_empty
 from neuralocks_core.lock_file import FolderLock
 
 from .frame_file import has_size, is_whole, read_rows, write_frame
+from .save_log import SaveLog, spent_frames
 
 _FRAME = r"\d+_-?0x[01](\.[0-9a-f]+)?p[+-]\d+\.frame"
-_PART = rf"{_FRAME[: -len('frame')]}part|[0-9a-f]{{32}}\.part.*"
+_SPARE = rf"{_FRAME[: -len('frame')]}part"
+_LAYER, _TEXT = (rf"[0-9a-f]{{32}}\.part\.{ending}" for ending in ("usdc", "usda"))
+_LOG, _INPUTS = "saves", "inputs"
+_KEPT, _STRAY = rf"{_FRAME}|{_LAYER}|{_LOG}|{_INPUTS}", rf"{_SPARE}|{_TEXT}|{_LOG}\.part"
 
 
 class Spool:
@@ -28,6 +33,7 @@ class Spool:
 
     Attributes:
         layer_path: where the output is assembled.
+        log: of that file, once `go_on` was called.
 
     Args:
         out: the output file.
@@ -40,6 +46,7 @@ class Spool:
     def __init__(self, out: Path, fingerprint: str):
         self.out = out
         self._sure: set[Path] = set()  # frames written or looked through by this process
+        self._spares: list[Path] = []
         self.folder = _folder(out)
         try:
             self._made = make_way(out)
@@ -57,23 +64,43 @@ class Spool:
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
 
     def _forget_others(self, fingerprint: bytes) -> None:
-        mark = self.folder / "inputs"
+        mark = self.folder / _INPUTS
         if not _is_file(mark) or mark.read_bytes() != fingerprint:
-            for old in self._named(_FRAME):
+            for old in self._named(_KEPT):
                 _remove(old)
-            _remove(mark)
             mark.write_bytes(fingerprint)
-        # A folder or a link under a frame's name cannot be replaced by one, or leads elsewhere.
-        for stray in [*self._named(_PART), *(frame for frame in self._named(_FRAME) if not _is_file(frame))]:
+        # A folder or a link under a name of ours cannot be replaced by a file, or leads elsewhere.
+        for stray in [*self._named(_STRAY), *(path for path in self._named(_KEPT) if not _is_file(path))]:
             _remove(stray)
 
     def _named(self, pattern: str) -> list[Path]:
         """What is in the folder under names of ours: whatever else a user put there stays."""
         return [path for path in self.folder.iterdir() if re.fullmatch(pattern, path.name)]
 
-    def seems_to_hold(self, groom: int, time_code: float, points: int) -> bool:
-        """Whether there is a frame of as many points; `holds` reads it to be sure."""
-        return has_size(self._path(groom, time_code), points)
+    def go_on(self, plan: str, spent: Sequence[int]) -> int:
+        """Take up the layer that was left by a bake of the same plan, if one was, under `layer_path`.
+
+        Args:
+            plan, spent: see `SaveLog`.
+
+        Returns:
+            How many samples are in it; 0 means that a new one is to be made.
+        """
+        self.log = SaveLog(self.folder / _LOG, plan, spent)
+        left, puts = self._named(_LAYER), 0
+        try:
+            if len(left) == 1 and (puts := self.log.restore(left[0])):
+                os.replace(left[0], self.layer_path)
+                return puts
+        except OSError:
+            pass
+        for layer in left:
+            _remove(layer)
+        return 0
+
+    def size(self) -> int:
+        """Bytes of all that is there to go on from."""
+        return sum(path.stat().st_size for path in self._named(_KEPT))
 
     def holds(self, groom: int, time_code: float, points: int) -> bool:
         """Whether the points (points, 3) of a frame are there, all of them, as they were written."""
@@ -98,10 +125,21 @@ class Spool:
         """Keep the points (P, 3) of a finished frame."""
         path = self._path(groom, time_code)
         try:
-            write_frame(path, array)
+            write_frame(path, array, self._spares.pop() if self._spares else None)
         except OSError as error:
             raise cannot_write(self.out, error) from None
         self._sure.add(path)
+
+    def forget(self, groom: int, time_code: float) -> None:
+        """Let go of a frame that nothing needs any more; nothing happens where it is not there. A later one takes its place on
+        the disk, which is faster by far than to make room for each.
+        """
+        path = self._path(groom, time_code)
+        self._sure.discard(path)
+        with suppress(OSError):
+            spare = path.with_suffix(".part")
+            os.replace(path, spare)
+            self._spares.append(spare)
 
     def finish(self) -> None:
         """Put the assembled layer under its final name and remove the rest."""
@@ -126,7 +164,7 @@ class Spool:
             return
         # Before the lock is given up: another process that takes it would lose what is its own.
         for path in list(self.folder.glob("*")):
-            if re.fullmatch(rf"{_FRAME}|{_PART}|inputs", path.name):
+            if re.fullmatch(rf"{_KEPT}|{_STRAY}", path.name):
                 with suppress(OSError):
                     _remove(path)
         self._lock.release()
@@ -138,7 +176,8 @@ class Spool:
 
 def kept(out: Path) -> int:
     """How many finished frames of an interrupted bake lie beside its output, counted for each groom or batch."""
-    return sum(1 for _ in _folder(out).glob("*.frame"))
+    folder = _folder(out)
+    return sum(1 for _ in folder.glob("*.frame")) + spent_frames(folder / _LOG)
 
 
 def _folder(out: Path) -> Path:

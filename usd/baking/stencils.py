@@ -5,6 +5,7 @@ import numpy as np
 
 from ..border.time_codes import on_frame
 from ..shot.stage import StageGroom
+from .sample_layer import in_order
 
 
 class Stencils:
@@ -25,11 +26,12 @@ class Stencils:
     Attributes:
         wanted: time codes to write.
         codes: ascending time codes at which points are needed.
+        puts: in the order in which they are written, "points" or "velocities", time code, and at which ones points are
+            needed for it.
     """
 
     def __init__(self, item: StageGroom, codes: list[float], origin: float, velocities: bool = True):
         self.wanted = dict.fromkeys(codes)
-        self.velocities = velocities
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
         rig, border = item.attachment.rig, item.attachment.rig.border
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
@@ -38,8 +40,11 @@ class Stencils:
         self._origin, self._step, self._rate = origin, border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep the very same number.
         self._known = np.array(codes, float)
-        extra = {other for code in codes for other, _ in self.terms(code)} if velocities else set()
-        self.codes = sorted(self.wanted.keys() | extra)
+        self.puts: list[tuple[str, float, list[float]]] = [
+            (name, code, [code] if name == "points" else [other for other, _ in self.terms(code)])
+            for name, code in in_order(codes, self._step, velocities)
+        ]
+        self.codes = sorted(set().union(*(needs for _, _, needs in self.puts)))
 
     def terms(self, code: float) -> list[tuple[float, float]]:
         """(time code, weight per second) whose weighted sum of points is the velocity at `code`."""

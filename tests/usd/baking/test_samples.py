@@ -16,6 +16,7 @@ from pxr import Sdf
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
+from usd.baking.spool import kept
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, write_shot
@@ -63,6 +64,55 @@ def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
     assert result.resumed >= 3
     assert out.read_bytes() == whole
     assert {p.name for p in tmp_path.iterdir()} == {"shot.usda", "bake.usdc"}
+
+
+@pytest.mark.parametrize("beards", [0, 1])
+def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monkeypatch, beards):
+    """Also twice, and where grooms are posed together; a frame stays no longer than something needs it."""
+    shot, out = write_shot(tmp_path, Recipe(frames=14, strands=60)), tmp_path / "bake.usdc"
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    for number in range(beards):
+        Sdf.CopySpec(layer, "/Hero/Hair", layer, f"/Hero/Beard{number}")
+    layer.Save()
+    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 3 * 60 * 12 * 12)
+    whole, frames, most = bake(shot, out, model).path.read_bytes(), 14 * (1 + beards), 0
+    out.unlink()
+
+    def until(last):
+        def stop(done, total, message):
+            nonlocal most
+            most = max(most, len(list(tmp_path.glob(".bake.usdc.baking/*.frame"))))
+            if done >= last:
+                raise KeyboardInterrupt
+
+        return stop
+
+    for stops in ([1], [5], [9, 12], [13, 14], [frames]):
+        for last in stops:
+            with pytest.raises(KeyboardInterrupt):
+                bake(shot, out, model, progress=until(last))
+            posed = min(-(-last // (1 + beards)), 14)
+            assert abs(kept(out) - posed) <= 2
+        assert bake(shot, out, model).resumed >= (1 + beards) * (posed - 1)
+        assert out.read_bytes() == whole
+        out.unlink()
+        assert [path.name for path in tmp_path.iterdir()] == ["shot.usda"]
+    assert most <= (14 if beards else 9)
+
+
+def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch):
+    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
+    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+    whole = bake(shot, out, model, frames="2:6").path.read_bytes()
+
+    def stop(done, total, message):
+        if done == 7:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    assert bake(shot, out, model, frames="2:6").resumed < 5
+    assert out.read_bytes() == whole
 
 
 def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A crate file goes back to one of its saves, whatever a kill or a power cut left of it, and goes on to the same bytes."""
+
+import zlib
+
+import numpy as np
+import pytest
+from pxr import Sdf, Vt
+
+from usd.baking import sample_layer
+from usd.baking.sample_layer import SampleLayer
+from usd.baking.save_log import SaveLog, spent_frames
+
+HAIR, SPENT = Sdf.Path("/Hair"), range(1, 13)
+
+
+@pytest.fixture(autouse=True)
+def often(monkeypatch):
+    monkeypatch.setattr(sample_layer, "SAVE_EVERY", 2 * 12 * 3000)
+
+
+def log_in(folder, plan="plan"):
+    return SaveLog(folder / "saves", plan, SPENT)
+
+
+def written(folder, log=None, puts=0, until=12, name="layer.usdc"):
+    """A layer of twelve samples, or as far as it is written."""
+    file = SampleLayer(folder / name, folder / "out.usdc", log, puts)
+    if not puts:
+        Sdf.AttributeSpec(Sdf.CreatePrimInLayer(file.layer, HAIR), "points", Sdf.ValueTypeNames.Point3fArray)
+    for number in range(puts, until):
+        points = np.random.default_rng(number).normal(size=(3000, 3)).astype(np.float32)
+        file.put(HAIR, number, {"points": Vt.Vec3fArray.FromNumpy(points)})
+    if until == 12:
+        file.close()
+    return folder / name
+
+
+@pytest.mark.parametrize(("lost", "puts"), [(0, 8), (40, 8), (2000, 6), (80_000, 4), (270_000, 0)])
+def test_a_save_that_was_cut_off_is_taken_back(tmp_path, lost, puts):
+    """Whatever is lost of the end of the file, with the header of a save that is not there, and one line half written."""
+    whole = written(tmp_path, name="whole.usdc").read_bytes()
+    part = written(tmp_path, log_in(tmp_path), until=8)
+    with open(part, "r+b") as file:
+        file.truncate(part.stat().st_size - lost)
+        file.seek(16)
+        file.write(bytes(8))
+    with open(tmp_path / "saves", "a") as file:
+        file.write("0123abcd {")
+    assert log_in(tmp_path).restore(part) == puts
+    log = log_in(tmp_path)
+    assert log.restore(part) == puts and (not puts or spent_frames(tmp_path / "saves") == puts)
+    # USD knows a layer by its path for as long as anything holds it.
+    moved = part.rename(tmp_path / "moved.usdc")
+    assert written(tmp_path, log, puts, name=moved.name).read_bytes() == whole
+
+
+def test_a_page_that_a_power_cut_took_is_missed(tmp_path):
+    part = written(tmp_path, log_in(tmp_path), until=10)
+    with open(part, "r+b") as file:
+        file.seek(25 * 4096)  # the second save's: 72,000 bytes each
+        file.write(bytes(4096))
+    assert log_in(tmp_path).restore(part) == 2
+
+
+def test_a_file_with_all_its_samples_is_closed_as_it_is(tmp_path):
+    whole = written(tmp_path, log_in(tmp_path))
+    log, bytes_ = log_in(tmp_path), whole.read_bytes()
+    assert log.restore(whole) == 12
+    moved = whole.rename(tmp_path / "moved.usdc")
+    assert written(tmp_path, log, 12, name=moved.name).read_bytes() == bytes_
+
+
+@pytest.mark.parametrize("harm", ["another plan", "no log", "garbage", "a huge place"])
+def test_a_log_of_something_else_counts_for_nothing(tmp_path, harm):
+    part = written(tmp_path, log_in(tmp_path), until=6)
+    before, log = part.read_bytes(), tmp_path / "saves"
+    if harm == "no log":
+        log.unlink()
+    elif harm == "garbage":
+        log.write_bytes(bytes(range(256)) * 9)
+    elif harm == "a huge place":
+        lines = log.read_text().splitlines()
+        lines[1:] = [_signed(line[9:].replace('"end": ', '"end": 9999')) for line in lines[1:]]
+        log.write_text("\n".join(lines) + "\n")
+    assert log_in(tmp_path, "other" if harm == "another plan" else "plan").restore(part) == 0
+    assert part.read_bytes() == before
+
+
+def _signed(text):
+    return f"{zlib.crc32(text.encode()):08x} {text}"
