@@ -3,7 +3,7 @@
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -76,45 +76,59 @@ class HeadField:
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (N,) [m] and its direction (N, 3), float32; infinite where the head is not what is nearest."""
-        corner, part, known = self._corners(points)
+        corner, (x, y, z), known = self._corners(points)
         value, direction = np.full(len(points), np.inf, np.float32), np.zeros((len(points), 3), np.float32)
         if not len(known):
             return value, direction
-        flat, strides = self._values.ravel(), self._strides
-        x, y, z = part
-        at = [[[flat.take(corner + (i * strides[0] + j * strides[1] + k)) for k in (0, 1)] for j in (0, 1)]
-              for i in (0, 1)]  # fmt: skip
+        at = self._values.ravel().take(corner + self._offsets).reshape(2, 2, 2, -1)
         with np.errstate(invalid="ignore"):  # infinity less infinity: not known, and left out below
-            (a, b), (c, d) = ([one + z * (other - one) for one, other in side] for side in at)
-            low, high = a + y * (b - a), c + y * (d - c)
-            mixed = low + x * (high - low)
-            slope_z = [[other - one for one, other in side] for side in at]
-            (e, f), (g, h) = slope_z
-            down, up = e + y * (f - e), g + y * (h - g)
-            slope = np.stack([high - low, (b - a) + x * ((d - c) - (b - a)), down + x * (up - down)], axis=1)
+            # Interpolated along z, then y, then x, with the slopes along each.
+            along_z = at[:, :, 1] - at[:, :, 0]
+            flat = at[:, :, 0] + z * along_z
+            along_y = flat[:, 1] - flat[:, 0]
+            line = flat[:, 0] + y * along_y
+            along_x = line[1] - line[0]
+            mixed = line[0] + x * along_x
+            along_z = along_z[:, 0] + y * (along_z[:, 1] - along_z[:, 0])
+            slope = np.empty((len(known), 3))
+            slope[:, 0] = along_x
+            slope[:, 1] = along_y[0] + x * (along_y[1] - along_y[0])
+            slope[:, 2] = along_z[0] + x * (along_z[1] - along_z[0])
             slope /= np.maximum(np.sqrt(np.einsum("ni,ni->n", slope, slope)), np.float32(1e-20))[:, None]
-            sound = np.isfinite(mixed)
-        value[known[sound]], direction[known[sound]] = mixed[sound], slope[sound]
+        sound = np.isfinite(mixed)
+        known = known[sound]
+        value[known], direction[known] = mixed[sound], slope[sound]
         return value, direction
 
     def rough(self, points: np.ndarray) -> np.ndarray:
         """The nearest node's distance (N,) [m]: right within 0.87 cells, infinite where nothing is known."""
         result = np.full(len(points), np.inf, np.float32)
         corner, part, known = self._corners(points)
-        nearest = corner + (part > 0.5).T.astype(np.int32) @ self._strides
+        nearest = corner + self._strides @ (part > 0.5).astype(np.int32)
         result[known] = self._values.ravel().take(nearest)
         return result
 
-    @property
+    @cached_property
     def _strides(self) -> np.ndarray:
         size = self._values.shape
         return np.array([size[1] * size[2], size[2], 1], np.int32)
 
+    @cached_property
+    def _offsets(self) -> np.ndarray:
+        """From the low node of a cell to its eight, (8, 1), the last axis fastest."""
+        return (np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ self._strides)[:, None]
+
     def _corners(self, points: np.ndarray):
         """Number of the low node of each point's cell (n,), place in it (3, n), and which points (n,) are in the grid."""
-        place = (np.asarray(points, np.float32) - self._low.astype(np.float32)) * np.float32(1 / self.cell)
-        held = [(x >= 0) & (x < size - 1) for x, size in zip(place.T, self._values.shape)]
-        known = np.flatnonzero(held[0] & held[1] & held[2])
-        place = place.take(known, axis=0).T
+        place = np.ascontiguousarray(points.T, np.float32)
+        place = place - self._low.astype(np.float32)[:, None]
+        place *= np.float32(1 / self.cell)
+        held = (place >= 0) & (place < self._most)
+        known = (held[0] & held[1] & held[2]).nonzero()[0]
+        place = place.take(known, axis=1)
         low = place.astype(np.int32)
         return self._strides @ low, place - low, known
+
+    @cached_property
+    def _most(self) -> np.ndarray:
+        return np.array(self._values.shape, np.float32)[:, None] - 1

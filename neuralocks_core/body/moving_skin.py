@@ -157,33 +157,37 @@ class PosedSkin:
         """
         skin = self._skin
         sample = self._start.take(cells)
-        x, y, z = np.ascontiguousarray(points.T, np.float32)[:, :, None]
+        place = np.ascontiguousarray(points.T, np.float32)[:, :, None]
         rows = np.arange(len(points))
         for _ in range(3):  # downhill from neighbour to neighbour
             near = skin.near.take(sample, axis=0)
-            dx, dy, dz = x - self._place[0].take(near), y - self._place[1].take(near), z - self._place[2].take(near)
-            squared = dx * dx + dy * dy + dz * dz
+            off = place - self._place.take(near, axis=1)
+            squares = off * off
+            squared = squares[0] + squares[1]
+            squared += squares[2]
             best = squared.argmin(axis=1)
             sample = near[rows, best]
             if not best.any():
                 break
         nearest = squared[rows, best]
         # Weights fall from the nearest sample on: smooth in the point and in the pose, at any height.
-        square = skin.square.take(near[:, 0])
+        first = near[:, 0]
+        square = skin.square.take(first)
         weight = np.maximum(1 - (squared - nearest[:, None]) / (3.2 * square)[:, None], 0)
         weight *= weight
-        weight *= skin.counted.take(near[:, 0], axis=0)
-        nx, ny, nz = (each.take(near) for each in self._normal)
-        height = dx * nx
-        height += dy * ny
-        height += dz * nz
+        weight *= skin.counted.take(first, axis=0)
+        normal = self._normal.take(near, axis=1)
+        off *= normal
+        height = off[0]
+        height += off[1]
+        height += off[2]
         value = np.einsum("nk,nk->n", height, weight) / np.einsum("nk->n", weight)
-        direction = np.stack([np.einsum("nk,nk->n", n, weight) for n in (nx, ny, nz)], axis=1)
+        direction = np.ascontiguousarray(np.einsum("ank,nk->an", normal, weight).T)
         direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
         beyond = nearest - value * value > 4 * square
         beyond |= nearest - 0.5 * square > head * head
         # A shoulder is thinner than the grid goes down: what is below its front is behind its back.
-        beyond |= -value > skin.thick.take(near[:, 0]) + np.float32(THIN)
+        beyond |= -value > skin.thick.take(first) + np.float32(THIN)
         return np.where(beyond, np.inf, value), direction
 
 
