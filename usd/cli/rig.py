@@ -136,6 +136,30 @@ def bake(
         )
 
 
+@command("evaluate")
+def evaluate(
+    baked: Annotated[Path, typer.Argument(help="A rig bake, or any animated character with hair joints.")],
+    chains: Chains = None,
+    head: Head = None,
+    skeleton: Skeleton = None,
+    joint: Joints = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print the report card of hair that moves on its bones: how much lies in the body, how far it swings, whether it rests."""
+    from ..rig.evaluate import evaluate_rig
+
+    with progress_bar("evaluating") as progress:
+        card = evaluate_rig(
+            baked, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"), progress=progress
+        )
+    if as_json:
+        print_json({"path": str(card.path), "skeleton": card.skeleton, **card.measures, "notes": card.notes})
+        return
+    for line in card.lines():
+        typer.echo(line)
+    note(card.notes)
+
+
 @command("export-c", usd=False)
 def export_c(
     model: Model = None,

@@ -48,7 +48,7 @@ def _on_joints(stage: Usd.Stage) -> str:
     hairy = next((prim for prim in find_skeletons(stage) if has_hair_joints(prim)), None)
     if hairy is None:
         return ""
-    return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake'"
+    return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake', and measured by 'rig evaluate'"
 
 
 def _in_a_variant(stage: Usd.Stage) -> str:

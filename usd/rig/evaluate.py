@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks rig evaluate`: the report card of mesh hair that moves on its bones, whatever moved it."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core import metrics
+from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.progress import Progress, silent
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT
+from neuralocks_core.runtime import cores
+
+from ..border.damage import names_damage
+from .stage import RiggedHair, chain_notes, check_patterns, core_meshes, read_rigged_hair, rigged_notes
+
+VERTICES = 4000
+"""Most vertices of the hair that are measured, evenly over its meshes."""
+FRAMES = 48
+"""Frames in which distances to the body are measured, evenly over the animation."""
+LEAST_SWING = 0.01
+"""Less [mm] is rounding."""
+SETTLED = 2.0
+"""A pose held for so long [s] should have still hair."""
+
+
+@dataclass(frozen=True)
+class RigCard:
+    """What was measured.
+
+    Attributes:
+        path: the stage.
+        skeleton: its Skeleton prim.
+        measures: `joints`, `chains`, `vertices`, `frames`; `swing_mm`: how far vertices are from where they would be carried
+            rigidly (root mean square), `swing_most`: the chain that swings most, `swing_most_mm`; `jitter_mm`: the farthest
+            that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN where none is;
+            `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, in `body_frames`
+            frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair no such.
+        notes: what a user should know.
+    """
+
+    path: Path
+    skeleton: str
+    measures: dict
+    notes: list[str]
+
+    def lines(self) -> list[str]:
+        """The card in words."""
+        m = self.measures
+        lines = [
+            f"{self.skeleton}: {m['joints']} hair joints in {m['chains']} chains, {m['vertices']} vertices measured, "
+            f"{m['frames']} frames",
+            f"swing: {m['swing_mm']:.1f} mm from where hair carried rigidly is, most of '{m['swing_most']}', "
+            f"{m['swing_most_mm']:.1f} mm"
+            if m["swing_most_mm"] > LEAST_SWING
+            else "swing: none, as if hair were carried rigidly",
+        ]
+        if np.isfinite(m["jitter_mm"]):
+            lines.append(f"held pose: jitter {m['jitter_mm']:.3f} mm")
+        for name, words in (("body", ""), ("body_rigid", ", carried rigidly")):
+            if name in m:
+                b = m[name]
+                where = f" ('{b['deepest']}' at {b['deepest_at']:g})" if b["penetration_worst_mm"] > 0 else ""
+                lines.append(
+                    f"inside the body{words}: {b['penetration_percent']:.2f} % of vertices, deeper than 3 mm "
+                    f"{b['penetration_3mm_percent']:.2f} %, at most {b['penetration_worst_mm']:.1f} mm{where}, "
+                    f"in {m['body_frames']} frames"
+                )
+        return lines
+
+
+@names_damage
+def evaluate_rig(
+    baked,
+    *,
+    skeleton: str | None = None,
+    head: str | None = None,
+    chains: list[str] | None = None,
+    joints: dict[str, str] | None = None,
+    progress: Progress | None = None,
+) -> RigCard:
+    """Measure rigged mesh hair as a stage moves it.
+
+    Args:
+        baked: path of a bake, or of any animated character with hair chains.
+        skeleton, head, chains, joints: as for `read_rigged_hair`; of several skeletons one that a bake moves comes first.
+        progress: called with (done, total, message).
+
+    Raises:
+        NeuralocksError: there is no such hair, it has no mesh, or nothing animates it.
+    """
+    hair = read_rigged_hair(
+        baked, skeleton=skeleton, head=head, chains=chains, joints=joints, baked_first=skeleton is None
+    )
+    check_patterns(hair, chains)
+    rig, source, say = hair.rig, hair.source, progress or silent
+    if not len(rig.points):
+        raise NeuralocksError(f"{source.path}: no mesh is skinned to its hair joints; there is nothing to measure")
+    if len(source.time_codes) < 2:
+        raise NeuralocksError(f"{source.path}: is not animated; give a bake, or an animated character")
+    moving = _moving(rig)
+    some = np.flatnonzero(_hair_vertices(hair, moving))
+    few = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
+    vertices, lock = some[few], rig.chains.chain[np.maximum(rig.weights[few, 1:].argmax(axis=1), 0)]
+    posed = _Posed(hair, vertices, moving)
+    points, carried = posed.all(say)
+    off = np.square(points - carried).sum(axis=-1).mean(axis=0)
+    each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
+    most = max(each, key=each.__getitem__)
+    measures = {
+        "joints": len(rig.chains),
+        "chains": len(rig.chains.roots),
+        "vertices": len(vertices),
+        "frames": len(points),
+        "swing_mm": 1e3 * float(np.sqrt(off.mean())),
+        "swing_most": rig.chains.chain_name(int(most)),
+        "swing_most_mm": 1e3 * each[most],
+        "jitter_mm": _jitter(source.clip, moving, points),
+    }
+    if rig.character.body is not None:
+        measures |= _depths(posed, points, carried, [rig.chains.chain_name(int(i)) for i in lock], say)
+    return RigCard(Path(baked), source.path, measures, rigged_notes(source) + chain_notes(hair, chains))
+
+
+class _Posed:
+    """Some vertices of the hair, and the skin, as the animation poses them, in canonical space [m]."""
+
+    def __init__(self, hair: RiggedHair, vertices: np.ndarray, moving: np.ndarray):
+        self.codes, self._clip = hair.source.time_codes, hair.source.clip
+        self._character, self.skin = hair.source.character, hair.rig.character.body
+        self._moving = moving
+        body = self._character.body
+        self._hair = body.part(vertices, np.zeros((0, 3), int))
+        self.at_rest = self._character.canonical(self._hair.points)
+
+    def all(self, say) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (T, V, 3) float32 of all samples, and where they would be carried rigidly."""
+        points = np.empty((2, len(self._clip.joints), len(self._hair.points), 3), np.float32)
+        for row, (joints, shape) in enumerate(zip(self._clip.joints, self._clip.shape)):
+            for which, here in enumerate((joints, _stiff(self._character, joints, self._moving))):
+                points[which, row] = self._hair.posed(self._character.skinning(here), shape)
+            say(row + 1, len(points[0]), "posing the hair")
+        return points[0], points[1]
+
+    def distances(self, row: int | None, points: np.ndarray) -> np.ndarray:
+        """Signed distances (N,) [m] of points (N, 3) to the skin at a sample, or in bind pose."""
+        if row is None:
+            vertices = self._character.canonical(self.skin.points)
+        else:
+            vertices = self.skin.posed(self._character.skinning(self._clip.joints[row]), self._clip.shape[row])
+        return proven_distances(vertices, self.skin.triangles, points)
+
+
+def _depths(posed: _Posed, points: np.ndarray, carried: np.ndarray, locks: list[str], say) -> dict:
+    """What lies in the body of vertices (T, V, 3), as the animation moves them and as they would be carried rigidly."""
+    rows = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
+    at_rest, measured = posed.distances(None, posed.at_rest), []
+    with ThreadPoolExecutor(cores()) as pool:
+        both = pool.map(lambda row: posed.distances(row, np.concatenate([points[row], carried[row]])), rows)
+        for done, distance in enumerate(both):
+            measured.append(distance.reshape(2, -1))
+            say(done + 1, len(rows), "measuring distances to the body")
+    result: dict = {"body_frames": len(rows)}
+    for name, distance in zip(("body", "body_rigid"), np.stack(measured, axis=1)):
+        row, vertex = np.unravel_index(np.argmin(distance - np.minimum(at_rest, 0)), distance.shape)
+        deepest = {"deepest_at": float(posed.codes[rows[row]]), "deepest": locks[vertex]}
+        result[name] = metrics.penetration(distance, at_rest) | deepest
+    return result
+
+
+def _moving(rig: HairRig) -> np.ndarray:
+    """Which joints (J,) of the skeleton are hair, with what hangs from it."""
+    skeleton = rig.character.skeleton
+    return np.any([skeleton.below(joint) for joint in rig.chains.joints[rig.chains.roots]], axis=0)
+
+
+def _hair_vertices(hair: RiggedHair, moving: np.ndarray) -> np.ndarray:
+    """Which vertices (V,) of all meshes the hair joints move, in the order of `HairRig.points`."""
+    return np.concatenate([mesh.weight_on(moving) > LEAST_WEIGHT for mesh in core_meshes(hair.source)])
+
+
+def _stiff(character: Character, joints: np.ndarray, moving: np.ndarray) -> np.ndarray:
+    """World joint transforms (J, 4, 4) in which hair joints are to their parents as in bind pose."""
+    bind, parents, result = character.skeleton.bind, character.skeleton.parents, joints.copy()
+    for joint in np.flatnonzero(moving):  # parents come first
+        up = parents[joint]
+        result[joint] = result[up] @ character.inverse_bind[up] @ bind[joint]
+    return result
+
+
+def _jitter(clip, moving: np.ndarray, points: np.ndarray) -> float:
+    """Largest step [mm] of vertices (T, V, 3) where all other joints have been still for SETTLED; NaN where they never are."""
+    still = metrics.held(clip.joints[:, ~moving])
+    last = np.maximum.accumulate(np.where(still, -np.inf, clip.times))
+    quiet = clip.times - last >= SETTLED
+    steps = [points[row - 1 : row + 1] for row in np.flatnonzero(quiet) if row and quiet[row - 1]]
+    return max(map(metrics.jitter, steps)) if steps else float("nan")
