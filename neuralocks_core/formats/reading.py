@@ -77,10 +77,10 @@ def read_with_look(
         likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
         if scale is None:
             scale = likely
-            notes.append(f"{path}: does not state its unit; {_taken(scalp, likely)}; --unit says otherwise")
+            notes.append(f"{path}: does not state its unit; {_taken(scalp, likely)}; import --unit says otherwise")
         elif scale != likely and size > 0:  # ten times off, or more
             fact = f"its format counts in {_name(scale)}, which makes it {scale * size:.3g} m of hair"
-            notes.append(f"{path}: {fact}; --unit {_name(likely)}?")
+            notes.append(f"{path}: {fact}; import --unit {_name(likely)}?")
     axis = wanted_axis or raw.up
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows or is no number is dealt with below
         points = points * np.float32(scale)

@@ -26,7 +26,7 @@ from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
-from ..shot.curve_ends import groom_between
+from ..shot.curve_ends import groom_between, undrawn
 from ..shot.curves import find_curves, rest_counts
 from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
@@ -201,6 +201,8 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
             joint = {"joint": rig_joint(found), "carried by": found.how}
         except NeuralocksError as error:
             stops.append(str(error))
+    else:
+        spoils += undrawn(prim)
     groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())

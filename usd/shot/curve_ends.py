@@ -71,6 +71,29 @@ def beyond_ends(prim: Usd.Prim) -> Beyond | None:
     return None if hair.all() else Beyond(before, after, hair)
 
 
+def undrawn(prim: Usd.Prim) -> list[str]:
+    """The note on strands of a cubic BasisCurves of whose segments some would lack points (UsdGeomBasisCurves, "Vertex count")."""
+    curves, tokens = UsdGeom.BasisCurves(prim), UsdGeom.Tokens
+    basis, wrap = curves.GetBasisAttr().Get(), curves.GetWrapAttr().Get()
+    if curves.GetTypeAttr().Get() != tokens.cubic or wrap == tokens.periodic:
+        return []
+    counts = rest_counts(prim)
+    if basis == tokens.bezier:
+        odd, fitting = (counts < LEAST) | ((counts - LEAST) % 3 != 0), "4, 7, 10 and so on"
+    else:
+        least = 2 if wrap == tokens.pinned else LEAST
+        odd, fitting = counts < least, f"{least} or more"
+    odd &= counts > 1  # a lone point is told as what does not move
+    if not odd.any():
+        return []
+    found = list(map(str, np.unique(counts[odd])))
+    told = ", ".join(found[:3]) + (", ..." if len(found) > 3 else "")
+    return [
+        f"{prim.GetPath()}: {int(odd.sum())} of {len(counts)} strands have {told} points, where {basis} curves ({wrap}) need "
+        f"{fitting}; renderers draw such strands in part or not at all, export them as linear curves"
+    ]
+
+
 def ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = None) -> np.ndarray:
     """Which points (n,) are strands' first or last ones, of all but those `beyond`; the very first one alone where the counts
     do not fit the points.

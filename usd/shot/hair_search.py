@@ -15,6 +15,7 @@ from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton
 from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
+from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far, unusable_skeleton
 from .other_curves import other_hair
@@ -104,7 +105,9 @@ class HairSearch:
         if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
             self._off_head.append(f"{path}: rides on '{joint}', not on a head")
         measured = [] if away else untrained(carrying)  # a chest has not a head's measures
-        self._notes += moved_as_open(prim) + left_as_they_are(prim) + measured + unevenly_scaled(carrying)
+        self._notes += (
+            moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim) + measured + unevenly_scaled(carrying)
+        )
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

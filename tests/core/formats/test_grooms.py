@@ -75,7 +75,7 @@ def test_units_of_the_formats(folder):
 
 
 @pytest.mark.parametrize(
-    "unit, words", [("m", ""), ("cm", "36 m of hair; --unit cm?"), ("mm", "360 m of hair; --unit mm?")]
+    "unit, words", [("m", ""), ("cm", "36 m of hair; import --unit cm?"), ("mm", "360 m of hair; import --unit mm?")]
 )
 def test_hair_that_its_formats_unit_makes_too_large_is_told(folder, unit, words):
     points = POINTS / np.ptp(POINTS, axis=0).max() * np.float32(0.36 / UNITS[unit])
@@ -90,11 +90,11 @@ def test_hair_that_its_formats_unit_makes_too_large_is_told(folder, unit, words)
 @pytest.mark.parametrize(
     "metres, words",
     [
-        (0.01, "took 1 cm, by which the scalp is 17 cm wide; --unit"),
-        (0.0254, "took 1 cm, by which the scalp is 6.69 cm wide, narrow; in inches 17 cm; --unit"),
-        (0.003, "took 1 mm, by which the scalp is 5.67 cm wide, narrow; --unit"),
-        (0.3048, "took 1 m, by which the scalp is 55.8 cm wide, more than a head; --unit"),
-        (0.1, "took 1 cm, by which the scalp is 1.7 cm wide, narrow; in inches 4.32 cm; --unit"),
+        (0.01, "took 1 cm, by which the scalp is 17 cm wide; import --unit"),
+        (0.0254, "took 1 cm, by which the scalp is 6.69 cm wide, narrow; in inches 17 cm; import --unit"),
+        (0.003, "took 1 mm, by which the scalp is 5.67 cm wide, narrow; import --unit"),
+        (0.3048, "took 1 m, by which the scalp is 55.8 cm wide, more than a head; import --unit"),
+        (0.1, "took 1 cm, by which the scalp is 1.7 cm wide, narrow; in inches 4.32 cm; import --unit"),
     ],
 )
 def test_the_scalps_width_is_told_where_no_unit_is_stated(folder, metres, words):

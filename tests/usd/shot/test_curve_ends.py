@@ -8,7 +8,7 @@ from pxr import Usd, UsdGeom, Vt
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
 from usd.review.inspect import inspect
-from usd.shot.curve_ends import beyond_ends, ends
+from usd.shot.curve_ends import beyond_ends, ends, undrawn
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, strand_points, world_points, write_shot
@@ -135,3 +135,27 @@ def test_first_points_that_lie_on_the_skin_are_roots(tmp_path, model, basis):
         (facts,) = inspect(path)["grooms"]
         assert [facts[name] for name in ("type", "basis", "wrap")] == ["cubic", basis, wrap]
     assert np.array_equal(world_points(paths[0], 5.0), world_points(paths[1], 5.0))
+
+
+@pytest.mark.parametrize("basis", ["bezier", "bspline", "catmullRom"])
+@pytest.mark.parametrize("wrap", ["nonperiodic", "pinned"])
+def test_strands_that_usd_counts_no_whole_segments_in_are_told(basis, wrap):
+    counts = [2, 3, 4, 5, 6, 7, 8, 9, 10]
+    stage = Usd.Stage.CreateInMemory()
+    prim = _curves(stage, np.random.default_rng(0).normal(size=(sum(counts), 3)), counts, basis, wrap)
+    segments = UsdGeom.BasisCurves(prim).ComputeSegmentCounts(Usd.TimeCode.Default())
+    whole = {"bezier": lambda n, s: n == 3 * s + 1}.get(basis, lambda n, s: s > 0)
+    odd = sum(not whole(n, s) for n, s in zip(counts, segments))
+    if odd:
+        (note,) = undrawn(prim)
+        assert note.startswith(f"/Hair: {odd} of 9 strands have 2, 3")
+    else:
+        assert undrawn(prim) == []
+
+
+def test_a_bake_tells_of_strands_that_are_not_drawn(tmp_path, model):
+    recipe = Recipe(strands=STRANDS, vertices=VERTICES, basis="bezier", bound="mesh")
+    shot, told = write_shot(tmp_path, recipe), []
+    bake(shot, tmp_path / "bake.usdc", model, tell=told.extend)
+    needed = "12 points, where bezier curves (pinned) need 4, 7, 10 and so on"
+    assert sum(needed in note for note in told) == sum(needed in note for note in inspect(shot)["spoils"]) == 1
