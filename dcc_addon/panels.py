@@ -84,8 +84,9 @@ def _motion(layout, armature, scene) -> None:
             words(
                 layout, f"Hair knows the motion of frames {first:g} to {last:g} only; widen the scene's range", "INFO"
             )
-    for text in sampled.bodies_off if sampled is not None else ():
-        words(layout, text, "INFO")
+    if sampled is not None:
+        for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off):
+            words(layout, text, "INFO")
     message(layout, armature.name_full)
 
 

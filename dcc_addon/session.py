@@ -63,6 +63,8 @@ class SampledRig:
 
     bodies_off: tuple[str, ...] = ()
     """What to say of bodies that are drawn elsewhere than hair is kept out of; see `scene.body_drawn`."""
+    leaps: tuple[str, ...] = ()
+    """What to say of frames at which the character is put elsewhere; see `services.leaps`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:

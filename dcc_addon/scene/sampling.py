@@ -16,6 +16,7 @@ from neuralocks_core.motion import Clip
 from ..services import rig as rig_service
 from ..services.axes import to_core
 from ..services.hidden import unhidden
+from ..services.leaps import leaps_told
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import actions, body_drawn, rotations
@@ -259,6 +260,7 @@ class _Recording:
             bodies_off=body_drawn.all_told(
                 armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
             ),
+            leaps=leaps_told(clip, character.head, motion.frames),
         )
 
 

@@ -31,13 +31,15 @@ WORDS = (
     ("train one with random_materials=True, as the other ways of training do", "train one here"),
 )
 """What the command line says, and the panel; in this order."""
+_CUTS = re.compile(r", or name them all if they are \(--cuts [^)]*\)")
+"""A remedy that the panel has not."""
 
 
 def for_the_panel(text: str) -> str:
     """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
-    return text
+    return _CUTS.sub("", text)
 
 
 def with_objects(text: str, prims: dict[str, str]) -> str:

@@ -23,6 +23,8 @@ def test_prims_become_objects():
         "Rig: no joint found for left_lower_arm, so the arms count as bound in a T-pose; "
         "name it with --joint left_lower_arm=JOINT",
         "Rig: its head is put elsewhere at 13; the hair starts anew there (--cuts says where)",
+        "Rig: its head leaps at 3,4, less than 0.2 s from one leap to the next, so these are no cuts and the hair is flung; "
+        "repair the animation, or name them all if they are (--cuts 3,4,20, ...)",
         "Rig: its head is put elsewhere at 13; a loop has no cuts, so the hair is flung there; leave out --loop, or repair "
         "the animation",
         "Rig: 'curl' and 3 more hang from 'neck' and are not moved; to move all, train and bake with --head neck",

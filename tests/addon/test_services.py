@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's services, without Blender."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,13 +10,16 @@ from pxr import Sdf
 
 from dcc_addon.services import axes, bones, card, names, panel_errors, rig
 from dcc_addon.services.history import SampledBoundary
+from dcc_addon.services.leaps import leaps_told
 from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core import model
+from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
+from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector, transformed
 from tests.core.rigs import moved, person
 
@@ -315,3 +320,19 @@ def test_card_fits_a_sidebar():
         Card("t", {"/Hair": {"droop_cm": 1.234, "settling_s": float("nan"), "strands": 7}}, notes=("n",))
     )
     assert lines == ["droop: 1.23 cm", "n"]
+
+
+def test_leaps_are_told_by_their_frames():
+    """A cut, and two leaps in succession that are none."""
+    frames = np.arange(10, 74)
+    joints = np.tile(np.eye(4), (64, 1, 1, 1))
+    joints[:, 0, 1, 3] = 0.01 * np.sin(np.arange(64))
+    for first in (20, 50, 54):
+        joints[first:, 0, 0, 3] += 1.0
+    clip = Clip(frames / 24, joints)
+    clip = replace(clip, cuts=find_cuts(clip, 0))
+    cut, flash = leaps_told(clip, 0, frames)
+    assert cut == "The head is put elsewhere at frame 30: hair starts anew there"
+    assert flash.startswith("The head leaps at frame 60, 64, less than 0.2 s from one leap to the next")
+    still = Clip(frames / 24, np.tile(np.eye(4), (64, 1, 1, 1)))
+    assert leaps_told(still, 0, frames) == ()

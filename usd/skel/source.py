@@ -118,7 +118,7 @@ class StageRig:
             every = self._named(np.union1d(cuts, flashes))
             notes.append(
                 f"{self.path}: its head leaps at {self._named(flashes)}, less than {APART:g} s from one leap to the next, so these "
-                f"are no cuts and the hair is flung; if they are, name them all (--cuts {every}), else repair the animation"
+                f"are no cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
             )
         return notes
 

@@ -107,6 +107,7 @@ def put_elsewhere(folder: Path) -> None:
     rig.neuralocks_character.loop = False
     shown = {f: points_at(strands, f) for f in (24, 13, 12, 20)}
     assert len(session.rigs["Rig"].clip.cuts) == 1
+    assert "hair starts anew there" in session.rigs["Rig"].leaps[0]
     assert apart(shown[12], unmoved[12]) < 1e-3, (
         "the motion before it has no frame after it now, and nothing else changed"
     )

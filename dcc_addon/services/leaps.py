@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What to say of frames at which a character is put elsewhere."""
+
+import numpy as np
+
+from neuralocks_core.animation.cuts import APART, find_flashes
+from neuralocks_core.motion import Clip
+
+MOST = 6
+"""Frames that are named."""
+
+
+def leaps_told(clip: Clip, joint: int, frames: np.ndarray) -> tuple[str, ...]:
+    """Lines for the panel; nothing that a loop is told, which has no cuts.
+
+    Args:
+        clip: the motion, with its cuts.
+        joint: the head.
+        frames: of its samples (T,).
+    """
+
+    def named(times: np.ndarray) -> str:
+        found = frames[np.searchsorted(clip.times, times - 1e-9)]
+        return ", ".join(f"{frame:g}" for frame in found[:MOST]) + (", ..." if len(found) > MOST else "")
+
+    told, flashes = [], find_flashes(clip, joint)
+    if len(clip.cuts):
+        told.append(f"The head is put elsewhere at frame {named(clip.cuts)}: hair starts anew there")
+    if len(flashes):
+        told.append(
+            f"The head leaps at frame {named(flashes)}, less than {APART:g} s from one leap to the next, and flings the hair; "
+            "repair the animation there"
+        )
+    return tuple(told)
