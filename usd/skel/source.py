@@ -24,7 +24,7 @@ from .clip_codes import clip_codes
 from .joints import JointSource
 from .motion_sketch import motion_sketch
 from .rig_copy import alike, hair_of, source_of
-from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body
+from .surface import Skins, StageMesh, bound_meshes, find_skins, merged_body, not_posed
 
 COMPARED = 100
 """About so many poses of a rig bake are compared with those that it was made from."""
@@ -207,6 +207,7 @@ def read_rig(
     notes += _old_copy(source, time_codes)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
+    notes += not_posed(meshes, source)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
     try:
         humanoid = _humanoid(source, by_hand)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Skinned meshes as arrays: points in authored bind space, triangles, influences, blend shapes."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import inside_out
@@ -73,6 +74,25 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
     return [mesh for mesh in read if mesh is not None]
 
 
+def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
+    """The note on meshes that USD draws as they were made, whatever their skeleton does, as no prim above them is a SkelRoot."""
+    outside = [mesh.prim for mesh in meshes if not any(above.IsA(UsdSkel.Root) for above in _lineage(mesh.prim))]
+    if not outside:
+        return []
+    others = f" and {len(outside) - 1} more" if len(outside) > 1 else ""
+    typed = ((above, spec.typeName) for above in _lineage(outside[0]) for spec in above.GetPrimStack())
+    # A reference to a SkelRoot on a prim that is defined with a type of its own.
+    hidden = next((above for above, name in typed if name == "SkelRoot"), None)
+    common = source.prim.GetParent().GetPath().GetCommonPrefix(outside[0].GetParent().GetPath())
+    remedy = f"make {common} a SkelRoot" if common != Sdf.Path.absoluteRootPath else "put both below a SkelRoot"
+    if hidden:
+        kind = hidden.GetTypeName()
+        remedy = f"{hidden.GetPath()} is one below an opinion that types it {kind}: type it SkelRoot there"
+    return [
+        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws that unmoved while hair moves; {remedy}"
+    ]
+
+
 def drawn(prim: Usd.Prim) -> bool:
     """Whether a renderer shows the prim, at any time."""
     imageable, unseen = UsdGeom.Imageable(prim), (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
@@ -81,12 +101,9 @@ def drawn(prim: Usd.Prim) -> bool:
 
 def ever_visible(prim: Usd.Prim) -> bool:
     """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
-    switches = []
-    above = prim
-    while above and not above.IsPseudoRoot():
-        if above.IsA(UsdGeom.Imageable):
-            switches.append(UsdGeom.Imageable(above).GetVisibilityAttr())
-        above = above.GetParent()
+    switches = [
+        UsdGeom.Imageable(above).GetVisibilityAttr() for above in _lineage(prim) if above.IsA(UsdGeom.Imageable)
+    ]
     times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
     return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
 
@@ -168,14 +185,19 @@ def geom_bind(prim: Usd.Prim) -> np.ndarray:
 
 def _in_effect(prim: Usd.Prim, name: str) -> Usd.Attribute | None:
     """A binding property with a value: the prim's own, else that of the nearest prim above with a binding, as UsdSkel has it."""
-    above = prim
-    while above and not above.IsPseudoRoot():
+    for above in _lineage(prim):
         attribute = above.GetAttribute(name)
         if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
             if attribute.HasAuthoredValue() and rest_value(attribute) is not None:
                 return attribute
-        above = above.GetParent()
     return None
+
+
+def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    """A prim, and all above it."""
+    while prim and not prim.IsPseudoRoot():
+        yield prim
+        prim = prim.GetParent()
 
 
 def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:

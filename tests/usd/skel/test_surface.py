@@ -96,6 +96,29 @@ def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
     assert read_rigs(path)[0].character.body is None
 
 
+def test_a_body_that_usd_leaves_where_it_was_made_is_told(tmp_path):
+    def told(path):
+        found = [
+            [note for note in notes if "SkelRoot" in note] for notes in (read_shot(path).notes, inspect(path)["spoils"])
+        ]
+        assert found[0] == found[1]
+        return found[0]
+
+    character = write_shot(tmp_path, Recipe(bound="mesh"))
+    assert told(character) == []
+    (note,) = told(write_shot(tmp_path, Recipe(skel_root=False), "bare"))
+    assert note.startswith("/Hero/Rig: no SkelRoot is above /Hero/Skin,") and note.endswith("; make /Hero a SkelRoot")
+    # A reference on a prim with a type of its own, which is stronger than the SkelRoot's.
+    stage = Usd.Stage.CreateNew(str(tmp_path / "set.usda"))
+    for name, kind in (("Left", UsdGeom.Xform), ("Right", UsdSkel.Root)):
+        kind.Define(stage, f"/Set/{name}").GetPrim().GetReferences().AddReference("./shot.usda", "/Hero")
+    stage.GetPrimAtPath("/Set/Left").SetInstanceable(True)
+    stage.Save()
+    (note,) = told(tmp_path / "set.usda")
+    assert note.startswith("/Set/Left/Rig: ")
+    assert note.endswith("; /Set/Left is one below an opinion that types it Xform: type it SkelRoot there")
+
+
 @pytest.mark.parametrize("above", [False, True])
 @pytest.mark.parametrize("method", ["dualQuaternion", "classicLinear"])
 def test_a_body_that_is_not_posed_as_its_mesh_asks_is_told(tmp_path, method, above):
