@@ -20,6 +20,7 @@ from .curves import left_as_they_are, without_points
 from .notes import another_carries, few, no_points, too_far, unusable_skeleton
 from .other_curves import other_hair
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
+from .seat_notes import coarsely_placed
 from .unusable import Unusable, find_unusable, lies_on
 
 
@@ -105,9 +106,8 @@ class HairSearch:
         if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
             self._off_head.append(f"{path}: rides on '{joint}', not on a head")
         measured = [] if away else untrained(carrying)  # a chest has not a head's measures
-        self._notes += (
-            moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim) + measured + unevenly_scaled(carrying)
-        )
+        self._notes += moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim) + measured
+        self._notes += unevenly_scaled(carrying) + coarsely_placed(prim, found.rig, found.character, placement)
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

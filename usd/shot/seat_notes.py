@@ -1,21 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on how a groom sits on skin: off it, upside down, or drawn from above it."""
+"""Notes on how a groom sits on skin: off it, upside down, or drawn from above it; and on one too far away to be placed exactly."""
+
+from contextlib import suppress
 
 import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
-from neuralocks_core.rotation import transformed
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import inverse, sizes, transformed
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .curve_ends import Beyond
-from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends
+from .seat import CLEARLY, NEAR, SOME_TIMES, either_ends, find_seat, off_skin, some_ends
 
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
 ASTRAY = 0.3
 """Bound hair farther from skin than this [m], on a person, is not where its author has put it: hats and wigs are nearer."""
+COARSE = 2e-4
+"""Points that single precision can only put so far apart [m] make strands tremble, which are about half as thick."""
 LEVEL = 0.001
 """Points nearer to skin than this [m] are all alike: skins are only as smooth as their triangles."""
 
@@ -95,4 +101,25 @@ def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool, beyond: Beyond | None
     return [
         f"{prim.GetPath()}: its curves are not pinned, so they are drawn from their second points on, but the first ones lie "
         "on the skin and are taken for the roots; set their wrap to pinned"
+    ]
+
+
+def coarsely_placed(prim: Usd.Prim, rig: StageRig, character: Character, placement: Placement) -> list[str]:
+    """The note on hair so far from its prim's origin, where joints or points in world space put it, that the prim's points are
+    not exact enough there.
+    """
+    some = np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int))
+    places = rig.clip.joints[some, character.carrying_joint, :3, 3]
+    worst, away = 0.0, 0.0
+    with suppress(NeuralocksError):  # a prim that is flat for a while, which is told where a bake comes to it
+        for code, place in zip(rig.time_codes[some], places):
+            to_world = rig.border.to_core @ placement.at(code)
+            own, unit = transformed(place, inverse(to_world)), abs(sizes(to_world))
+            step = float(np.spacing(np.float32(abs(own).max()))) * unit
+            worst, away = max((worst, away), (step, float(np.linalg.norm(own)) * unit))
+    if worst < COARSE:
+        return []
+    return [
+        f"{prim.GetPath()}: the head is up to {away:.0f} m from this prim's origin, where points can only be {1000 * worst:.2g} mm "
+        "apart, so its strands tremble; bring the character there by a transform above its hair"
     ]

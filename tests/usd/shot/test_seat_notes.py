@@ -95,3 +95,33 @@ def test_bound_hair_far_from_the_skin_is_told(tmp_path):
         assert len(told) == 1 and told[0].startswith(
             "/Hero/Hair: its skel binding puts its roots 4.8 m from the skin of"
         )
+
+
+def test_hair_that_points_cannot_place_is_told(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=0.01))
+
+    def told(moved):
+        stage = Usd.Stage.Open(str(path))
+        moved(stage)
+        stage.Save()
+        found = [
+            [note for note in notes if "tremble" in note] for notes in (read_shot(path).notes, inspect(path)["spoils"])
+        ]
+        assert found[0] == found[1]
+        return found[0]
+
+    def by_transform(stage):
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp().Set((1e6, 0, 0))
+
+    def by_joints(stage):
+        steps = stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttribute("translations")
+        for code in steps.GetTimeSamples():
+            places = np.array(steps.Get(code))
+            places[0, 0] += 1e6 * (code - 1) / 8
+            steps.Set(Vt.Vec3fArray.FromNumpy(places), code)
+
+    assert told(by_transform) == []
+    (note,) = told(by_joints)
+    assert note.startswith(
+        "/Hero/Hair: the head is up to 10000 m from this prim's origin, where points can only be 0.62 mm apart"
+    )
