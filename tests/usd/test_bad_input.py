@@ -174,6 +174,17 @@ def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called
     assert "no UsdSkel skeleton" in stops[0] and "no BasisCurves prim" in stops[1]
 
 
+def test_where_a_character_stands_that_cannot_be_used_stops_nothing_more(tmp_path):
+    """Ten kilometres out by a transform, which a usable one bakes at."""
+    shot = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp().Set((12000, 0, 0))
+    stage.GetPrimAtPath("/Hero/Rig").GetAttribute("joints").Set(["rig:hips"])
+    stage.Save()
+    (stop,) = inspect(shot)["stops"]
+    assert "'rig:hips', which is no path" in stop
+
+
 def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
     path = edited(tmp_path, renamed, Recipe(bound="none"))
     with pytest.raises(NeuralocksError, match="--head"):
