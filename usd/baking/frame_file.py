@@ -27,13 +27,14 @@ def write_frame(path: Path, points: np.ndarray, spare: Path | None = None) -> No
     os.replace(part, path)
 
 
-def read_rows(path: Path, rows: slice) -> np.ndarray:
-    """Points (n, 3) float32 from `rows.start` to before `rows.stop`. Raises OSError, or ValueError where they are fewer."""
-    count = 3 * (rows.stop - rows.start)
-    numbers = np.fromfile(path, np.float32, count, offset=12 * rows.start)
-    if len(numbers) < count:
-        raise ValueError("it is cut short")
-    return numbers.reshape(-1, 3)
+def read_rows(path: Path, first: int, into: np.ndarray) -> None:
+    """Points from the `first` on, as many as fill `into` (n, 3) float32, one piece of memory. Raises OSError, or ValueError where
+    they are fewer.
+    """
+    with open(path, "rb", buffering=0) as file:
+        file.seek(12 * first)
+        if file.readinto(into.reshape(-1).data) < into.nbytes:
+            raise ValueError("it is cut short")
 
 
 def has_size(path: Path, points: int) -> bool:

@@ -2,7 +2,7 @@
 """The override layer of a bake: sublayers the shot, and puts samples on the groom prims only."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -74,22 +74,22 @@ class OverrideWriter:
         for name in sorted(authored):
             Sdf.AttributeSpec(over, name, names.Vector3fArray).default = Sdf.ValueBlock()
 
-    def sample(self, item: StageGroom, time_code: float, name: str, blocks: Iterable[np.ndarray]) -> None:
+    def sample(
+        self, item: StageGroom, time_code: float, name: str, fill: Callable[[np.ndarray], Iterable[np.ndarray]]
+    ) -> None:
         """Add one time sample of `points` (and of the extent with it) or `velocities`.
 
         Args:
             item: the groom.
             time_code: when.
             name: "points" or "velocities".
-            blocks: consecutive parts (n, 3) float32 of all P values: a large groom's are never all there twice.
+            fill: puts all P values into an array of zeros (P, 3) float32, and yields consecutive parts of it as they are
+                there: a large groom's are in memory once.
         """
-        array, first, corners = Vt.Vec3fArray(item.point_count), 0, []
-        inside = np.asarray(_Writable(array))
-        for block in blocks:
-            inside[first : first + len(block)] = block
-            first += len(block)
+        array, corners = Vt.Vec3fArray(item.point_count), []
+        for part in fill(np.asarray(_Writable(array))):
             if name == "points":
-                corners += _corners(block)
+                corners += _corners(part)
         values = {name: array}
         if name == "points":
             pad = self._reach[item.prim.GetPath()]

@@ -11,6 +11,7 @@ import shutil
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -177,7 +178,9 @@ class _Store:
         """Write the samples that need no frame after `code`, which are in the spool; `done` is called after each."""
         while self._left and max(self._left[0][2], default=code) <= code:
             name, at, _ = self._left.popleft()
-            self._writer.sample(self.item, at, name, self._points(at) if name == "points" else self._velocities(at))
+            self._writer.sample(
+                self.item, at, name, partial(self._points if name == "points" else self._velocities, at)
+            )
             done()
 
     def whole(self, velocities: bool, facts: dict, done: Callable[[], None]) -> None:
@@ -185,30 +188,32 @@ class _Store:
         self.open(velocities, facts)
         self.put(math.inf, done)
 
-    def _rows(self) -> Iterator[slice]:
-        first, end = self._first, self._first + self.item.point_count
-        return (slice(low, min(low + BLOCK, end)) for low in range(first, end, BLOCK))
+    def _blocks(self, into: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """Parts (n, 3) of an array for all points of the groom, each with its first point's number in the batch."""
+        for low in range(0, len(into), BLOCK):
+            yield self._first + low, into[low : low + BLOCK]
 
-    def _points(self, code: float) -> Iterator[np.ndarray]:
-        """Blocks (n, 3) float32, in units of the prim."""
-        return (self._spool.read(self._number, code, rows) for rows in self._rows())
+    def _points(self, code: float, into: np.ndarray) -> Iterator[np.ndarray]:
+        """Fills an array (P, 3) float32 in units of the prim; yields parts of it as they are filled."""
+        for first, part in self._blocks(into):
+            self._spool.read(self._number, code, first, part)
+            yield part
 
-    def _velocities(self, code: float) -> Iterator[np.ndarray]:
-        """Blocks (n, 3) float32, in units of the prim per second."""
-        terms = self._plan.terms(code)
-        for rows in self._rows():
-            result = np.zeros((rows.stop - rows.start, 3), np.float32)
-            base = None
-            for other, weight in terms:
-                part = self._spool.read(self._number, other, rows)
-                if base is None:
-                    base = part
-                    continue
+    def _velocities(self, code: float, into: np.ndarray) -> Iterator[np.ndarray]:
+        """The same in units of the prim per second; of zeros, to which they are added."""
+        (base_code, _), *terms = self._plan.terms(code) or [(code, 0.0)]
+        base, other = np.empty((2, min(BLOCK, len(into)), 3), np.float32)
+        for first, part in self._blocks(into):
+            here, term = base[: len(part)], other[: len(part)]
+            if terms:
+                self._spool.read(self._number, base_code, first, here)
+            for term_code, weight in terms:
+                self._spool.read(self._number, term_code, first, term)
                 # The weights add up to nothing: of differences, hair that stands still has no velocity by rounding.
-                part -= base
-                part *= np.float32(weight)
-                result += part
-            yield result
+                term -= here
+                term *= np.float32(weight)
+                part += term
+            yield part
 
 
 def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bool) -> None:

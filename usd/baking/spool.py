@@ -109,15 +109,15 @@ class Spool:
             self._sure.add(path)
         return path in self._sure
 
-    def read(self, groom: int, time_code: float, rows: slice) -> np.ndarray:
-        """Rows (n, 3) float32, from a first to before a last, of the points of a frame that is there.
+    def read(self, groom: int, time_code: float, first: int, into: np.ndarray) -> None:
+        """Fill `into` (n, 3) float32 with points of a frame that is there, from the `first` on.
 
         Raises:
             NeuralocksError: they cannot be read.
         """
         path = self._path(groom, time_code)
         try:
-            return read_rows(path, rows)
+            read_rows(path, first, into)
         except (OSError, ValueError) as error:
             raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
 

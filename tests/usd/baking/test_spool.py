@@ -12,6 +12,12 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.spool import Spool, _remove, fingerprint
 
 
+def read(spool, code, rows):
+    points = np.zeros((rows.stop - rows.start, 3), np.float32)
+    spool.read(0, code, rows.start, points)
+    return points
+
+
 def test_a_damaged_mark_means_a_fresh_start(tmp_path):
     folder = tmp_path / ".bake.usdc.baking"
     folder.mkdir()
@@ -48,7 +54,7 @@ def test_frames_that_were_left_damaged_are_not_taken_over(tmp_path, points):
     again = Spool(tmp_path / "bake.usdc", "a")
     whole = [code for code in (1.0, 2.0, -3.5) if again.holds(0, code, points)]
     assert [again._path(0, code) for code in whole] == files[:1]
-    assert np.array_equal(again.read(0, whole[0], slice(points // 2, points)), array[points // 2 :])
+    assert np.array_equal(read(again, whole[0], slice(points // 2, points)), array[points // 2 :])
     again.discard()
 
 
@@ -57,10 +63,10 @@ def test_a_frame_that_is_cut_short_while_it_is_used_is_one_line(tmp_path):
     spool.write(0, 1.0, np.ones((10, 3)))
     with open(spool._path(0, 1.0), "r+b") as file:
         file.truncate(5 * 12)
-    assert len(spool.read(0, 1.0, slice(0, 5))) == 5
+    assert read(spool, 1.0, slice(0, 5)).all()
     for rows in (slice(0, 10), slice(5, 10), slice(8, 10)):
         with pytest.raises(NeuralocksError, match="cannot be read .*; bake again"):
-            spool.read(0, 1.0, rows)
+            read(spool, 1.0, rows)
     spool.discard()
 
 
@@ -130,7 +136,7 @@ def test_a_bake_that_fails_once_it_let_go_of_the_folder_leaves_it_to_the_next(tm
     following = Spool(tmp_path / "bake.usdc", "a")
     following.write(0, 1.0, np.ones((2, 3)))
     getattr(done, ending)()
-    assert following.read(0, 1.0, slice(0, 2)).all() and (following.folder / "lock").exists()
+    assert read(following, 1.0, slice(0, 2)).all() and (following.folder / "lock").exists()
     following.discard()
     assert [path.name for path in tmp_path.iterdir()] == ["bake.usdc"]
 
