@@ -10,7 +10,7 @@ from .scene.binding import hidden
 from .scene.last_called import others_called
 from .scene.sampling import shown_frame, timing_of
 from .services.axes import to_core
-from .services.motion import TOLERANCE, as_carried
+from .services.motion import as_carried, same_pose
 from .session import session
 
 
@@ -31,7 +31,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))
     if row is not None:
-        same = np.abs(world - sampled.drawn[row]).max(axis=(1, 2)) < TOLERANCE
+        same = same_pose(world, sampled.drawn[row])
         if body:
             same |= _hair(armature, sampled)
         if same[sampled.moving(body)].all():

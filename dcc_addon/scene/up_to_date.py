@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a sampled motion is still what Blender shows, and sampling it anew where it is not."""
 
-import numpy as np
-
-from ..services.motion import TOLERANCE
+from ..services.motion import same_pose
 from ..session import SampledRig, session
 from .carried import hairs_of
 from .layers import layer_of, working_in
@@ -40,7 +38,7 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
             with working_in(scene, layer):
                 evaluated = named(name).evaluated_get(context.evaluated_depsgraph_get())
                 drawn = (reader.world(evaluated) @ sampled.trim)[read]
-            if np.abs(drawn - sampled.drawn[row, read]).max() >= TOLERANCE:
+            if not same_pose(drawn, sampled.drawn[row, read]).all():
                 return False
     return True
 

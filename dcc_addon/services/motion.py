@@ -16,6 +16,13 @@ from .uneven import ROUNDED, carriable, nearest, sheared, uneven
 
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
+KEPT_TO = float(np.finfo(np.float32).eps)
+"""What is kept of a number in single precision, relative to it: 2 km from the origin it is as coarse as TOLERANCE."""
+
+
+def same_pose(drawn: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Which transforms (..., 4, 4) are, up to rounding, those that were kept in single precision, (...)."""
+    return (np.abs(drawn - kept) < TOLERANCE + KEPT_TO * np.abs(kept)).all(axis=(-2, -1))
 
 
 def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:

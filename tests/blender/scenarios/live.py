@@ -214,6 +214,30 @@ def moved_hair(folder: Path) -> None:
     assert not messages(), messages()
 
 
+def far_from_the_origin(_folder: Path) -> None:
+    """Single precision, in which poses are kept, is coarse there, in a scene of centimetres 20 m away: what nobody edited is
+    up to date, and an edit is noticed.
+    """
+    from dcc_addon.scene.up_to_date import ensure
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    place = bpy.data.objects.new("Place", None)
+    scene.collection.objects.link(place)
+    place.location, rig.parent = (3000, 2100, 0), place
+    strands = scenes.hair(rig, 10)
+    make_live(rig, strands)
+    sampled = session.rigs["Rig"]
+    for frame in range(1, 25):
+        scene.frame_set(frame)
+        assert not sampled.stale, frame
+    assert ensure(bpy.context, rig, looking=True) is sampled, "no frame is as it was"
+    place.location.x += 0.01
+    scene.frame_set(9)
+    assert sampled.stale
+
+
 def rendering(folder: Path) -> None:
     """A final render sees the hair of the viewport, frame by frame, and samples what is out of date."""
     rig = scenes.armature()
