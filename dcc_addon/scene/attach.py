@@ -144,6 +144,7 @@ def _cache_file(path: str):
             return cache
     bpy.ops.cachefile.open(filepath=path)
     cache = next(c for c in bpy.data.cache_files if c.name not in known)
+    cache.user_clear()  # the operator counts one that is none, and the block would outlast its modifiers
     cache.filepath = named_here(path)
     return cache
 

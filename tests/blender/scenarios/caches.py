@@ -109,6 +109,7 @@ def taken_off(folder: Path) -> None:
         strands.neuralocks_hair.live = False
         assert deform.show_viewport and deform.show_render, "the hair stays behind its surface"
         assert [modifier.name for modifier in strands.modifiers] == [deform.name] and not messages(), messages()
+        assert not bpy.data.cache_files, "a cache that nothing plays goes into the file"
 
 
 def stretched_since(folder: Path) -> None:
