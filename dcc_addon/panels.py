@@ -85,7 +85,7 @@ def _motion(layout, armature, scene) -> None:
                 layout, f"Hair knows the motion of frames {first:g} to {last:g} only; widen the scene's range", "INFO"
             )
     if sampled is not None:
-        for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off):
+        for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off, *sampled.hairs_off.values()):
             words(layout, text, "INFO")
     message(layout, armature.name_full)
 

@@ -65,6 +65,8 @@ class SampledRig:
     """What to say of bodies that are drawn elsewhere than hair is kept out of; see `scene.body_drawn`."""
     leaps: tuple[str, ...] = ()
     """What to say of frames at which the character is put elsewhere; see `services.leaps`."""
+    hairs_off: dict[str, str] = field(default_factory=dict)
+    """What to say of hair objects, by name, that do not go with the head; see `scene.straying`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:

@@ -115,6 +115,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     check_ours([*outs, *map(shot_beside, outs)], is_own)
     sampled = yield from sampling(context, named(character), share=0.5)
+    notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):

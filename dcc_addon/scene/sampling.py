@@ -19,7 +19,7 @@ from ..services.hidden import unhidden
 from ..services.leaps import leaps_told
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
-from . import actions, body_drawn, rotations
+from . import actions, body_drawn, rotations, straying
 from . import armature as armature_reader
 from . import body as body_reader
 from .binding import bind_places, hidden
@@ -257,11 +257,23 @@ class _Recording:
             own=self._own,
             rigging=self._rigging,
             posture=self._posture,
+            hairs_off=self._straying(),
             bodies_off=body_drawn.all_told(
                 armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
             ),
             leaps=leaps_told(clip, character.head, motion.frames),
         )
+
+    def _straying(self) -> dict[str, str]:
+        """What to say of hair objects that do not go with the head, by name."""
+        joint = self._rig.humanoid().get("hips", 0)
+        carriers = [np.broadcast_to(np.eye(4), self._heads.shape), self._places[""], self._heads]
+        while joint >= 0:  # what carries the whole body is as good as its object
+            carriers.append(self._drawn[:, joint].astype(float))
+            joint = self._rig.parents[joint]
+        hairs = [thing for name in self._tracked if name not in self._bodies and (thing := find(name)) is not None]
+        said = {h.name_full: straying.told(h, self._places[h.name_full], carriers, self._unit) for h in hairs}
+        return {name: text for name, text in said.items() if text}
 
 
 class stepping:

@@ -173,6 +173,16 @@ def on_head(places: np.ndarray, objects: np.ndarray, heads: np.ndarray, bind: np
     return bind @ by_head[0]
 
 
+def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
+    """How far a path (T, 3) leads, at most, from where that of some carriers would take its first point which it follows
+    most closely; each is world transforms (T, 4, 4).
+    """
+    able = [carrier for carrier in carriers if np.linalg.det(carrier[0])]  # not those hidden by a scale of zero
+    ways = [carrier @ np.linalg.inv(carrier[0]) for carrier in able]
+    off = [path - (way[:, :3, :3] @ path[0] + way[:, :3, 3]) for way in ways]
+    return min((float(np.linalg.norm(each, axis=-1).max()) for each in off), default=0.0)
+
+
 def stood_up(rig: RigArrays, place: np.ndarray) -> np.ndarray:
     """Where an armature object that stands at `place` (4, 4) stands in the bind pose: there, without leaning."""
     similar(place, rig.name)  # or what cannot be used would have no name

@@ -7,7 +7,7 @@ from unittest import SkipTest
 import bpy
 import numpy as np
 
-from tests.blender import scenes
+from tests.blender import panel, scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
 
 
@@ -245,6 +245,41 @@ def ways_of_parenting(folder: Path) -> None:
     assert set(character.body.joint_indices[character.body.joint_weights > 0]) == {character.head}
     on_surface.neuralocks_hair.live = False
     assert deform.show_viewport and deform.show_render
+
+
+def straying(folder: Path) -> None:
+    """Hair objects that move otherwise than the head, on a jaw or by keys of their own, are told of, for hair stays on the
+    head; none that hangs on the head, on what carries all of the body, or stands still is. The remedy works.
+    """
+    from dcc_addon.session import session
+
+    jaw = ("jaw", "head", (0, -0.02, 1.6), (0, -0.12, 1.57))
+    rig, scene = scenes.armature(bones=[*scenes.BONES, jaw]), bpy.context.scene
+    scenes.dance(rig)
+    for frame, angle in ((1, 0.0), (12, 0.5), (24, 0.0)):
+        rig.pose.bones["jaw"].rotation_euler.x = angle
+        rig.pose.bones["jaw"].keyframe_insert("rotation_euler", frame=frame)
+    hairs = {name: scenes.hair(rig, 10, name=name) for name in ("Beard", "OnHead", "OnHips", "Own", "OnRig", "Still")}
+    for name, bone in (("Beard", "jaw"), ("OnHead", "head"), ("OnHips", "hips")):
+        rest = rig.data.bones[bone]
+        hairs[name].parent_type, hairs[name].parent_bone = "BONE", bone
+        hairs[name].matrix_parent_inverse = (rest.matrix_local @ scenes.translation((0, rest.length, 0))).inverted()
+    for frame in (1, 24):
+        hairs["Own"].location.x = frame / 24
+        hairs["Own"].keyframe_insert("location", frame=frame)
+    hairs["Still"].parent = None
+    beard = hairs["Beard"]
+    scene.frame_set(9)
+    on_jaw = points_at(beard, 9)[::24]
+    make_live(rig, beard)
+    told = session.rigs["Rig"].hairs_off
+    assert sorted(told) == ["Beard", "Own"] and all("Head bone" in text for text in told.values()), told
+    assert apart(points_at(beard, 9)[::24], on_jaw) > 0.01, "it rides on the jaw: say so no longer"
+    assert any("Beard: its object moves" in line for line in panel.drawn("INFO"))
+    rig.neuralocks_character.head_bone = "jaw"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert "Beard" not in session.rigs["Rig"].hairs_off
+    assert apart(points_at(beard, 9)[::24], on_jaw) < SAME
 
 
 def new_hair(folder: Path) -> None:
