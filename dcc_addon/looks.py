@@ -21,7 +21,8 @@ class Look(NamedTuple):
 
 
 def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
-    """The names of hair objects that can be baked, by look, and what is to be told of the others.
+    """The names of hair objects that can be baked, by look, and what is to be told of the others. The order is that of the
+    names: no slider may exchange the hair of two numbered files, which another scene refers to.
 
     Args:
         hairs: hair objects, one at least.
@@ -48,7 +49,7 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
         for name in undrawn
         if name in found
     ]
-    return sorted(looks.items()), [*(f"{text} (left out)" for text in left_out), *told]
+    return sorted(looks.items(), key=lambda look: min(look[1])), [*(f"{text} (left out)" for text in left_out), *told]
 
 
 def _look(hair) -> Look:

@@ -83,6 +83,21 @@ def hidden_in_renders(folder: Path) -> None:
     refused(bpy.ops.neuralocks.bake, "Backup: some points are not finite")
 
 
+def numbered_by_name(folder: Path) -> None:
+    """Of hair of two looks each keeps its numbered file, to which other scenes may refer, whatever its sliders say."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 5, name="Scalp").neuralocks_hair.model = MODEL
+    beard = scenes.hair(rig, 5, name="Beard")
+    beard.neuralocks_hair.model = MODEL
+    bpy.context.scene.neuralocks.armature = rig
+    for bend in (0.5, 2.0):
+        beard.neuralocks_hair.bend = bend
+        assert bpy.ops.neuralocks.bake(filepath=str(folder / "hair.usdc")) == {"FINISHED"}
+        for number, name in enumerate(("Beard", "Scalp"), 1):
+            assert _drawn(folder / f"hair_{number}.usdc") == {f"Hair_{name}"}, bend
+
+
 def told_of_a_bake(folder: Path) -> None:
     """What a bake has to say is reported, with the names of objects and without options of a terminal."""
     rig, scene = scenes.armature("Hero"), bpy.context.scene
