@@ -16,15 +16,17 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 
-from ..border.damage import names_damage
+from ..border.damage import named, names_damage
 from ..border.stage_files import check_not_input, unsaved, used_files
 from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
+from .header import write_header
 from .override import OverrideWriter, deliver
 from .sample_layer import SAVE_EVERY, SampleLayer
 from .spool import Spool, fingerprint, program_files, unsaved_digest
@@ -102,7 +104,7 @@ def _carried(item: StageGroom) -> list:
 def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
     plans = [[Stencils(item, codes, shot.first, velocities) for item in items] for items in batched]
     uses = Uses(plans)
-    there = spool.go_on(hashlib.sha256(repr(codes).encode()).hexdigest(), uses.spent)
+    there = spool.go_on(_plan(shot, spool.out, codes, facts), uses.spent)
     file = SampleLayer(spool.layer_path, spool.out, spool.log, there)
     writer = OverrideWriter(file, spool.out, shot, codes)
     needed = [uses.codes(number) for number in range(len(plans))]
@@ -142,6 +144,16 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
         behind.put(writer.close)
     deliver(spool)
     return resumed
+
+
+def _plan(shot: Shot, out: Path, codes: list[float], facts: dict) -> str:
+    """Digest of what a layer says beside its samples, and of their time codes: a folder that was moved has another way to the
+    shot, and options that change no sample are told, too.
+    """
+    header = Sdf.Layer.CreateAnonymous()
+    with named(out):
+        write_header(header, shot.stage, shot.border, shot.path, out, codes)
+    return hashlib.sha256(repr((codes, facts, header.ExportToString())).encode()).hexdigest()
 
 
 class _Store:

@@ -115,6 +115,25 @@ def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatc
     assert out.read_bytes() == whole
 
 
+@pytest.mark.parametrize("changed", [{"folder": "a/deeper"}, {"cuts": []}, {"joints": {"head": "head"}}])
+def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_path, model, monkeypatch, changed):
+    """Where the folder was moved, or options are told that change no sample: a layer that finds no shot is worth nothing."""
+    shot, first = write_shot(tmp_path), tmp_path / "one" / "bake.usdc"
+    last = tmp_path / changed.pop("folder", "one") / first.name
+    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+
+    def stop(done, total, message):
+        if done == 7:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, first, model, progress=stop)
+    last.parent.parent.mkdir(exist_ok=True)
+    first.parent.rename(last.parent)
+    resumed = bake(shot, last, model, **changed).path.read_bytes()
+    assert bake(shot, last, model, **changed).path.read_bytes() == resumed
+
+
 def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
     shot, out = write_shot(tmp_path, Recipe(frames=40, strands=2000, vertices=16)), tmp_path / "bake.usdc"
     command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
