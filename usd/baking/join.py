@@ -79,6 +79,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     total, done = sum(map(len, plan.values())), 0
     spool = Spool(out, fingerprint([part.path for part in every], {}))
     try:
+        spool.drop_layers()
         file = SampleLayer(spool.layer_path, out)
         with named(out):
             _copy_header(first.layer, file.layer, out, every)

@@ -94,9 +94,13 @@ class Spool:
                 return puts
         except OSError:
             pass
-        for layer in left:
-            _remove(layer)
+        self.drop_layers()
         return 0
+
+    def drop_layers(self) -> None:
+        """Remove the layers that were left, to make a new one."""
+        for layer in self._named(_LAYER):
+            _remove(layer)
 
     def size(self) -> int:
         """Bytes of all that is there to go on from."""

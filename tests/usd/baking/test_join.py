@@ -230,6 +230,24 @@ def test_a_stopped_join_leaves_nothing(shot, tmp_path, model):
     assert sorted(os.listdir(tmp_path)) == sorted(part.name for part in parts)
 
 
+def test_a_killed_join_leaves_no_layer_to_the_next(shot, tmp_path, model, monkeypatch):
+    parts, out = parts_of(shot, tmp_path, model), tmp_path / "hair.usdc"
+    layers = []
+
+    def look(done, total, message):
+        layers.append(len(list(tmp_path.glob(".hair.usdc.baking/*.usdc"))))
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as killed:
+        killed.setattr("usd.baking.join.Spool.discard", lambda spool: spool._lock.release())
+        for _ in range(3):
+            with pytest.raises(KeyboardInterrupt):
+                join(parts, out, progress=look)
+    join(parts, out)
+    assert set(layers) == {1}
+
+
 @pytest.mark.parametrize(
     ("rate", "frames", "begin", "end", "parts"),
     [(24.0, 12, 0.3, 12.8, ("1:6", "7:12")), (1000.0, 120, 1, 120, ("1:50", "84.333333:120"))],
