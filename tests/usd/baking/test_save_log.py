@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pxr import Sdf, Vt
 
-from usd.baking import sample_layer
+from usd.baking import sample_layer, save_log
 from usd.baking.sample_layer import SampleLayer
-from usd.baking.save_log import SaveLog, spent_frames
+from usd.baking.save_log import HEADER, SaveLog, spent_frames
 
 HAIR, SPENT = Sdf.Path("/Hair"), range(1, 13)
 
@@ -61,6 +61,22 @@ def test_a_page_that_a_power_cut_took_is_missed(tmp_path):
         file.seek(25 * 4096)  # the second save's: 72,000 bytes each
         file.write(bytes(4096))
     assert log_in(tmp_path).restore(part) == 2
+
+
+def test_a_page_that_begins_with_zeros_is_missed(tmp_path):
+    """As velocities of hair do of which some stands still."""
+    file = tmp_path / "values"
+    values = np.ones(9000, np.uint64)
+    values[::512] = 0
+    file.write_bytes(values.tobytes())
+    before = save_log._trace(file, HEADER, 71_997)
+    for lost in (1, 3, 17):
+        changed = values.copy()
+        changed[512 * lost : 512 * (lost + 1)] = 0
+        file.write_bytes(changed.tobytes())
+        assert save_log._trace(file, HEADER, 71_997) != before
+    file.write_bytes(bytes(HEADER) + values.tobytes()[HEADER:])  # which is another one after the next save
+    assert save_log._trace(file, HEADER, 71_997) == before
 
 
 def test_a_file_with_all_its_samples_is_closed_as_it_is(tmp_path):
