@@ -147,7 +147,7 @@ def prepare(hair, sampled, wanted: tuple, wait: bool) -> Prepared | None:
     path = model_path(hair)
     if prepared is not None and prepared.file != (path, stamp(path)):
         session.doubtful.add(name)
-    if prepared is None or name in session.doubtful or prepared.hair.character is not sampled.character:
+    if prepared is None or name in session.doubtful or prepared.hair.character is not sampled.carrying(name):
         made_of, make = _recipe(hair, sampled, wanted)
         if prepared is None or prepared.made_of != made_of:
             session.forget(name)
@@ -193,16 +193,16 @@ def _recipe(hair, sampled, wanted: tuple):
     """What the prepared hair is made of, to be compared, and a function of a progress callback that makes it without
     Blender, with all that its first frame needs.
     """
-    name, data, path = hair.name_full, hair.data, model_path(hair)
+    name, data, path, character = hair.name_full, hair.data, model_path(hair), sampled.carrying(hair.name_full)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(hair)
     # The hair keeps its character, so no other one gets its id.
     file = path, stamp(path)
-    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(sampled.character)
+    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(character)
 
     def make(say) -> Prepared:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
-        live = LiveHair(groom, sampled.character, load_model(path), lambda done: say(0.8 * done, 1))
+        live = LiveHair(groom, character, load_model(path), lambda done: say(0.8 * done, 1))
         live.follow(sampled.clip)
         live.points(*wanted)
         return Prepared(live, made_of, own, of, file)

@@ -40,8 +40,9 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
             _tell_late(armature.name_full)
         elif moved:
             sampled.stale = session.wanting = True
-    drawn, head = to_core(sampled.motion.metres_per_unit) @ world, sampled.character.head
-    drawn[head] = as_carried(drawn[head], armature.name_full)
+    drawn = to_core(sampled.motion.metres_per_unit) @ world
+    for joint in {sampled.character.head, *sampled.carriers.values()}:
+        drawn[joint] = as_carried(drawn[joint], armature.name_full)
     if row is not None:
         drawn[same] = sampled.clip.joints[row, same]
     return drawn

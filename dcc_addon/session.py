@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -61,21 +61,36 @@ class SampledRig:
     posture: int = 0
     """How what is not keyed was posed; see `scene.sampling.posture_of`."""
 
+    carriers: dict[str, int] = field(default_factory=dict)
+    """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
+    carried: dict[int, Character] = field(default_factory=dict)
+    """The character with such a joint, made once; see `carrying`."""
     bodies_off: tuple[str, ...] = ()
     """What to say of bodies that are drawn elsewhere than hair is kept out of; see `scene.body_drawn`."""
     leaps: tuple[str, ...] = ()
     """What to say of frames at which the character is put elsewhere; see `services.leaps`."""
     hairs_off: dict[str, str] = field(default_factory=dict)
-    """What to say of hair objects, by name, that do not go with the head; see `scene.straying`."""
+    """What to say of hair objects, by name, that do not go with the head; see `scene.riding`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of the body meshes."""
         return self.key[1]
 
+    def carrying(self, hair: str) -> Character:
+        """The character as it carries a hair object: the very same one as long as it stays the same."""
+        joint = self.carriers.get(hair)
+        if joint is None:
+            return self.character
+        return self.carried.setdefault(joint, replace(self.character, carrier=joint))
+
     def moving(self, body: bool) -> np.ndarray:
         """Joints (N,) by which hair is moved; with `body` also those that move the body, which hair is kept out of."""
-        return self._moving_hair_and_body if body else np.unique(list(self.character.humanoid.values()))
+        return self._moving_hair_and_body if body else self._moving_hair
+
+    @cached_property
+    def _moving_hair(self) -> np.ndarray:
+        return np.unique([*self.character.humanoid.values(), *self.carriers.values()])
 
     @cached_property
     def _moving_hair_and_body(self) -> np.ndarray:

@@ -83,7 +83,7 @@ def _hair(hair, label: str, sampled, visible: bool):
         widths=2 * radius,
         bind_place=sampled.bind_places[hair.name_full],
         places=sampled.motion.places[hair.name_full],
-        joint=sampled.character.head,
+        joint=sampled.carrying(hair.name_full).carrying_joint,
         spline=Spline("cubic", basis, "pinned") if basis else Spline(),
         visible=visible,
     )

@@ -19,7 +19,7 @@ from ..services.hidden import unhidden
 from ..services.leaps import leaps_told
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
-from . import actions, body_drawn, rotations, straying
+from . import actions, body_drawn, riding, rotations
 from . import armature as armature_reader
 from . import body as body_reader
 from .binding import bind_places, hidden
@@ -228,21 +228,30 @@ class _Recording:
         self._drawn[rows] = self._joints[: end - first] @ self._trim
         self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
+    def _moved(self, joint: int) -> np.ndarray:
+        """World transforms (T, 4, 4) of a joint as Blender gave them, but for rounding to single precision."""
+        return self._drawn[:, joint].astype(float) @ np.linalg.inv(self._trim[joint])
+
     def sampled(self) -> SampledRig:
         """What was read, as the character and clip that live view and bake use."""
         rig, places, armature = self._rig, self._places, find(self.name)
         motion, binds = Motion.joined(self._parts, places), self._binds
+        hairs = [thing for name in self._tracked if name not in self._bodies and (thing := find(name)) is not None]
+        of_hairs = {hair.name_full: places[hair.name_full] for hair in hairs}
+        carriers = riding.carriers(rig, self._head, self._heads, self._moved, of_hairs)
         for other in self._tracked:
-            own = rig_service.on_head(places[other], places[""], self._heads, self._bind[self._head])
+            joint = carriers.get(other, self._head)
+            joints = self._heads if joint == self._head else self._moved(joint)
+            own = rig_service.on_joint(places[other], places[""], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
         arrays = [(body_reader.read(find(body), armature), binds[body]) for body in self._bodies]
         metres = self._unit * rig_service.size_shown(rig, self._place, self._shown)
         character = rig_service.character(rig, self._place, arrays, metres)
         clip = Clip(motion.times, self._world, motion.shape, armature.neuralocks_character.loop)
         clip = replace(clip, cuts=find_cuts(clip, character.head))
-        before = session.rigs.get(self.name)
+        before, carried = session.rigs.get(self.name), {}
         if before is not None and rig_service.same(before.character, character):
-            character = before.character
+            character, carried = before.character, before.carried
         return SampledRig(
             rig,
             motion,
@@ -257,23 +266,21 @@ class _Recording:
             own=self._own,
             rigging=self._rigging,
             posture=self._posture,
-            hairs_off=self._straying(),
+            hairs_off=riding.strays_told(
+                [hair for hair in hairs if hair.name_full not in carriers],
+                rig,
+                self._heads,
+                self._moved,
+                places,
+                self._unit,
+            ),
+            carriers=carriers,
+            carried=carried,
             bodies_off=body_drawn.all_told(
                 armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
             ),
             leaps=leaps_told(clip, character.head, motion.frames),
         )
-
-    def _straying(self) -> dict[str, str]:
-        """What to say of hair objects that do not go with the head, by name."""
-        joint = self._rig.humanoid().get("hips", 0)
-        carriers = [np.broadcast_to(np.eye(4), self._heads.shape), self._places[""], self._heads]
-        while joint >= 0:  # what carries the whole body is as good as its object
-            carriers.append(self._drawn[:, joint].astype(float))
-            joint = self._rig.parents[joint]
-        hairs = [thing for name in self._tracked if name not in self._bodies and (thing := find(name)) is not None]
-        said = {h.name_full: straying.told(h, self._places[h.name_full], carriers, self._unit) for h in hairs}
-        return {name: text for name, text in said.items() if text}
 
 
 class stepping:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender rig, read as arrays, as the core's character; and in plain words what is wrong with it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -51,6 +51,13 @@ class RigArrays:
         if self.head_bone not in self.bones:
             raise NeuralocksError(f"{self.name}: it has no bone '{self.head_bone}'; choose the head bone again")
         return {"head": self.paths[self.bones.index(self.head_bone)]}
+
+    def named_head(self) -> int | None:
+        """The bone that is named like a head, whatever the artist chose; None where none is."""
+        try:
+            return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3])["head"]
+        except NeuralocksError:
+            return None
 
     def humanoid(self) -> Humanoid:
         """Which bone is which, found once; the error says it in the words of the panel."""
@@ -158,19 +165,43 @@ def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
     return 1.0 if abs(size - 1) < 1e-4 else size
 
 
-def on_head(places: np.ndarray, objects: np.ndarray, heads: np.ndarray, bind: np.ndarray) -> np.ndarray | None:
-    """The place (4, 4) in the bind pose of something that goes with the head throughout, by whatever means; None where
-    its motion does not say so.
+def on_joint(places: np.ndarray, objects: np.ndarray, joints: np.ndarray, bind: np.ndarray) -> np.ndarray | None:
+    """The place (4, 4) in the bind pose of something that goes with a joint throughout, by whatever means; None where its
+    motion does not say so.
 
     Args:
-        places, objects, heads: world transforms (T, 4, 4) of it, of the armature object and of the head.
-        bind: of the head in the bind pose (4, 4).
+        places, objects, joints: world transforms (T, 4, 4) of it, of the armature object and of the joint.
+        bind: of the joint in the bind pose (4, 4).
     """
-    by_object, by_head = (np.linalg.inv(carrier) @ places for carrier in (objects, heads))
-    still = TOLERANCE * max(1.0, np.abs(places).max())
-    if np.ptp(by_object, axis=0).max() <= still or np.ptp(by_head, axis=0).max() > still:
+    if _still(places, objects) or not _still(places, joints):
         return None
-    return bind @ by_head[0]
+    return bind @ np.linalg.inv(joints[0]) @ places[0]
+
+
+def carrier_below(
+    places: np.ndarray, heads: np.ndarray, below: Sequence[int], moved: Callable[[int], np.ndarray]
+) -> int | None:
+    """The joint below the head that something goes with which does not go with the head: the jaw of a beard; None where there
+    is none.
+
+    Args:
+        places, heads: world transforms (T, 4, 4) of it and of the head.
+        below: joints below the head, parents first.
+        moved: gives a joint's world transforms (T, 4, 4).
+    """
+    if _still(places, heads):
+        return None
+    for joint in below:
+        joints = moved(joint)
+        if np.linalg.det(joints).all() and _still(places, joints):
+            return int(joint)
+    return None
+
+
+def _still(places: np.ndarray, carriers: np.ndarray) -> bool:
+    """Whether something (T, 4, 4) does not move against what carries it (T, 4, 4)."""
+    relative = np.linalg.inv(carriers) @ places
+    return bool(np.ptp(relative, axis=0).max() <= TOLERANCE * max(1.0, np.abs(places).max()))
 
 
 def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which skeleton and joint carries a groom, and where the groom lies in that rig's bind pose.
 
-In this order: the groom's own skel binding, the binding of the mesh it sits on, the joint named by the user, a joint
-named like a head.
+In this order: the groom's own skel binding, the joint that the prim's own animated transform follows where it sits on a mesh,
+the binding of that mesh, the joint named by the user, a joint named like a head.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from ..border.placement import Placement
 from ..skel.source import StageRig
 from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .alike import one_of_alike
-from .carrying import carried_by, carrying_joint, head_by_name, joint_shares, spread_over
+from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, joint_shares, spread_over
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
@@ -158,12 +158,18 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     seat, turned = _of_roots(prim, one_of_alike(prim, alike, notes), placement)
     rig, mesh = seat.rig, seat.mesh
     joint, why, shares = _by_seat(seat)
-    path = str(prim.GetPath())
-    notes += turned or spread_over(rig, path, joint, shares)
+    path, to_bind, moved = str(prim.GetPath()), seat.to_bind, moment(prim) is not None
+    followed = None if moved else followed_joint(rig, placement)
+    if followed is None:
+        notes += turned or spread_over(rig, path, joint, shares)
+        how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
+    else:
+        joint, to_bind = followed
+        notes += turned
+        how = f"joint '{rig.source.names[joint]}' (which its own transform follows)"
     notes += unsure(prim, seat, placement)
-    how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
-    at_default = None if moment(prim) is None else ways(rig, mesh, placement)[0]
-    return Attachment(rig, carried_by(rig, joint), seat.to_bind, how, False, at_default)
+    at_default = ways(rig, mesh, placement)[0] if moved else None
+    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default)
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:

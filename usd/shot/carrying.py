@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which joint of a rig carries hair, by the joints that the skin under it follows, and the character with that joint."""
+"""Which joint of a rig carries hair, by what its own prim follows or the skin under it, and the character with that joint."""
 
 from dataclasses import replace
 
@@ -9,8 +9,13 @@ from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 
+from ..border.placement import Placement
 from ..skel.source import StageRig
 
+SOME_TIMES = 16
+"""Times at which a prim is compared with joints."""
+STILL = 1e-4
+"""What moves by less [m], and turns by less, against something goes with it."""
 MOST = 0.75
 """Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
 
@@ -26,6 +31,35 @@ def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tu
         if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
             return head, f"joint '{names[head]}'"
     return best, f"joint '{names[best]}'"
+
+
+def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray] | None:
+    """The head, or the joint below it, that a prim's own animated transform follows, as that of hair which was made the child of
+    a bone does, and the way from there to bind world (4, 4) [m]; None where it follows none, or others as well, as where all of
+    the character moves as one.
+    """
+    head, character = rig.character.humanoid.get("head"), rig.character
+    if head is None or not placement.samples:
+        return None
+    rows = np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int))
+    places = np.stack([rig.border.to_core @ placement.at(code) for code in rig.time_codes[rows]])
+    below, joints = character.skeleton.below(head), rig.clip.joints[rows]
+    if _still(places) or any(_still(np.linalg.inv(joints[:, joint]) @ places) for joint in np.flatnonzero(~below)):
+        return None
+    for joint in np.flatnonzero(below):  # parents come first
+        if np.linalg.det(joints[:, joint]).all():
+            way = character.skeleton.bind[joint] @ np.linalg.inv(joints[:, joint]) @ places
+            if _still(way):
+                return int(joint), way[0]
+    return None
+
+
+def _still(places: np.ndarray) -> bool:
+    """Whether transforms (T, 4, 4), which end in metres, are one and the same."""
+    size = np.abs(places[:, :3, :3]).max()
+    return bool(
+        np.ptp(places[:, :3, 3], axis=0).max() < STILL and np.ptp(places[:, :3, :3] / size, axis=0).max() < STILL
+    )
 
 
 def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:

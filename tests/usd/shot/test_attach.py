@@ -12,7 +12,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
-from ..shots import CENTRE, HEAD, RADIUS, Recipe, add_curves, strand_points, write_shot
+from ..shots import CENTRE, HEAD, JOINTS, RADIUS, Recipe, add_curves, strand_points, world_points, write_shot
 
 
 @pytest.mark.parametrize(
@@ -38,8 +38,8 @@ def test_a_head_by_hand_serves_where_no_binding_speaks(tmp_path):
         assert sum("--joint head=neck is not used, the groom is carried by" in note for note in notes) == count
 
 
-def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_path):
-    path = write_shot(tmp_path, Recipe())
+def _with_a_jaw(path):
+    """The shot's stage with a joint below the head, its last one, that opens while the head moves."""
     stage = Usd.Stage.Open(str(path))
     skeleton, motion = UsdSkel.Skeleton.Get(stage, "/Hero/Rig"), UsdSkel.Animation.Get(stage, "/Hero/Rig/Motion")
     joints = [*skeleton.GetJointsAttr().Get(), "hips/spine/neck/head/jaw"]
@@ -59,7 +59,13 @@ def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_
         ):
             attribute.Set([*attribute.Get(code), own], code)
     motion.GetScalesAttr().Set([*motion.GetScalesAttr().Get(), (1, 1, 1)])
-    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair")).GetJointIndicesPrimvar().Set([len(joints) - 1])
+    return stage
+
+
+def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_path):
+    path = write_shot(tmp_path, Recipe())
+    stage = _with_a_jaw(path)
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair")).GetJointIndicesPrimvar().Set([len(JOINTS)])
     stage.Save()
     found = read_shot(path).grooms[0]
     character, posed = found.attachment.character, found.attachment.rig.joints_at(5.0)
@@ -67,6 +73,34 @@ def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_
     assert character.canonical_to_bind[:3, 3] == pytest.approx(character.skeleton.bind[HEAD, :3, 3])
     assert np.allclose(character.carrying(posed) @ character.skeleton.bind[-1], posed[-1])
     assert not np.allclose(character.carrying(posed) @ character.skeleton.bind[HEAD], posed[HEAD], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("unit", "followed", "joint"), [(1, HEAD, "head"), (0.01, HEAD, "head"), (1, len(JOINTS), "jaw"), (1, 2, "head")]
+)
+def test_hair_goes_with_the_joint_that_its_own_transform_follows(tmp_path, model, unit, followed, joint):
+    """As tools write the child of a bone, whatever skin is under its roots; not with a neck, which carries a head."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=unit))
+    stage = _with_a_jaw(path) if unit == 1 else Usd.Stage.Open(str(path))
+    stage.Save()
+    rig = read_shot(path).rigs[0]
+    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
+    began = np.linalg.inv(rig.joints_at(1)[followed])
+    for frame in range(1, 10):
+        way = rig.joints_at(frame)[followed] @ began
+        way[:3, 3] /= unit
+        op.Set(Gf.Matrix4d(way.T.tolist()), frame)
+    stage.Save()
+    item = read_shot(path).grooms[0]
+    assert item.joint.endswith(joint)
+    assert ("its own transform follows" in item.attachment.how) == (followed != 2)
+    if followed == 2:
+        return
+    baked = bake(path, tmp_path / "bake.usdc", model).path
+    roots = [world_points(baked, frame)[:: Recipe.vertices] for frame in (1, 5, 9)]
+    for frame, found in zip((1, 5, 9), roots):
+        way = rig.joints_at(frame)[followed] @ began
+        assert np.abs(found - (roots[0] @ way[:3, :3].T + way[:3, 3])).max() < 1e-5
 
 
 def _without_a_head_by_name(path):

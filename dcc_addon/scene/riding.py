@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What hair objects ride on: the head, a joint below it such as a beard's jaw, or neither, when their object moves by keys of its
+own. That is told, for live hair and bakes stay on the head whatever such an object does.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..services import rig as rig_service
+from . import curves
+
+FAR = 0.01
+"""Less is not told [m]."""
+
+
+def carriers(
+    rig: rig_service.RigArrays, head: int, heads: np.ndarray, moved: Callable[[int], np.ndarray], places: dict
+) -> dict[str, int]:
+    """The joints below the head that hair objects ride on, by name; the others ride on the head.
+
+    Args:
+        rig: the armature.
+        head, heads: its joint that carries hair, and world transforms (T, 4, 4) of that.
+        moved: gives those of a joint, as Blender has them.
+        places: those of the hair objects, by name.
+    """
+    below = np.zeros(len(rig.bones), bool)
+    for joint, parent in enumerate(rig.parents):  # parents come first
+        below[joint] = parent == head or parent >= 0 and below[parent]
+    named = rig.named_head()
+    if named is not None:  # which is no part of a neck that the artist calls the head
+        below[named] = False
+    able = np.flatnonzero(below)
+    found = {name: rig_service.carrier_below(place, heads, able, moved) for name, place in places.items()}
+    return {name: joint for name, joint in found.items() if joint is not None}
+
+
+def strays_told(
+    hairs: list,
+    rig: rig_service.RigArrays,
+    heads: np.ndarray,
+    moved: Callable[[int], np.ndarray],
+    places: dict,
+    metres: float,
+) -> dict[str, str]:
+    """What to say of hair objects that do not go with the head, by name.
+
+    Args:
+        hairs: those that ride on no joint below it.
+        rig, heads, moved: as for `carriers`.
+        places: world transforms (T, 4, 4) of the hair objects, by name, and of the armature under "".
+        metres: of Blender's unit.
+    """
+    joint, ways = rig.humanoid().get("hips", 0), [np.broadcast_to(np.eye(4), heads.shape), places[""], heads]
+    while joint >= 0:  # what carries the whole body is as good as its object
+        ways.append(moved(joint))
+        joint = rig.parents[joint]
+    said = {hair.name_full: _told(hair, places[hair.name_full], ways, metres) for hair in hairs}
+    return {name: text for name, text in said.items() if text}
+
+
+def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> str:
+    """What to say of a hair object at `places`, empty where it goes with one of what hair may hang on, the head's `ways`."""
+    points, shown = curves.points(hair.data), np.abs(np.linalg.det(places)) > 0
+    if not len(points) or not shown.any() or hair.parent_type.startswith("VERTEX"):  # skin is followed strand by strand
+        return ""
+    path = places[shown, :3, :3] @ points.mean(axis=0, dtype=float) + places[shown, :3, 3]
+    far = metres * rig_service.strays(path, [way[shown] for way in ways])
+    if not far >= FAR:
+        return ""
+    return (
+        f"{hair.name_full}: its object moves up to {1000 * far:.0f} mm against the head, which live hair and bakes do not "
+        "follow: they stay on the head bone; make it a child of the bone that it shall ride on"
+    )
