@@ -83,7 +83,6 @@ def write_samples(
     inputs["unsaved"] = unsaved_digest(unsaved(shot.stage))
     batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
-    _check_space(spool, batched, codes, velocities)
     try:
         return _write(shot, codes, batched, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
@@ -105,9 +104,11 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
     plans = [[Stencils(item, codes, shot.first, velocities) for item in items] for items in batched]
     uses = Uses(plans)
     there = spool.go_on(_plan(shot, spool.out, codes, facts), uses.spent)
+    needed = [uses.codes(number) for number in range(len(plans))]
+    spool.keep_only((number, c) for number, some in enumerate(needed) for c in some if not uses.over(number, c, there))
+    _check_space(spool, batched, codes, velocities)
     file = SampleLayer(spool.layer_path, spool.out, spool.log, there)
     writer = OverrideWriter(file, spool.out, shot, codes)
-    needed = [uses.codes(number) for number in range(len(plans))]
     # A frame of a batch is posed once, and written for each of its grooms.
     total = sum((2 * len(items) - 1) * len(some) for items, some in zip(batched, needed, strict=True))
     done, resumed, begin = 0, 0, 0

@@ -8,7 +8,7 @@ import re
 import shutil
 import stat
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write, make_way, remove_empty
 from neuralocks_core.lock_file import FolderLock
 
+from ..border.stopping import deferred
 from .frame_file import has_size, is_whole, read_rows, write_frame
 from .save_log import SaveLog, spent_frames
 
@@ -145,13 +146,22 @@ class Spool:
             os.replace(path, spare)
             self._spares.append(spare)
 
+    def keep_only(self, frames: Iterable[tuple[int, float]]) -> None:
+        """Remove all frames but those of these grooms and time codes: a bake of other frames may have left some."""
+        kept = {self._path(groom, code) for groom, code in frames}
+        for path in self._named(_FRAME):
+            if path not in kept:
+                self._sure.discard(path)
+                _remove(path)
+
     def finish(self) -> None:
-        """Put the assembled layer under its final name and remove the rest."""
-        try:
-            os.replace(self.layer_path, self.out)
-        except OSError as error:
-            raise cannot_write(self.out, error) from None
-        self.discard()
+        """Put the assembled layer under its final name and remove the rest, which is not stopped halfway."""
+        with deferred():
+            try:
+                os.replace(self.layer_path, self.out)
+            except OSError as error:
+                raise cannot_write(self.out, error) from None
+            self.discard()
 
     def close(self) -> None:
         """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
@@ -181,7 +191,8 @@ class Spool:
 def kept(out: Path) -> int:
     """How many finished frames of an interrupted bake lie beside its output, counted for each groom or batch."""
     folder = _folder(out)
-    return sum(1 for _ in folder.glob("*.frame")) + spent_frames(folder / _LOG)
+    frames, layers = (sum(1 for _ in folder.glob(f"*.{ending}")) for ending in ("frame", "part.usdc"))
+    return frames + (spent_frames(folder / _LOG) if layers else 0)
 
 
 def _folder(out: Path) -> Path:

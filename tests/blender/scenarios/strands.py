@@ -269,6 +269,8 @@ def riding(folder: Path) -> None:
         hairs["Own"].location.x = frame / 24
         hairs["Own"].keyframe_insert("location", frame=frame)
     hairs["Still"].parent = None
+    for hair in hairs.values():
+        hair.neuralocks_hair.model = MODEL
     beard = hairs["Beard"]
     on_jaw = {frame: points_at(beard, frame)[::24] for frame in (3, 9, 20)}
     on_head = points_at(hairs["OnHead"], 9)[::24]

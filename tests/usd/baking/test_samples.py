@@ -111,6 +111,12 @@ def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatc
 
     with pytest.raises(KeyboardInterrupt):
         bake(shot, out, model, progress=stop)
+    frames = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
+    assert kept(out) > frames
+    (layer,) = tmp_path.glob(".bake.usdc.baking/*.part.usdc")
+    aside = layer.rename(tmp_path / "aside")
+    assert kept(out) == frames, "what was in the layer is gone"
+    aside.rename(layer)
     assert bake(shot, out, model, frames="2:6").resumed < 5
     assert out.read_bytes() == whole
 

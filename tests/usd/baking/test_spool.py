@@ -167,6 +167,15 @@ def test_a_stop_leaves_finished_frames_and_nothing_else(tmp_path):
     again.discard()
 
 
+def test_frames_that_a_bake_of_others_left_make_way(tmp_path):
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    for code in (1.0, 2.0):
+        spool.write(0, code, np.ones((2, 3)))
+    spool.keep_only([(0, 2.0), (0, 3.0), (1, 1.0)])
+    assert [spool.holds(0, code, 2) for code in (1.0, 2.0)] == [False, True]
+    spool.discard()
+
+
 def test_a_folder_made_for_an_output_that_did_not_come_is_gone(tmp_path):
     Spool(tmp_path / "new" / "bake.usdc", "a").close()
     assert not list(tmp_path.iterdir())
