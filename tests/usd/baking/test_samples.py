@@ -93,6 +93,10 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
                 bake(shot, out, model, progress=until(last))
             posed = min(-(-last // (1 + beards)), 14)
             assert abs(kept(out) - posed) <= 2
+        (layer,) = tmp_path.glob(".bake.usdc.baking/*.part.usdc")
+        aside = layer.rename(tmp_path / "aside")
+        assert kept(out) == len(list(tmp_path.glob(".bake.usdc.baking/*.frame"))), "what was in the layer is gone"
+        aside.rename(layer)
         assert bake(shot, out, model).resumed >= (1 + beards) * (posed - 1)
         assert out.read_bytes() == whole
         out.unlink()
@@ -100,24 +104,23 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
     assert most <= (14 if beards else 9)
 
 
-def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch):
+@pytest.mark.parametrize("frames", ["1:9", "1:5"])
+def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch, frames):
+    """Also for as many; what was saved of it is gone then."""
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
     monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
     whole = bake(shot, out, model, frames="2:6").path.read_bytes()
 
     def stop(done, total, message):
-        if done == 7:
+        if done == 5:
             raise KeyboardInterrupt
 
+    def look(done, total, message):
+        assert len(list(tmp_path.glob(".bake.usdc.baking/*.usdc"))) == 1
+
     with pytest.raises(KeyboardInterrupt):
-        bake(shot, out, model, progress=stop)
-    frames = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
-    assert kept(out) > frames
-    (layer,) = tmp_path.glob(".bake.usdc.baking/*.part.usdc")
-    aside = layer.rename(tmp_path / "aside")
-    assert kept(out) == frames, "what was in the layer is gone"
-    aside.rename(layer)
-    assert bake(shot, out, model, frames="2:6").resumed < 5
+        bake(shot, out, model, frames=frames, progress=stop)
+    assert bake(shot, out, model, frames="2:6", progress=look).resumed < 5
     assert out.read_bytes() == whole
 
 
@@ -220,6 +223,7 @@ def test_a_bake_that_goes_on_asks_for_the_space_that_it_still_needs(tmp_path, mo
             raise KeyboardInterrupt
 
     monkeypatch.setattr("usd.baking.samples.shutil.disk_usage", usage)
+    monkeypatch.setattr("usd.baking.samples.SAVE_EVERY", 1)
     with pytest.raises(KeyboardInterrupt):
         bake(shot, out, model, velocities=False, progress=stop)
     left = len(list(spool.glob("*.frame")))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A crate file goes back to one of its saves, whatever a kill or a power cut left of it, and goes on to the same bytes."""
 
+import json
 import zlib
 
 import numpy as np
@@ -77,6 +78,28 @@ def test_a_page_that_begins_with_zeros_is_missed(tmp_path):
         assert save_log._trace(file, HEADER, 71_997) != before
     file.write_bytes(bytes(HEADER) + values.tobytes()[HEADER:])  # which is another one after the next save
     assert save_log._trace(file, HEADER, 71_997) == before
+
+
+def test_a_page_that_fell_back_to_the_save_before_is_missed(tmp_path):
+    """Values begin in the midst of a page that was on the disk already."""
+    early = written(tmp_path, until=2, name="early.usdc").read_bytes()
+    part = written(tmp_path, log_in(tmp_path), until=8)
+    begin = json.loads((tmp_path / "saves").read_text().splitlines()[2][9:])["begin"]
+    end = -(-begin // 4096) * 4096
+    assert begin < end and len(early) > begin
+    with open(part, "r+b") as file:
+        file.seek(begin)
+        file.write(early[begin:end])
+    assert log_in(tmp_path).restore(part) == 2
+
+
+@pytest.mark.parametrize("harm", ["lost", "changed"])
+def test_a_log_counts_up_to_the_first_line_that_is_not_as_it_was(tmp_path, harm):
+    part, log = written(tmp_path, log_in(tmp_path), until=8), tmp_path / "saves"
+    lines = log.read_text().splitlines(keepends=True)
+    lines[2:3] = [lines[2].replace('"puts": 4', '"puts": 5')] if harm == "changed" else []
+    log.write_text("".join(lines))
+    assert log_in(tmp_path).restore(part) == 2
 
 
 def test_a_file_with_all_its_samples_is_closed_as_it_is(tmp_path):

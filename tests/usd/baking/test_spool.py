@@ -70,6 +70,21 @@ def test_a_frame_that_is_cut_short_while_it_is_used_is_one_line(tmp_path):
     spool.discard()
 
 
+def test_a_frame_is_written_over_one_that_nothing_needs_any_more(tmp_path):
+    """Also over a longer one, of another groom."""
+    spool = Spool(tmp_path / "bake.usdc", "a")
+    spool.write(0, 1.0, np.ones((50, 3)))
+    for code in (1.0, 2.0):
+        spool.forget(0, code)
+        assert not spool.holds(0, code, 50)
+    spool.write(1, 1.0, np.full((9, 3), 2.0))
+    assert not list(spool.folder.glob("*.part"))
+    spool.close()
+    again = Spool(tmp_path / "bake.usdc", "a")
+    assert again.holds(1, 1.0, 9) and (again.read(1, 1.0, slice(0, 9)) == 2).all()
+    again.discard()
+
+
 def test_folders_and_links_in_the_place_of_frames_make_way(tmp_path):
     folder = tmp_path / ".bake.usdc.baking"
     spool = Spool(tmp_path / "bake.usdc", "a")
