@@ -17,14 +17,15 @@ from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT
 from neuralocks_core.runtime import cores
 
 from ..border.damage import names_damage
+from ..shot.notes import few
 from .stage import RiggedHair, chain_notes, check_patterns, core_meshes, read_rigged_hair, rigged_notes
 
 VERTICES = 4000
 """Most vertices of the hair that are measured, evenly over its meshes."""
 FRAMES = 48
 """Frames in which distances to the body are measured, evenly over the animation."""
-LEAST_SWING = 0.01
-"""Less [mm] is rounding."""
+ROUNDING = 0.01
+"""Less [mm] is no swing and no depth."""
 SETTLED = 2.0
 """A pose held for so long [s] should have still hair."""
 
@@ -57,7 +58,7 @@ class RigCard:
             f"{m['frames']} frames",
             f"swing: {m['swing_mm']:.1f} mm from where hair carried rigidly is, most of '{m['swing_most']}', "
             f"{m['swing_most_mm']:.1f} mm"
-            if m["swing_most_mm"] > LEAST_SWING
+            if m["swing_most_mm"] > ROUNDING
             else "swing: none, as if hair were carried rigidly",
         ]
         if np.isfinite(m["jitter_mm"]):
@@ -65,7 +66,7 @@ class RigCard:
         for name, words in (("body", ""), ("body_rigid", ", carried rigidly")):
             if name in m:
                 b = m[name]
-                where = f" ('{b['deepest']}' at {b['deepest_at']:g})" if b["penetration_worst_mm"] > 0 else ""
+                where = f" ('{b['deepest']}' at {b['deepest_at']:g})" if b["penetration_worst_mm"] > ROUNDING else ""
                 lines.append(
                     f"inside the body{words}: {b['penetration_percent']:.2f} % of vertices, deeper than 3 mm "
                     f"{b['penetration_3mm_percent']:.2f} %, at most {b['penetration_worst_mm']:.1f} mm{where}, "
@@ -88,15 +89,14 @@ def evaluate_rig(
 
     Args:
         baked: path of a bake, or of any animated character with hair chains.
-        skeleton, head, chains, joints: as for `read_rigged_hair`; of several skeletons one that a bake moves comes first.
+        skeleton, head, chains, joints: as for `read_rigged_hair`; of several skeletons one that a bake moves comes first,
+            and the others are told.
         progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: there is no such hair, it has no mesh, or nothing animates it.
     """
-    hair = read_rigged_hair(
-        baked, skeleton=skeleton, head=head, chains=chains, joints=joints, baked_first=skeleton is None
-    )
+    hair = read_rigged_hair(baked, skeleton=skeleton, head=head, chains=chains, joints=joints, baked_first=True)
     check_patterns(hair, chains)
     rig, source, say = hair.rig, hair.source, progress or silent
     if not len(rig.points):
@@ -105,8 +105,8 @@ def evaluate_rig(
         raise NeuralocksError(f"{source.path}: is not animated; give a bake, or an animated character")
     moving = _moving(rig)
     some = np.flatnonzero(_hair_vertices(hair, moving))
-    few = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
-    vertices, lock = some[few], rig.chains.chain[np.maximum(rig.weights[few, 1:].argmax(axis=1), 0)]
+    picked = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
+    vertices, lock = some[picked], rig.chains.chain[rig.weights[picked, 1:].argmax(axis=1)]
     posed = _Posed(hair, vertices, moving)
     points, carried = posed.all(say)
     off = np.square(points - carried).sum(axis=-1).mean(axis=0)
@@ -124,7 +124,8 @@ def evaluate_rig(
     }
     if rig.character.body is not None:
         measures |= _depths(posed, points, carried, [rig.chains.chain_name(int(i)) for i in lock], say)
-    return RigCard(Path(baked), source.path, measures, rigged_notes(source) + chain_notes(hair, chains))
+    notes = rigged_notes(source) + chain_notes(hair, chains) + _not_measured(hair)
+    return RigCard(Path(baked), source.path, measures, notes)
 
 
 class _Posed:
@@ -134,8 +135,7 @@ class _Posed:
         self.codes, self._clip = hair.source.time_codes, hair.source.clip
         self._character, self.skin = hair.source.character, hair.rig.character.body
         self._moving = moving
-        body = self._character.body
-        self._hair = body.part(vertices, np.zeros((0, 3), int))
+        self._hair = self._character.body.part(vertices, np.zeros((0, 3), int))
         self.at_rest = self._character.canonical(self._hair.points)
 
     def all(self, say) -> tuple[np.ndarray, np.ndarray]:
@@ -171,6 +171,11 @@ def _depths(posed: _Posed, points: np.ndarray, carried: np.ndarray, locks: list[
         deepest = {"deepest_at": float(posed.codes[rows[row]]), "deepest": locks[vertex]}
         result[name] = metrics.penetration(distance, at_rest) | deepest
     return result
+
+
+def _not_measured(hair: RiggedHair) -> list[str]:
+    """The note on hair of other skeletons."""
+    return few([f"{path}: its hair is not measured; name it with --skeleton" for path in hair.others], "have hair, too")
 
 
 def _moving(rig: HairRig) -> np.ndarray:

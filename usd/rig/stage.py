@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,12 +42,14 @@ class RiggedHair:
         border: its units.
         source: skeleton, body and clip as read.
         rig: hair and body apart.
+        others: further skeletons with hair chains, of which this one was taken.
     """
 
     stage: Usd.Stage = field(repr=False)
     border: Border
     source: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
+    others: tuple[str, ...] = ()
 
 
 @names_damage
@@ -106,7 +108,8 @@ def read_rigged_hair(
         hairy = [has_hair_joints(prim) for prim in prims]
         raise errors[hairy.index(True) if any(hairy) else 0]
     if baked_first:
-        found = [min(found, key=lambda hair: not _is_baked(hair.source))]
+        first, *others = sorted(found, key=lambda hair: not _is_baked(hair.source))
+        found = [replace(first, others=tuple(hair.source.path for hair in others))]
     if len(found) > 1:
         paths = ", ".join(f.source.path for f in found)
         raise NeuralocksError(

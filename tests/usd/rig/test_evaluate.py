@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, UsdSkel, Vt
+import trimesh
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.rig.bake import bake_rig
@@ -13,18 +14,25 @@ from usd.rig.evaluate import evaluate_rig
 from usd.rig.stage import read_rigged_hair
 
 from ..commands import status
+from ..fbx_rigs import FRAMES, write_character
 from ..rig_shots import EXAMPLE, model_for, small_shot
 
+CODES = range(1, 26)
+"""Frames of a small shot."""
 
-def hair_by_usd(stage, codes, mesh="/Who/Hair", rig="/Who/Rig", head=1):
-    """Vertices (T, V, 3) of a hair mesh in the frame of its head joint, in the stage's units, by UsdSkel alone."""
-    cache, skel_root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Who"))
+
+def hair_by_usd(stage, codes, mesh="/Who/Hair", rig="/Who/Rig", head=1, rest=None):
+    """Vertices (T, V, 3) of a mesh, or of `rest` (V, 3) in its place, in the frame of its head joint, in the stage's units, by
+    UsdSkel alone.
+    """
+    cache, skel_root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath(Sdf.Path(rig).GetParentPath()))
     cache.Populate(skel_root, Usd.PrimDefaultPredicate)
     query = cache.GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath(rig)))
     skinning = cache.GetSkinningQuery(stage.GetPrimAtPath(mesh))
     found = []
     for code in codes:
         points = UsdGeom.Mesh(stage.GetPrimAtPath(mesh)).GetPointsAttr().Get(code)
+        points = points if rest is None else Vt.Vec3fArray.FromNumpy(rest)
         joints = query.ComputeSkinningTransforms(code)
         skinning.ComputeSkinnedPoints(joints, points, code)
         place = np.array(query.ComputeJointSkelTransforms(code))[head]
@@ -37,10 +45,8 @@ def test_swing_is_what_usd_shows(tmp_path, scale, z_up):
     shot = small_shot(tmp_path / "shot.usda", scale=scale, z_up=z_up)
     baked = bake_rig(shot, tmp_path / "baked.usda", model_for(read_rigged_hair(shot))).path
     card = evaluate_rig(baked).measures
-    codes = range(25)
-    moved, stiff = (hair_by_usd(Usd.Stage.Open(str(path)), codes) for path in (baked, shot))
-    # In the shot itself the tail is animated, too: rigid is the place of its first frame, that of the bind pose.
-    off = np.linalg.norm(moved - stiff[0], axis=-1) / scale
+    moved, stiff = (hair_by_usd(Usd.Stage.Open(str(path)), CODES) for path in (baked, shot))
+    off = np.linalg.norm(moved - stiff, axis=-1) / scale
     assert card["frames"] == 25 and card["vertices"] == 9 and card["joints"] == 3
     assert card["swing_mm"] == pytest.approx(1e3 * np.sqrt(np.square(off).mean()), rel=1e-3)
     assert card["swing_most"] == "hair_0" and "body" not in card
@@ -51,7 +57,7 @@ def test_depths_are_those_of_a_known_body(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     baked = bake_rig(shot, tmp_path / "baked.usda", model_for(read_rigged_hair(shot))).path
     stage = Usd.Stage.Open(str(baked))
-    moved, head = hair_by_usd(stage, range(25)), np.array([0, 1.5, 0])
+    moved, head = hair_by_usd(stage, CODES), np.array([0, 1.5, 0])
     wall = hair_by_usd(Usd.Stage.Open(str(shot)), [0])[0][:, 2].min() - 0.005
     box = UsdGeom.Mesh.Define(stage, "/Who/Wall")
     corners = np.array([[x, y, z] for x in (-0.15, 0.15) for y in (-0.15, 0.15) for z in (wall - 0.1, wall)]) + head
@@ -70,7 +76,7 @@ def test_depths_are_those_of_a_known_body(tmp_path):
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.01)
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.01)
     assert card["body"]["penetration_3mm_percent"] == pytest.approx(100 * (depth > 3e-3).mean(), abs=0.5)
-    assert card["body"]["deepest_at"] == depth.max(axis=1).argmax() and card["body"]["deepest"] == "hair_0"
+    assert card["body"]["deepest_at"] == CODES[depth.max(axis=1).argmax()] and card["body"]["deepest"] == "hair_0"
     assert card["body_rigid"]["penetration_worst_mm"] == 0
 
 
@@ -84,16 +90,91 @@ def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsy
     assert body["penetration_worst_mm"] < 0.3 * rigid["penetration_worst_mm"]
 
 
+def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
+    """Five chains, some of them in the head already at rest, which a blend shape swells by a centimetre."""
+    path, codes = tmp_path / "shot.usda", range(1, FRAMES + 1)
+    write_character(path, 24)
+    stage = Usd.Stage.Open(str(path))
+    body, hair = (UsdGeom.Mesh(stage.GetPrimAtPath(f"/Fbx/{name}")) for name in ("Body", "Hair"))
+    skin, tips = (np.array(mesh.GetPointsAttr().Get()) for mesh in (body, hair))
+    out, ball = np.zeros_like(skin), skin[: len(skin) // 2]
+    out[: len(ball)] = (ball - ball.mean(axis=0)) / 9
+    skin += 3 * out
+    body.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(skin))
+    aside = np.tile(np.float32([0.2, 0.1, -0.3]), (len(tips), 1))
+    for mesh, offsets in ((body, out), (hair, aside)):
+        shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild("breath"))
+        shape.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(offsets))
+        binding = UsdSkel.BindingAPI(mesh.GetPrim())
+        binding.CreateBlendShapesAttr(["breath"])
+        binding.CreateBlendShapeTargetsRel().SetTargets([shape.GetPath()])
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Fbx/Armature/Take"))
+    animation.CreateBlendShapesAttr(["breath"])
+    animation.CreateBlendShapeWeightsAttr([1.0])
+    stage.Save()
+
+    def by_usd(mesh, rest):
+        return 0.01 * hair_by_usd(stage, codes, mesh.GetPath(), "/Fbx/Armature", 3, rest)
+
+    joints = np.array(UsdSkel.BindingAPI(hair.GetPrim()).GetJointIndicesPrimvar().Get())
+    names = list(UsdSkel.Skeleton(stage.GetPrimAtPath("/Fbx/Armature")).GetJointsAttr().Get())
+    chain = np.array([names[joint].split("/")[4] for joint in joints])
+    points = by_usd(hair, tips + aside)
+    off = np.square(points - points[0]).sum(axis=-1)  # the first frame is the bind pose
+    swing = {name: 1e3 * np.sqrt(off[:, chain == name].mean()) for name in chain}
+    faces = np.reshape(body.GetFaceVertexIndicesAttr().Get(), (-1, 3))
+    skins, vertices = [by_usd(body, skin)[0], *by_usd(body, skin + out)], [by_usd(hair, tips)[0], *points]
+    meshes = [trimesh.Trimesh(each, faces, process=False) for each in skins]
+    distance = [-trimesh.proximity.signed_distance(mesh, each) for mesh, each in zip(meshes, vertices)]
+    depth = np.maximum(np.minimum(distance[0], 0) - distance[1:], 0)
+    deepest = np.unravel_index(depth.argmax(), depth.shape)
+    assert (distance[0] < 0).any() and depth.max() > 0.005
+
+    card = evaluate_rig(path)
+    assert [f"('{chain[deepest[1]]}' at" in line for line in card.lines()[-2:]] == [True, False]
+    card = card.measures
+    assert (card["joints"], card["chains"], card["vertices"]) == (18, 5, len(chain))
+    assert card["swing_mm"] == pytest.approx(1e3 * np.sqrt(off.mean()), rel=1e-3)
+    assert card["swing_most"] == max(swing, key=swing.__getitem__)
+    assert card["swing_most_mm"] == pytest.approx(max(swing.values()), rel=1e-3)
+    assert card["body"]["inside_at_rest_percent"] == pytest.approx(100 * (distance[0] < 0).mean())
+    assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.1)
+    assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.05)
+    assert card["body"]["deepest_at"] == codes[deepest[0]] and card["body"]["deepest"] == chain[deepest[1]]
+    monkeypatch.setattr("usd.rig.evaluate.VERTICES", len(chain) // 3)
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 7)
+    some = evaluate_rig(path).measures
+    assert some["vertices"] == len(chain) // 3 and some["body_frames"] == 7 and some["frames"] == FRAMES
+    assert some["swing_most"] == card["swing_most"]
+    assert some["swing_most_mm"] == pytest.approx(card["swing_most_mm"], rel=0.1)
+    at = depth[codes.index(some["body"]["deepest_at"])]
+    assert some["body"]["penetration_worst_mm"] == pytest.approx(1e3 * at.max(), rel=0.2)
+
+
 def test_hair_that_does_not_move_is_told(tmp_path, capsys):
-    shot = small_shot(tmp_path / "shot.usda")
-    stage = Usd.Stage.Open(str(shot))
-    turns = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
-    bind, head = turns.Get(0), [turns.Get(code)[1] for code in range(25)]
-    for code in range(25):
-        turns.Set([*bind[:1], head[code], *bind[2:]], code)
-    stage.GetRootLayer().Save()
-    assert status("rig", "evaluate", shot) == 0
+    assert status("rig", "evaluate", small_shot(tmp_path / "shot.usda")) == 0
     assert "swing: none, as if hair were carried rigidly" in capsys.readouterr().out
+
+
+def test_of_several_characters_the_baked_one_is_measured_and_others_are_told(tmp_path):
+    small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "both.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name in ("One", "Two"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference("./shot.usda")
+    stage.Save()
+
+    def measured(path, **options):
+        card = evaluate_rig(path, **options)
+        return card.skeleton, [note for note in card.notes if "not measured" in note]
+
+    both = tmp_path / "both.usda"
+    model = model_for(read_rigged_hair(tmp_path / "shot.usda"))
+    baked = bake_rig(both, tmp_path / "baked.usda", model, skeleton="/Two/Rig").path
+    told = "Rig: its hair is not measured; name it with --skeleton"
+    assert measured(both) == ("/One/Rig", [f"/Two/{told}"])
+    assert measured(baked) == ("/Two/Rig", [f"/One/{told}"])
+    assert measured(baked, skeleton="/One/Rig") == ("/One/Rig", [])
 
 
 def test_a_held_pose_rests(tmp_path):
