@@ -192,9 +192,8 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     if facts["type"] == UsdGeom.Tokens.cubic:
         facts |= {"basis": str(curves.GetBasisAttr().Get()), "wrap": str(curves.GetWrapAttr().Get())}
     found, to_bind, drawn, joint = None, border.to_core @ placement.reference, False, {}
-    to_bind[:3, 3] = (
-        0  # without a character, counts and lengths are what is told, and where hair stands changes neither
-    )
+    # Without a character, counts and lengths are what is told, and where hair stands changes neither.
+    to_bind[:3, 3] = 0
     if search is not None:
         try:
             found = search.attachment(prim, placement)
