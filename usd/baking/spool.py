@@ -107,39 +107,39 @@ class Spool:
         """Bytes of all that is there to go on from."""
         return sum(path.stat().st_size for path in self._named(_KEPT))
 
-    def holds(self, groom: int, time_code: float, points: int) -> bool:
+    def holds(self, batch: int, time_code: float, points: int) -> bool:
         """Whether the points (points, 3) of a frame are there, all of them, as they were written."""
-        path = self._path(groom, time_code)
+        path = self._path(batch, time_code)
         if path not in self._sure and has_size(path, points) and is_whole(path):
             self._sure.add(path)
         return path in self._sure
 
-    def read(self, groom: int, time_code: float, first: int, into: np.ndarray) -> None:
+    def read(self, batch: int, time_code: float, first: int, into: np.ndarray) -> None:
         """Fill `into` (n, 3) float32 with points of a frame that is there, from the `first` on.
 
         Raises:
             NeuralocksError: they cannot be read.
         """
-        path = self._path(groom, time_code)
+        path = self._path(batch, time_code)
         try:
             read_rows(path, first, into)
         except (OSError, ValueError) as error:
             raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
 
-    def write(self, groom: int, time_code: float, array: np.ndarray) -> None:
+    def write(self, batch: int, time_code: float, array: np.ndarray) -> None:
         """Keep the points (P, 3) of a finished frame."""
-        path = self._path(groom, time_code)
+        path = self._path(batch, time_code)
         try:
             write_frame(path, array, self._spares.pop() if self._spares else None)
         except OSError as error:
             raise cannot_write(self.out, error) from None
         self._sure.add(path)
 
-    def forget(self, groom: int, time_code: float) -> None:
+    def forget(self, batch: int, time_code: float) -> None:
         """Let go of a frame that nothing needs any more; nothing happens where it is not there. A later one takes its place on
         the disk, which is faster by far than to make room for each.
         """
-        path = self._path(groom, time_code)
+        path = self._path(batch, time_code)
         self._sure.discard(path)
         with suppress(OSError):
             spare = path.with_suffix(".part")
@@ -147,8 +147,8 @@ class Spool:
             self._spares.append(spare)
 
     def keep_only(self, frames: Iterable[tuple[int, float]]) -> None:
-        """Remove all frames but those of these grooms and time codes: a bake of other frames may have left some."""
-        kept = {self._path(groom, code) for groom, code in frames}
+        """Remove all frames but those of these batches and time codes: a bake of other frames may have left some."""
+        kept = {self._path(batch, code) for batch, code in frames}
         for path in self._named(_FRAME):
             if path not in kept:
                 self._sure.discard(path)
@@ -184,12 +184,12 @@ class Spool:
         self._lock.release()
         remove_empty(self._made)
 
-    def _path(self, groom: int, time_code: float) -> Path:
-        return self.folder / f"{groom}_{float(time_code).hex()}.frame"
+    def _path(self, batch: int, time_code: float) -> Path:
+        return self.folder / f"{batch}_{float(time_code).hex()}.frame"
 
 
 def kept(out: Path) -> int:
-    """How many finished frames of an interrupted bake lie beside its output, counted for each groom or batch."""
+    """How many finished frames of an interrupted bake lie beside its output, counted for each batch of grooms."""
     folder = _folder(out)
     frames, layers = (sum(1 for _ in folder.glob(f"*.{ending}")) for ending in ("frame", "part.usdc"))
     return frames + (spent_frames(folder / _LOG) if layers else 0)

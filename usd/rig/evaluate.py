@@ -72,6 +72,8 @@ class RigCard:
                     f"{b['penetration_3mm_percent']:.2f} %, at most {b['penetration_worst_mm']:.1f} mm{where}, "
                     f"in {m['body_frames']} frames"
                 )
+        if "body" not in m:
+            lines.append("inside the body: not measured, none of this skeleton's is near the hair")
         return lines
 
 
