@@ -153,8 +153,9 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
 
 def test_hair_that_does_not_move_is_told(tmp_path, capsys):
     assert status("rig", "evaluate", small_shot(tmp_path / "shot.usda")) == 0
-    said = capsys.readouterr().out
+    said, notes = capsys.readouterr()
     assert "swing: none, as if hair were carried rigidly\n" in said and "inside the body: not measured" in said
+    assert notes.startswith("note: /Who/Rig: no joint found for neck;")
 
 
 def test_of_several_characters_the_baked_one_is_measured_and_others_are_told(tmp_path):
@@ -204,6 +205,8 @@ def test_what_cannot_be_measured_is_one_line(tmp_path):
     with pytest.raises(NeuralocksError, match="/Body/Rig: is not animated; give a bake, or an animated character"):
         evaluate_rig(EXAMPLE / "character.usda")
     shot = small_shot(tmp_path / "shot.usda")
+    with pytest.raises(NeuralocksError, match="--chains tail.*: no joint of the hair has such a name"):
+        evaluate_rig(shot, chains=["hair_0", "tail*"])
     stage = Usd.Stage.Open(str(shot))
     stage.RemovePrim("/Who/Hair")
     stage.GetRootLayer().Save()

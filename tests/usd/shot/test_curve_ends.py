@@ -153,6 +153,18 @@ def test_strands_that_usd_counts_no_whole_segments_in_are_told(basis, wrap):
         assert undrawn(prim) == []
 
 
+@pytest.mark.parametrize(
+    ("counts", "wrap", "told"),
+    [([1, 7], "nonperiodic", None), ([3, 7], "periodic", None), ([2, 3, 3, 5, 7], "pinned", "4 of 5 strands have 2, 3, 5 points,"),
+     ([2, 3, 5, 6], "nonperiodic", "4 of 4 strands have 2, 3, 5, ... points,")],
+)  # fmt: skip
+def test_which_strands_lack_points_is_told(counts, wrap, told):
+    """Neither lone points, which are told otherwise, nor closed curves."""
+    stage = Usd.Stage.CreateInMemory()
+    notes = undrawn(_curves(stage, np.zeros((sum(counts), 3)), counts, "bezier", wrap))
+    assert told in notes[0] if told else notes == []
+
+
 def test_a_bake_tells_of_strands_that_are_not_drawn(tmp_path, model):
     recipe = Recipe(strands=STRANDS, vertices=VERTICES, basis="bezier", bound="mesh")
     shot, told = write_shot(tmp_path, recipe), []

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
@@ -108,6 +108,17 @@ def test_a_body_that_usd_leaves_where_it_was_made_is_told(tmp_path):
     assert told(character) == []
     (note,) = told(write_shot(tmp_path, Recipe(skel_root=False), "bare"))
     assert note.startswith("/Hero/Rig: no SkelRoot is above /Hero/Skin,") and note.endswith("; make /Hero a SkelRoot")
+    for name, there, named, remedy in (
+        ("teeth", "/Hero/Teeth", "/Hero/Skin and 1 more", "make /Hero a SkelRoot"),
+        ("apart", "/Skin", "/Skin", "put both below a SkelRoot"),
+    ):
+        layer = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(skel_root=False), name)))
+        Sdf.CopySpec(layer, "/Hero/Skin", layer, there)
+        if named == there:
+            del layer.GetPrimAtPath("/Hero").nameChildren["Skin"]
+        layer.Save()
+        (note,) = told(layer.realPath)
+        assert f" is above {named}, " in note and note.endswith(f"; {remedy}")
     # A reference on a prim with a type of its own, which is stronger than the SkelRoot's.
     stage = Usd.Stage.CreateNew(str(tmp_path / "set.usda"))
     for name, kind in (("Left", UsdGeom.Xform), ("Right", UsdSkel.Root)):

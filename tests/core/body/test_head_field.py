@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distances around a head that stands still: those of the shape that it is, and the way out of it."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.body.head_field import ROOM, head_field
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return trimesh.creation.icosphere(subdivisions=4, radius=0.1)
+
+
+def test_a_ball_is_as_far_and_in_the_direction_that_it_is(ball):
+    field = head_field(ball.vertices, ball.faces, np.ones(len(ball.vertices), bool))
+    out = np.random.default_rng(0).normal(size=(2000, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    away = np.random.default_rng(1).uniform(-0.02, 0.008, 2000)
+    points = ((0.1 + away)[:, None] * out).astype(np.float32)
+    distance, direction = field.distance(points)
+    assert distance.dtype == direction.dtype == np.float32
+    assert np.abs(distance - away).max() < 5e-4 and (direction * out).sum(axis=1).min() > 0.99
+    assert np.abs(field.rough(points) - away).max() < 0.87 * field.cell + 5e-4
+
+
+def test_nothing_is_known_beyond_the_grid_and_where_something_moves(ball):
+    still = ball.vertices[:, 2] > -0.05
+    field = head_field(ball.vertices, ball.faces, still)
+    assert (len(field.moving) > 0) and not still[field.moving].all(axis=1).any()
+    nodes = field.near(np.inf)
+    distance, _ = field.distance(np.concatenate([nodes, nodes + [1, 0, 0], nodes - [0, 0, 1]]))
+    assert np.isinf(distance[len(nodes) :]).all() and np.isfinite(distance[: len(nodes)]).any()
+    top, neck = np.array([[0, 0, 0.1 + ROOM / 2]]), np.array([[0, 0, -0.1]])
+    assert abs(field.distance(top)[0][0] - ROOM / 2) < 0.002 and np.isinf(field.distance(neck)[0]).all()
