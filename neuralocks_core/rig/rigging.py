@@ -46,7 +46,7 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
     chains = find_chains(character, meshes, patterns)
     skeleton = character.skeleton
     count = len(skeleton.names)
-    moving = np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
+    moving = moving_joints(skeleton, chains)
     body_triangles, points, weights, triangles = [], [], [], []
     start, taken = 0, 0
     for mesh, (body, moved) in zip(meshes, _parted(meshes, skeleton, character.head, moving)):
@@ -75,6 +75,11 @@ def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list
     if body is None or not rig.in_reach(body).any():
         return rig
     return replace(rig, character=replace(character, body=body))
+
+
+def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:
+    """Which joints (J,) are hair, with what hangs from it."""
+    return np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
 
 
 def _parted(meshes: list[SkinnedMesh], skeleton: Skeleton, head: int, moving: np.ndarray):

@@ -12,7 +12,7 @@ from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
-from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT
 from neuralocks_core.runtime import cores
 
@@ -105,7 +105,7 @@ def evaluate_rig(
         raise NeuralocksError(f"{source.path}: no mesh is skinned to its hair joints; there is nothing to measure")
     if len(source.time_codes) < 2:
         raise NeuralocksError(f"{source.path}: is not animated; give a bake, or an animated character")
-    moving = _moving(rig)
+    moving = moving_joints(rig.character.skeleton, rig.chains)
     some = np.flatnonzero(_hair_vertices(hair, moving))
     picked = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
     vertices, lock = some[picked], rig.chains.chain[rig.weights[picked, 1:].argmax(axis=1)]
@@ -178,12 +178,6 @@ def _depths(posed: _Posed, points: np.ndarray, carried: np.ndarray, locks: list[
 def _not_measured(hair: RiggedHair) -> list[str]:
     """The note on hair of other skeletons."""
     return few([f"{path}: its hair is not measured; name it with --skeleton" for path in hair.others], "have hair, too")
-
-
-def _moving(rig: HairRig) -> np.ndarray:
-    """Which joints (J,) of the skeleton are hair, with what hangs from it."""
-    skeleton = rig.character.skeleton
-    return np.any([skeleton.below(joint) for joint in rig.chains.joints[rig.chains.roots]], axis=0)
 
 
 def _hair_vertices(hair: RiggedHair, moving: np.ndarray) -> np.ndarray:

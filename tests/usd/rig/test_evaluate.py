@@ -91,7 +91,7 @@ def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsy
 
 
 def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
-    """Five chains, some of them in the head already at rest, which a blend shape swells by a centimetre."""
+    """Five chains, some of them in the head already at rest, one deep, which a blend shape swells by a centimetre."""
     path, codes = tmp_path / "shot.usda", range(1, FRAMES + 1)
     write_character(path, 24)
     stage = Usd.Stage.Open(str(path))
@@ -100,7 +100,9 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
     out, ball = np.zeros_like(skin), skin[: len(skin) // 2]
     out[: len(ball)] = (ball - ball.mean(axis=0)) / 9
     skin += 3 * out
-    body.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(skin))
+    tips[-1] = ball.mean(axis=0) - (0, 0, 5)
+    for mesh, points in ((body, skin), (hair, tips)):
+        mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points))
     aside = np.tile(np.float32([0.2, 0.1, -0.3]), (len(tips), 1))
     for mesh, offsets in ((body, out), (hair, aside)):
         shape = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild("breath"))
@@ -128,7 +130,7 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
     distance = [-trimesh.proximity.signed_distance(mesh, each) for mesh, each in zip(meshes, vertices)]
     depth = np.maximum(np.minimum(distance[0], 0) - distance[1:], 0)
     deepest = np.unravel_index(depth.argmax(), depth.shape)
-    assert (distance[0] < 0).any() and depth.max() > 0.005
+    assert deepest[1] != np.argmin(distance[0]) and depth.max() > 0.005
 
     card = evaluate_rig(path)
     assert [f"('{chain[deepest[1]]}' at" in line for line in card.lines()[-2:]] == [True, False]
@@ -141,14 +143,15 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.1)
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.05)
     assert card["body"]["deepest_at"] == codes[deepest[0]] and card["body"]["deepest"] == chain[deepest[1]]
-    monkeypatch.setattr("usd.rig.evaluate.VERTICES", len(chain) // 3)
     monkeypatch.setattr("usd.rig.evaluate.FRAMES", 7)
-    some = evaluate_rig(path).measures
-    assert some["vertices"] == len(chain) // 3 and some["body_frames"] == 7 and some["frames"] == FRAMES
-    assert some["swing_most"] == card["swing_most"]
-    assert some["swing_most_mm"] == pytest.approx(card["swing_most_mm"], rel=0.1)
-    at = depth[codes.index(some["body"]["deepest_at"])]
-    assert some["body"]["penetration_worst_mm"] == pytest.approx(1e3 * at.max(), rel=0.2)
+    seldom = evaluate_rig(path).measures
+    assert seldom["body_frames"] == 7 and seldom["frames"] == FRAMES
+    at = depth[codes.index(seldom["body"]["deepest_at"])]
+    assert seldom["body"]["penetration_worst_mm"] == pytest.approx(1e3 * at.max(), abs=0.05)
+    monkeypatch.setattr("usd.rig.evaluate.VERTICES", len(chain) // 3)
+    few = evaluate_rig(path).measures
+    assert few["vertices"] == len(chain) // 3 and few["swing_most"] == card["swing_most"]
+    assert few["swing_most_mm"] == pytest.approx(card["swing_most_mm"], rel=0.1)
 
 
 def test_hair_that_does_not_move_is_told(tmp_path, capsys):
