@@ -89,7 +89,7 @@ def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
         kind = hidden.GetTypeName()
         remedy = f"{hidden.GetPath()} is one below an opinion that types it {kind}: type it SkelRoot there"
     return [
-        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws that unmoved while hair moves; {remedy}"
+        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws that as it was made, whatever the skeleton does; {remedy}"
     ]
 
 

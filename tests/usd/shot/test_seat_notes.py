@@ -6,6 +6,8 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
@@ -125,3 +127,15 @@ def test_hair_that_points_cannot_place_is_told(tmp_path):
     assert note.startswith(
         "/Hero/Hair: the head is up to 10000 m from this prim's origin, where points can only be 0.62 mm apart"
     )
+
+
+def test_hair_that_is_flat_for_a_while_is_baked_until_then(tmp_path, still_model):
+    path = write_shot(tmp_path, Recipe(bound="own"))
+    stage = Usd.Stage.Open(str(path))
+    size = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddScaleOp()
+    size.Set((1, 1, 1), 6)
+    size.Set((1, 0, 1), 9)
+    stage.Save()
+    assert bake(path, tmp_path / "bake.usdc", still_model, frames="1:4").frames == [1, 2, 3, 4]
+    with pytest.raises(NeuralocksError, match="/Hero/Hair: its transform at time code 9 has zero scale"):
+        bake(path, tmp_path / "bake.usdc", still_model)
