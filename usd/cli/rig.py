@@ -155,6 +155,8 @@ def evaluate(
     if as_json:
         print_json({"path": str(card.path), "skeleton": card.skeleton, **card.measures, "notes": card.notes})
         return
+    joints, roots = counted(card.measures["joints"], "hair joint"), counted(card.measures["chains"], "chain")
+    typer.echo(f"{card.skeleton}: {joints} in {roots}")
     for line in card.lines():
         typer.echo(line)
     note(card.notes)

@@ -51,11 +51,10 @@ class RigCard:
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """The card in words."""
+        """What was measured, in words."""
         m = self.measures
         lines = [
-            f"{self.skeleton}: {m['joints']} hair joints in {m['chains']} chains, {m['vertices']} vertices measured, "
-            f"{m['frames']} frames",
+            f"measured: {m['vertices']} vertices in {m['frames']} frames",
             f"swing: {m['swing_mm']:.1f} mm from where hair carried rigidly is, most of '{m['swing_most']}', "
             f"{m['swing_most_mm']:.1f} mm"
             if m["swing_most_mm"] > ROUNDING
