@@ -12,9 +12,9 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.spool import Spool, _remove, fingerprint
 
 
-def read(spool, code, rows):
+def read(spool, code, rows, batch=0):
     points = np.zeros((rows.stop - rows.start, 3), np.float32)
-    spool.read(0, code, rows.start, points)
+    spool.read(batch, code, rows.start, points)
     return points
 
 
@@ -81,7 +81,7 @@ def test_a_frame_is_written_over_one_that_nothing_needs_any_more(tmp_path):
     assert not list(spool.folder.glob("*.part"))
     spool.close()
     again = Spool(tmp_path / "bake.usdc", "a")
-    assert again.holds(1, 1.0, 9) and (again.read(1, 1.0, slice(0, 9)) == 2).all()
+    assert again.holds(1, 1.0, 9) and (read(again, 1.0, slice(0, 9), batch=1) == 2).all()
     again.discard()
 
 
