@@ -83,8 +83,8 @@ class OverrideWriter:
             item: the groom.
             time_code: when.
             name: "points" or "velocities".
-            fill: puts all P values into an array of zeros (P, 3) float32, and yields consecutive parts of it as they are
-                there: a large groom's are in memory once.
+            fill: puts all P values into an array (P, 3) float32, and yields consecutive parts of it as they are there: a
+                large groom's are in memory once.
         """
         array, corners = Vt.Vec3fArray(item.point_count), []
         for part in fill(np.asarray(_Writable(array))):

@@ -213,11 +213,12 @@ class _Store:
             yield part
 
     def _velocities(self, code: float, into: np.ndarray) -> Iterator[np.ndarray]:
-        """The same in units of the prim per second; of zeros, to which they are added."""
+        """The same in units of the prim per second."""
         (base_code, _), *terms = self._plan.terms(code) or [(code, 0.0)]
         base, other = np.empty((2, min(BLOCK, len(into)), 3), np.float32)
         for first, part in self._blocks(into):
             here, term = base[: len(part)], other[: len(part)]
+            part.fill(0)
             if terms:
                 self._spool.read(self._number, base_code, first, here)
             for term_code, weight in terms:
