@@ -62,9 +62,9 @@ class SampleLayer:
 
     def _save(self) -> None:
         self.layer.Save()
-        if self._log is not None:
-            self._log.add(self._part, self._puts)
-        self.saved, self._held = self._puts, 0
+        self._held = 0
+        if self._log is None or self._log.add(self._part, self._puts):
+            self.saved = self._puts
 
     @contextmanager
     def _named(self) -> Iterator[None]:

@@ -72,13 +72,19 @@ class SaveLog:
         self._end = HEADER
         self._path.write_text(_line({"plan": self._plan}))
 
-    def add(self, file: Path, puts: int) -> None:
-        """Note what a file is like after a save. Raises OSError, or ValueError if it is no crate file."""
-        header, end, tables = _tables(file)
+    def add(self, file: Path, puts: int) -> bool:
+        """Note what a file is like after a save; False where it is none that this knows, as one of a later USD may be. Raises
+        OSError.
+        """
+        try:
+            header, end, tables = _tables(file)
+        except (ValueError, struct.error):
+            return False
         begin, self._end = self._end, end
         save = _Save(puts, bisect.bisect_right(self._spent, puts), header, end, tables, begin, _trace(file, begin, end))
         with open(self._path, "a") as log:
             log.write(_line(asdict(save) | {name: base64.b64encode(getattr(save, name)).decode() for name in _BYTES}))
+        return True
 
     def restore(self, file: Path) -> int:
         """Take a file back to its last save whose values are all there, and forget the later ones.
@@ -121,7 +127,7 @@ def spent_frames(path: Path) -> int:
 
 
 def _tables(file: Path) -> tuple[bytes, int, bytes]:
-    """Header of a crate file, where its tables begin, and these."""
+    """Header of a crate file, where its tables begin, and these. Raises ValueError or struct.error if it is none."""
     with open(file, "rb") as crate:
         header = crate.read(HEADER)
         if len(header) < HEADER or not header.startswith(b"PXR-USDC"):

@@ -104,6 +104,26 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
     assert most <= (14 if beards else 9)
 
 
+def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, model, monkeypatch):
+    """As one of a later USD could be: a bake that is stopped then goes on from its frames, all of which stay."""
+    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
+    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+    whole = bake(shot, out, model).path.read_bytes()
+    out.unlink()
+
+    def unknown(file):
+        raise ValueError("of another kind")
+
+    def stop(done, total, message):
+        if done == 7:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("usd.baking.save_log._tables", unknown)
+    with pytest.raises(KeyboardInterrupt):
+        bake(shot, out, model, progress=stop)
+    assert bake(shot, out, model).resumed >= 6 and out.read_bytes() == whole
+
+
 @pytest.mark.parametrize("frames", ["1:9", "1:5"])
 def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch, frames):
     """Also for as many; what was saved of it is gone then."""
