@@ -70,6 +70,7 @@ class SaveLog:
     def begin(self) -> None:
         """Start anew. Raises OSError."""
         self._end = HEADER
+        self._path.unlink(missing_ok=True)  # a hard link's other name keeps what it has
         self._path.write_text(_line({"plan": self._plan}))
 
     def add(self, file: Path, puts: int) -> bool:

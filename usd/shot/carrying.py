@@ -11,9 +11,8 @@ from neuralocks_core.character import Character
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
+from .seat import some_places
 
-SOME_TIMES = 16
-"""Times at which a prim is compared with joints."""
 STILL = 1e-4
 """What moves by less [m], and turns by less, against something goes with it."""
 MOST = 0.75
@@ -41,8 +40,9 @@ def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray
     head, character = rig.character.humanoid.get("head"), rig.character
     if head is None or not placement.samples:
         return None
-    rows = np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int))
-    places = np.stack([rig.border.to_core @ placement.at(code) for code in rig.time_codes[rows]])
+    rows, places = some_places(rig, placement)
+    if not len(rows):
+        return None
     below, joints = character.skeleton.below(head), rig.clip.joints[rows]
     if _still(places) or any(_still(np.linalg.inv(joints[:, joint]) @ places) for joint in np.flatnonzero(~below)):
         return None

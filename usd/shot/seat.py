@@ -7,6 +7,7 @@ place at which their roots lie on skin.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -223,6 +224,18 @@ def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
     return with_skeleton, _drift(
         placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core
     )
+
+
+def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """Some samples of a rig's clip (n,), and where a prim stands at each (n, 4, 4) [m]; without those at which it cannot be
+    placed, as it is flat then, say, which is told where a bake comes to them.
+    """
+    rows, places = [], []
+    for row in np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int)):
+        with suppress(NeuralocksError):
+            places.append(rig.border.to_core @ placement.at(rig.time_codes[row]))
+            rows.append(row)
+    return np.array(rows, int), np.array(places).reshape(-1, 4, 4)
 
 
 def _drift(placement: Placement, against: Callable[[float], np.ndarray]) -> float:

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notes on how a groom sits on skin: off it, upside down, or drawn from above it; and on one too far away to be placed exactly."""
 
-from contextlib import suppress
-
 import numpy as np
 from pxr import Usd
 from scipy.spatial import cKDTree
 
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, sizes, transformed
 
 from ..border.placement import Placement
 from ..skel.source import StageRig
 from .curve_ends import Beyond
-from .seat import CLEARLY, NEAR, SOME_TIMES, either_ends, find_seat, off_skin, some_ends
+from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends, some_places
 
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
@@ -108,15 +105,12 @@ def coarsely_placed(prim: Usd.Prim, rig: StageRig, character: Character, placeme
     """The note on hair so far from its prim's origin, where joints or points in world space put it, that the prim's points are
     not exact enough there.
     """
-    some = np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int))
-    places = rig.clip.joints[some, character.carrying_joint, :3, 3]
+    rows, to_world = some_places(rig, placement)
     worst, away = 0.0, 0.0
-    with suppress(NeuralocksError):  # a prim that is flat for a while, which is told where a bake comes to it
-        for code, place in zip(rig.time_codes[some], places):
-            to_world = rig.border.to_core @ placement.at(code)
-            own, unit = transformed(place, inverse(to_world)), abs(sizes(to_world))
-            step = float(np.spacing(np.float32(abs(own).max()))) * unit
-            worst, away = max((worst, away), (step, float(np.linalg.norm(own)) * unit))
+    for place, way in zip(rig.clip.joints[rows, character.carrying_joint, :3, 3], to_world):
+        own, unit = transformed(place, inverse(way)), abs(sizes(way))
+        step = float(np.spacing(np.float32(abs(own).max()))) * unit
+        worst, away = max((worst, away), (step, float(np.linalg.norm(own)) * unit))
     if worst < COARSE:
         return []
     return [

@@ -128,3 +128,10 @@ def test_a_log_of_something_else_counts_for_nothing(tmp_path, harm):
 
 def _signed(text):
     return f"{zlib.crc32(text.encode()):08x} {text}"
+
+
+def test_a_hard_link_in_the_place_of_a_log_is_let_go_of(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "saves").hardlink_to(tmp_path / "mine")
+    written(tmp_path, log_in(tmp_path), until=4)
+    assert (tmp_path / "mine").read_text() == "mine" and spent_frames(tmp_path / "saves") == 4
