@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live hair in Blender beside Blender's own hair dynamics, on the same strands and the same motion.
+"""Live hair in Blender at several sizes, and in the shipped shot; `blender_dynamics.py` has it beside Blender's own.
 
-    .venv-blender-4.5/bin/python benchmarks/blender_live.py MODEL      beside particle hair dynamics
-    .venv-blender-5.2/bin/python benchmarks/blender_live.py MODEL      beside the "Hair Dynamics" asset (XPBD)
+    .venv-blender-5.2/bin/python benchmarks/blender_live.py MODEL
 
 Prints milliseconds a frame (median of sequential frames), everything counted: all of `scene.frame_set`. MODEL left out
 means the shipped one. Run it on an idle machine: the numbers are wall-clock time; on a busy one with --cpu-time, which
-counts the processor time of all threads, ours and theirs. Strands have 24 vertices, unevenly spaced, as a groom of
-somebody else has; `even` are those whose vertices are the network's own. The shipped shot has a skinned body that the
-hair is kept out of; its motion is sampled as often as it is played, in turns.
+counts the processor time of all threads. Strands have 24 vertices, unevenly spaced, as a groom of somebody else has;
+`even` are those whose vertices are the network's own. The shipped shot has a skinned body that the hair is kept out of;
+its motion is sampled as often as it is played, in turns.
 """
 
-import math
 import os
 import sys
 import time
@@ -27,32 +25,22 @@ import numpy as np
 
 clock = time.process_time if "--cpu-time" in sys.argv else time.perf_counter
 FRAMES = 40
-SLOW_FRAMES = 8
 
 
 def main() -> None:
-    """Measure ours at three sizes, then what this Blender has of its own."""
+    """Measure three sizes, then the shipped shot."""
     import dcc_addon
     from tests.blender import scenes
 
     model = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
     dcc_addon.register()
     print(f"Blender {bpy.app.version_string}, {os.cpu_count()} cores")
-    ours = {}
     for count, even in ((3000, False), (3000, True), (50000, False), (50000, True), (120000, False)):
         found = live(scenes, model, count, even)
-        ours.setdefault(count, found)
         rate = ", ".join(f"{name} {value:.2f}" for name, value in found.items())
-        print(f"neuralocks live, {count} strands x 24{' even' if even else ''}: {rate} [ms]", flush=True)
+        print(f"live, {count} strands x 24{' even' if even else ''}: {rate} [ms]", flush=True)
     for name, value in shipped_shot(scenes, model).items():
         print(f"shipped shot, {name}: {value:.2f}", flush=True)
-    if bpy.app.version < (5, 0):
-        theirs, name = particle_dynamics(scenes), "particle hair dynamics, 3000 strands"
-    elif bpy.app.version >= (5, 2):
-        theirs, name = xpbd_dynamics(scenes), "Hair Dynamics (XPBD), 3000 strands"
-    else:
-        return
-    print(f"{name}: {theirs:.0f} ms a frame, {theirs / ours[3000]['live']:.0f} times as long as live hair")
 
 
 def live(scenes, model: str, count: int, even: bool) -> dict[str, float]:
@@ -68,12 +56,12 @@ def live(scenes, model: str, count: int, even: bool) -> dict[str, float]:
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = model
     bpy.context.view_layer.update()  # from now on there is something that a frame must evaluate
-    plain = _median(scene, FRAMES)
+    plain = median(scene, FRAMES)
     bpy.ops.neuralocks.sample_motion()
     hair.neuralocks_hair.live = True
     for frame in (1, 2):
         scene.frame_set(frame)
-    result = {"live": _median(scene, FRAMES), "without": plain}
+    result = {"live": median(scene, FRAMES), "without": plain}
     from dcc_addon.session import session
 
     assert not session.messages, session.messages
@@ -99,13 +87,13 @@ def shipped_shot(scenes, model: str) -> dict[str, float]:
         bpy.ops.neuralocks.sample_motion()
         sampling.append(clock() - played)
         playing.append(played - began)
-    result = {"playing [ms]": _median(scene, FRAMES)}
+    result = {"playing [ms]": median(scene, FRAMES)}
     own = hair.neuralocks_hair
     own.model, own.resolve, own.live = model, False, True
-    result["live [ms]"] = _median(scene, FRAMES)
+    result["live [ms]"] = median(scene, FRAMES)
     own.resolve = True
     scene.frame_set(frames[0])
-    result["live, kept out of the body [ms]"] = _median(scene, FRAMES)
+    result["live, kept out of the body [ms]"] = median(scene, FRAMES)
     own.live = False
     return result | {"sampling, times playing": min(sampling) / min(playing)}
 
@@ -123,65 +111,7 @@ def _even(data) -> None:
     curves.write(data, points)
 
 
-def particle_dynamics(scenes) -> float:
-    """Blender's particle hair on a ball that moves and turns, default quality."""
-    scenes.empty()
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    ball = bpy.context.active_object
-    _move(ball)
-    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
-    system = ball.particle_systems[0]
-    system.settings.type, system.settings.count = "HAIR", 3000
-    system.settings.hair_length, system.settings.hair_step = 0.2, 23
-    system.use_hair_dynamics = True
-    return _median(bpy.context.scene, SLOW_FRAMES)
-
-
-def xpbd_dynamics(scenes) -> float:
-    """The asset that comes with Blender 5.2, in its mode Physics at default steps."""
-    scenes.empty()
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    ball = bpy.context.active_object
-    _move(ball)
-    rng = np.random.default_rng(0)
-    from dcc_addon.scene import curves
-
-    direction = rng.normal(size=(3000, 1, 3))
-    direction /= np.linalg.norm(direction, axis=2, keepdims=True)
-    points = direction * (0.1 + 0.2 * np.linspace(0, 1, 24)[None, :, None])
-    data = curves.create("Hair", np.full(3000, 24), points.reshape(-1, 3).astype(np.float32))
-    data.surface = ball
-    data.surface_uv_map = ball.data.uv_layers.active.name
-    hair = bpy.data.objects.new("Hair", data)
-    bpy.context.scene.collection.objects.link(hair)
-    hair.parent = ball
-    bpy.context.view_layer.objects.active = hair
-    bpy.ops.curves.snap_curves_to_surface(attach_mode="NEAREST")
-    assets = Path(bpy.utils.system_resource("DATAFILES")) / "assets"
-    library = next(assets.rglob("geometry_nodes_dynamics_assets.blend"))
-    with bpy.data.libraries.load(str(library)) as (_, wanted):
-        wanted.node_groups = ["Hair Dynamics"]
-    modifier = hair.modifiers.new("Dynamics", "NODES")
-    modifier.node_group = wanted.node_groups[0]
-    for item in modifier.node_group.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.socket_type == "NodeSocketMenu":
-            value = getattr(modifier.properties.inputs, item.identifier)
-            try:
-                value.value = "Physics (Experimental)"
-            except TypeError:
-                continue
-    return _median(bpy.context.scene, SLOW_FRAMES)
-
-
-def _move(thing) -> None:
-    for frame in range(1, FRAMES + 1, 4):
-        thing.location = (0.08 * math.sin(frame / 3), 0, 0)
-        thing.rotation_euler = (0, 0, 0.6 * math.sin(frame / 4))
-        thing.keyframe_insert("location", frame=frame)
-        thing.keyframe_insert("rotation_euler", frame=frame)
-
-
-def _median(scene, frames: int) -> float:
+def median(scene, frames: int) -> float:
     """Milliseconds a frame of going through the frames in order."""
     spent = []
     for frame in range(1, frames + 1):

@@ -91,8 +91,9 @@ class Carrier:
         return blocks
 
     def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
-        # The inverse of a rotation: rows times R are columns times its transpose.
-        return vectors @ self._facing
+        # The inverse of a rotation: rows times R are columns times its transpose. All rows at once: a product of each
+        # strand's few takes ten times as long.
+        return (vectors.reshape(-1, 3) @ self._facing).reshape(vectors.shape)
 
     def carry(
         self,
@@ -140,9 +141,12 @@ class Carrier:
         """`carry` of one chunk, in arrays whose coordinates come first."""
         if self._still is not None:
             displacement = np.where(self._still[start:stop, None, None], np.float32(0.0), displacement)
+        rest = self._groom.points[self._ends[start] : self._ends[stop]]
+        if onto is None and not self._blocks:
+            self._carried_at_once(displacement, rest, out, placing)
+            return
         if self._facing is not None:
             displacement = self._in_bind_axes(displacement)
-        rest = self._groom.points[self._ends[start] : self._ends[stop]]
         block = self._blocks[start // BLOCK] if self._blocks else None
         columns = block.columns if block else np.transpose
         (points,) = _scratch.arrays(columns(rest).shape)
@@ -161,6 +165,15 @@ class Carrier:
         np.add(columns(onto), moved, out=columns(out))
         if self._negative_zero:  # -0 + 0 is +0: the one value that adding nothing changes
             np.copyto(columns(out), columns(onto), where=moved == 0)
+
+    def _carried_at_once(self, displacement, rest, out, placing) -> None:
+        """`_carried` where the groom's vertices are the network's: placed and turned from the network's axes in one."""
+        both, result = in_turn.arrays((6, len(rest)), (3, len(rest)))
+        np.subtract(rest.T, placing.centre[:, None], out=both[:3])
+        both[3:] = displacement.reshape(-1, 3).T
+        turned = placing.linear if self._facing is None else placing.linear @ self._facing.T
+        np.matmul(np.hstack([placing.linear, turned]), both, out=result)
+        np.add(result, placing.origin[:, None], out=out.T)
 
 
 def _placed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from neuralocks_core.deformation.carrier import Carrier
+from neuralocks_core.deformation.carrier import Carrier, Placing
 from neuralocks_core.deformation.lengths import keep_lengths_of_any
 from neuralocks_core.deformation.spans import LEFT_OVER, weights
 from neuralocks_core.groom import Groom
 from neuralocks_core.network_sizes import K
+from neuralocks_core.rotation import transformed
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.centreline import centre_lines
 from neuralocks_core.strands.strand_set import root_frames, root_uv, scalp_local, strand_set
@@ -225,6 +226,30 @@ def test_facing_turns_both_ways():
         Carrier(groom, straight).carry(displacement),
         atol=2e-6,
     )
+
+
+@pytest.mark.parametrize("vertices", [24, 40])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_placed_groom_is_the_carried_one_placed(vertices, turned):
+    """Whether vertices are the network's own, which are placed and turned from its axes at once, or follow these."""
+    facing = Rotation.from_euler("y", -70, degrees=True).as_matrix() if turned else np.eye(3)
+    way = np.linspace(0, 1, vertices)[None, :, None]
+    rng = np.random.default_rng(0)
+    roots = ORIGIN + 0.1 * rng.normal(size=(20, 1, 3))
+    points = (roots + 0.2 * way * rng.normal(size=(20, 1, 3))).reshape(-1, 3).astype(np.float32)
+    groom = Groom("/straight", points, np.full(20, vertices))
+    strands = strand_set(groom, ORIGIN, CENTRE, facing)
+    carrier = Carrier(groom, strands)
+    displacement = rng.normal(size=strands.rest.shape).astype(np.float32) * 0.01
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = Rotation.from_euler("xyz", [0.3, 1.0, -2.0]).as_matrix() * 1.5, [3, 4, 5]
+    placed = carrier.carry(displacement, placing=Placing.of(transform, ORIGIN))
+    np.testing.assert_allclose(placed, transformed(carrier.carry(displacement), transform), atol=3e-6)
+    parts = [
+        carrier.carry(displacement[i : i + 5], strands=slice(i, i + 5), placing=Placing.of(transform, ORIGIN))
+        for i in (0, 5, 10, 15)
+    ]
+    np.testing.assert_allclose(np.concatenate(parts), placed, atol=1e-6)
 
 
 def test_root_frames_take_the_normal_up():
