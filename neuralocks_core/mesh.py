@@ -38,8 +38,9 @@ def inside_out(points: np.ndarray, triangles: np.ndarray) -> bool:
     """
     if not len(triangles):
         return False
-    around = np.asarray(points, float)
-    around = around - around[triangles].mean(axis=(0, 1))
-    a, b, c = (around[triangles[:, corner]] for corner in range(3))
-    volumes = np.einsum("fi,fi->f", a, np.cross(b, c))
-    return bool(volumes.sum() < INSIDE_OUT * np.abs(volumes).sum())
+    points, a = np.asarray(points, float), np.ascontiguousarray(triangles.T)
+    middle = np.bincount(a.ravel(), minlength=len(points)) @ points / a.size
+    # One array a coordinate: triples are read five times as slowly.
+    x, y, z = np.ascontiguousarray((points - middle).T)[:, a]
+    spanned = sum(p[0] * (q[1] * r[2] - q[2] * r[1]) for p, q, r in ((x, y, z), (y, z, x), (z, x, y)))
+    return bool(spanned.sum() < INSIDE_OUT * np.abs(spanned).sum())

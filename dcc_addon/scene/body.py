@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The body mesh at rest: surface, vertex groups and shape keys."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import bpy
@@ -16,6 +17,8 @@ from .binding import carrier, carrying_bone
 
 PROBES = 500
 """Vertices whose weights are compared with what is known."""
+WEIGHED = 4000
+"""Vertices whose weights are read in one step."""
 
 
 def find(armature, objects) -> list:
@@ -36,10 +39,8 @@ def read(mesh_object, armature) -> BodyArrays:
         raise NeuralocksError(
             f"{mesh_object.name_full}: it has no faces to keep hair out of; choose a body with a surface, or none"
         )
-    points = _coordinates(mesh.vertices)
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    points = vertices(mesh).astype(float)
+    triangles = _triangles(mesh)
     groups = tuple(group.name for group in mesh_object.vertex_groups)
     weights, shapes, keys = _weights(mesh, groups), {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
@@ -125,17 +126,31 @@ def _mirrored(body: BodyArrays, mesh_object, modifier) -> BodyArrays:
 
 
 def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
-    """Rows (N, 3) of vertex, group, weight: read again only when a few of them, or the groups, have changed.
+    """Rows (N, 3) of vertex, group, weight."""
+    for _ in _weighed(mesh, groups):
+        pass
+    return session.weights[mesh.name_full][1]
 
-    Blender gives them one by one: half a second for a large body.
+
+def weighed(mesh_object) -> Iterator[None]:
+    """Get to know the weights of a body, of a few thousand vertices in each step, if they are not known: Blender gives them
+    one by one, half a second for a large body.
     """
+    return _weighed(mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups))
+
+
+def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
+    """They are read again only when a few of them, or the groups, have changed."""
     some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
     probe = len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
-    known = session.weights.get(mesh.name_full)
-    if known is None or known[0] != probe:
-        rows = [(v.index, g.group, g.weight) for v in mesh.vertices for g in v.groups]
-        known = session.weights[mesh.name_full] = probe, np.array(rows, float).reshape(-1, 3)
-    return known[1]
+    name, edits, rows = mesh.name_full, session.edits, []
+    if name in session.weights and session.weights[name][0] == probe:
+        return
+    for first in range(0, len(mesh.vertices), WEIGHED):
+        rows += [(v.index, g.group, g.weight) for v in mesh.vertices[first : first + WEIGHED] for g in v.groups]
+        yield
+    if edits == session.edits:  # or what was edited in between is read again
+        session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
 
 
 def shape_values(mesh_object, graph) -> np.ndarray:
@@ -152,6 +167,30 @@ def shape_values(mesh_object, graph) -> np.ndarray:
         shares = {b.name: np.interp(keys.eval_time, frames, each[row]) for row, b in enumerate(blocks)}
         return np.array([shares[b.name] for b in keys.key_blocks if b != keys.reference_key])
     return np.array([0.0 if b.mute else b.value for b in keys.key_blocks if b != keys.reference_key])
+
+
+def _triangles(mesh) -> np.ndarray:
+    """Corners (F, 3) int32 of the faces, cut into triangles."""
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    corners = mesh.attributes.get(".corner_vert")  # as a block; Blender gives the triangles' own one by one
+    if corners is None:
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        return triangles
+    vertices = np.empty(len(mesh.loops), np.int32)
+    corners.data.foreach_get("value", vertices)
+    mesh.loop_triangles.foreach_get("loops", triangles.ravel())
+    return vertices[triangles]
+
+
+def vertices(mesh) -> np.ndarray:
+    """Points (V, 3) float32 of a mesh in its own space."""
+    points, kept = np.empty((len(mesh.vertices), 3), np.float32), mesh.attributes.get("position")
+    if kept is None:  # in Blender 3.4
+        mesh.vertices.foreach_get("co", points.ravel())
+    else:  # as a block, a hundred times faster
+        kept.data.foreach_get("vector", points.ravel())
+    return points
 
 
 def _coordinates(elements) -> np.ndarray:

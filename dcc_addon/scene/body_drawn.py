@@ -9,7 +9,7 @@ from neuralocks_core.rotation import transformed
 
 from ..services.axes import to_core
 from .armature import matrix
-from .body import left_behind
+from .body import left_behind, vertices
 from .lookup import find
 from .watched import evaluated_for_itself
 
@@ -27,12 +27,9 @@ def drawn(mesh_object, graph) -> np.ndarray | None:
     if off or not evaluated_for_itself(mesh_object, graph):
         return None
     evaluated = mesh_object.evaluated_get(graph)
-    vertices = evaluated.data.vertices
-    if len(vertices) != len(mesh_object.data.vertices):
+    if len(evaluated.data.vertices) != len(mesh_object.data.vertices):
         return None
-    points = np.empty((len(vertices), 3), np.float32)
-    vertices.foreach_get("co", points.ravel())
-    return transformed(points, matrix(evaluated.matrix_world))
+    return transformed(vertices(evaluated.data), matrix(evaluated.matrix_world))
 
 
 def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -> tuple[str, ...]:

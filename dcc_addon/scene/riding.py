@@ -12,6 +12,8 @@ from . import curves
 
 FAR = 0.01
 """Less is not told [m]."""
+PROBES = 1000
+"""Points of hair, about, whose mean stands for all of it."""
 
 
 def carriers(
@@ -65,7 +67,8 @@ def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> st
     points, shown = curves.points(hair.data), np.abs(np.linalg.det(places)) > 0
     if not len(points) or not shown.any() or hair.parent_type.startswith("VERTEX"):  # skin is followed strand by strand
         return ""
-    path = places[shown, :3, :3] @ points.mean(axis=0, dtype=float) + places[shown, :3, 3]
+    middle = points[:: max(1, len(points) // PROBES)].mean(axis=0, dtype=float)
+    path = places[shown, :3, :3] @ middle + places[shown, :3, 3]
     far = metres * rig_service.strays(path, [way[shown] for way in ways])
     if not far >= FAR:
         return ""

@@ -3,8 +3,7 @@
 
 import math
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 import bpy
@@ -19,9 +18,9 @@ from ..services.hidden import unhidden
 from ..services.leaps import leaps_told
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
-from . import actions, body_drawn, riding, rotations
 from . import armature as armature_reader
 from . import body as body_reader
+from . import body_drawn, riding
 from .binding import bind_places, hidden
 from .carried import bodies_of, hairs_of
 from .layers import layer_of, working_in
@@ -29,10 +28,10 @@ from .lookup import find, named
 from .placing import world
 from .relations import found_anew
 from .rigging import posture, rigging
-from .unkeyed import Unkeyed
+from .stepping import step, stepping
 from .watched import watched
 
-BLOCK, MANY = 128, 6000
+BLOCK, MANY = 256, 6000
 """Frames whose poses are made channels together, at most, and joints in all of these: each frame then costs little, since what
 is done to so few numbers costs as much for one frame as for all, and all of them about a slice of work.
 """
@@ -115,16 +114,13 @@ def _sample(context, armature) -> Iterator[tuple[int, int]]:
     recording = _Recording(context, armature)
     total = len(recording.frames)
     yield 0, total
+    for body in bodies_of(armature, context.scene):
+        for _ in body_reader.weighed(body):
+            yield 0, total
     for row in range(total):
         recording.take(row)
         yield row + 1, total
-    session.renew_motion(recording.name, recording.sampled(), recording.reader)
-
-
-def step(scene, frame: float) -> None:
-    """Show a frame, with its fraction."""
-    whole = int(np.floor(frame + 1e-6))
-    scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+    session.renew_motion(recording.name, (yield from recording.sampled()), recording.reader)
 
 
 class _Recording:
@@ -149,7 +145,8 @@ class _Recording:
         self._unit = self._scene.unit_settings.scale_length
         count, bones = len(self.frames), len(self._rig.bones)
         self._block = min(BLOCK, max(1, MANY // bones))
-        self._joints, self._parts = np.empty((self._block, bones, 4, 4)), []
+        self._pose, self._basis = np.empty((2, self._block, len(armature.pose.bones), 4, 4), np.float32)
+        self._parts = []
         self._drawn, self._world = np.empty((count, bones, 4, 4), np.float32), np.empty((count, bones, 4, 4))
         self._own = np.empty((count, bones, 3, 3), np.float32)
         self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
@@ -196,7 +193,7 @@ class _Recording:
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        self._joints[row % self._block], self._own[row] = self.reader.world(evaluated), self.reader.own(evaluated)
+        self.reader.record(evaluated, self._pose[row % self._block], self._basis[row % self._block])
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for name, other in zip(self._tracked, tracked, strict=True):
             self._places[name][row] = world(other, graph)
@@ -208,8 +205,9 @@ class _Recording:
 
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""
-        rows = slice(first, end)
-        joints = unhidden(self._joints[: end - first], self._rig, self._needed, self.frames[rows])
+        rows, kept = slice(first, end), slice(end - first)
+        drawn = self.reader.posed(self._pose[kept], self._places[""][rows])
+        joints = unhidden(drawn, self._rig, self._needed, self.frames[rows])
         part = Motion.from_world(
             frames=self.frames[rows],
             rate=self._rate,
@@ -225,28 +223,36 @@ class _Recording:
         world = part.world()
         self._parts.append(part)
         self._world[rows] = to_core(self._unit) @ world
-        self._drawn[rows] = self._joints[: end - first] @ self._trim
+        self._drawn[rows], self._own[rows] = drawn @ self._trim, self.reader.own(self._basis[kept])
         self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
     def _moved(self, joint: int) -> np.ndarray:
         """World transforms (T, 4, 4) of a joint as Blender gave them, but for rounding to single precision."""
         return self._drawn[:, joint].astype(float) @ np.linalg.inv(self._trim[joint])
 
-    def sampled(self) -> SampledRig:
-        """What was read, as the character and clip that live view and bake use."""
-        rig, places, armature = self._rig, self._places, find(self.name)
+    def sampled(self) -> Generator[tuple[int, int], None, SampledRig]:
+        """What was read, as the character and clip that live view and bake use; yields (done, total) where a large body would
+        hold Blender up.
+        """
+        rig, places, done = self._rig, self._places, (len(self.frames), len(self.frames))
         motion, binds = Motion.joined(self._parts, places), self._binds
-        hairs = [thing for name in self._tracked if name not in self._bodies and (thing := find(name)) is not None]
-        of_hairs = {hair.name_full: places[hair.name_full] for hair in hairs}
+        hairs = [name for name in self._tracked if name not in self._bodies]
+        of_hairs = {name: places[name] for name in hairs if find(name) is not None}
         carriers = riding.carriers(rig, self._head, self._heads, self._moved, of_hairs)
         for other in self._tracked:
             joint = carriers.get(other, self._head)
             joints = self._heads if joint == self._head else self._moved(joint)
             own = rig_service.on_joint(places[other], places[""], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
-        arrays = [(body_reader.read(find(body), armature), binds[body]) for body in self._bodies]
+        yield done
+        arrays = []
+        for body in self._bodies:
+            arrays.append((body_reader.read(named(body), named(self.name)), binds[body]))
+            yield done
         metres = self._unit * rig_service.size_shown(rig, self._place, self._shown)
         character = rig_service.character(rig, self._place, arrays, metres)
+        yield done
+        armature = named(self.name)
         clip = Clip(motion.times, self._world, motion.shape, armature.neuralocks_character.loop)
         clip = replace(clip, cuts=find_cuts(clip, character.head))
         before, carried = session.rigs.get(self.name), {}
@@ -267,7 +273,7 @@ class _Recording:
             rigging=self._rigging,
             posture=self._posture,
             hairs_off=riding.strays_told(
-                [hair for hair in hairs if hair.name_full not in carriers],
+                [hair for name in hairs if name not in carriers and (hair := find(name)) is not None],
                 rig,
                 self._heads,
                 self._moved,
@@ -281,37 +287,3 @@ class _Recording:
             ),
             leaps=leaps_told(clip, character.head, motion.frames),
         )
-
-
-class stepping:
-    """While frames are stepped: the live view is off, hair bones are turned as without it and without baked keys, and the
-    current frame comes back at the end, with poses that are not keyed.
-    """
-
-    def __init__(self, scene):
-        self._scene = scene
-
-    def __enter__(self):
-        self._frame = self._scene.frame_current, self._scene.frame_subframe
-        self._unkeyed = Unkeyed(self._scene)
-        self._live = {}
-        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
-            text = armature.neuralocks_character.rig_kept
-            self._live[armature.name_full] = rotations.kept(armature, rotations.named(text))
-            rotations.give_back(armature, text, keyed=True)
-        self._keyed = ExitStack()
-        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):
-            self._keyed.enter_context(actions.without(armature))
-        session.paused += 1
-
-    def __exit__(self, *_):
-        try:
-            self._keyed.close()
-            self._scene.frame_set(self._frame[0], subframe=self._frame[1])
-            self._unkeyed.put_back()
-            for name, turned in self._live.items():
-                if (armature := find(name)) is not None:
-                    rotations.give_back(armature, turned)
-            bpy.context.view_layer.update()  # what is put back is no edit of the artist's
-        finally:
-            session.paused -= 1

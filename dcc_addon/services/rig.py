@@ -209,8 +209,8 @@ def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
     most closely; each is world transforms (T, 4, 4).
     """
     able = [carrier for carrier in carriers if np.linalg.det(carrier[0])]  # not those hidden by a scale of zero
-    ways = [carrier @ np.linalg.inv(carrier[0]) for carrier in able]
-    off = [path - (way[:, :3, :3] @ path[0] + way[:, :3, 3]) for way in ways]
+    firsts = [transformed(path[0], np.linalg.inv(carrier[0])) for carrier in able]
+    off = [path - (way[:, :3, :3] @ first + way[:, :3, 3]) for way, first in zip(able, firsts)]
     return min((float(np.linalg.norm(each, axis=-1).max()) for each in off), default=0.0)
 
 

@@ -133,6 +133,42 @@ def simulated_in_slices(_folder: Path) -> None:
     assert np.ptp(drawn[0]) > 1.0 and apart(*drawn) == 0.0
 
 
+@patch("dcc_addon.scene.body.WEIGHED", 10)
+def weighed_in_steps(_folder: Path) -> None:
+    """The weights of a large body are read in several slices, before the first frame; edited meanwhile, they are read again."""
+    from dcc_addon.scene import body
+    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.session import session
+
+    scenes.empty()
+    rig = scenes.armature()
+    scenes.dance(rig)
+    skin = scenes.body(rig)
+    count = len(skin.data.vertices)
+
+    def first_frame(edit) -> int:
+        """Slices before the first frame is read."""
+        slices = in_slices(bpy.context, rig, 0.0)
+        done = [next(slices)[0] for _ in range(3)]
+        edit()
+        done += [now for now, _ in slices]
+        return done.index(1)
+
+    assert first_frame(lambda: None) > count / 10 - 2, count
+    known = session.weights[skin.data.name_full][1]
+    np.testing.assert_array_equal(known, body.read(skin, rig).weights)
+    assert first_frame(lambda: None) == 1  # what is known is not read again
+
+    def reweigh() -> None:
+        skin.vertex_groups[0].add([0], 0.25, "REPLACE")
+        session.edits += 1
+        session.weights.clear()
+
+    session.weights.clear()
+    first_frame(reweigh)
+    assert 0.25 in body.read(skin, rig).weights[:, 2]
+
+
 @patch("dcc_addon.background.SLICE", 0.0)
 def posed_without_a_key(_folder: Path) -> None:
     """A shape key that was turned up, and has no key of that yet, is put back after each slice: no edit that would let

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Showing one frame after the other, to read them, and leaving the scene as it was."""
+
+from contextlib import ExitStack
+
+import bpy
+import numpy as np
+
+from ..session import session
+from . import actions, rotations
+from .lookup import find
+from .unkeyed import Unkeyed
+
+
+def step(scene, frame: float) -> None:
+    """Show a frame, with its fraction."""
+    whole = int(np.floor(frame + 1e-6))
+    scene.frame_set(whole, subframe=max(0.0, float(frame - whole)))
+
+
+class stepping:
+    """While frames are stepped: the live view is off, hair bones are turned as without it and without baked keys, and the
+    current frame comes back at the end, with poses that are not keyed.
+    """
+
+    def __init__(self, scene):
+        self._scene = scene
+
+    def __enter__(self):
+        self._frame = self._scene.frame_current, self._scene.frame_subframe
+        self._unkeyed = Unkeyed(self._scene)
+        self._live = {}
+        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
+            text = armature.neuralocks_character.rig_kept
+            self._live[armature.name_full] = rotations.kept(armature, rotations.named(text))
+            rotations.give_back(armature, text, keyed=True)
+        self._keyed = ExitStack()
+        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):
+            self._keyed.enter_context(actions.without(armature))
+        session.paused += 1
+
+    def __exit__(self, *_):
+        try:
+            self._keyed.close()
+            self._scene.frame_set(self._frame[0], subframe=self._frame[1])
+            self._unkeyed.put_back()
+            for name, turned in self._live.items():
+                if (armature := find(name)) is not None:
+                    rotations.give_back(armature, turned)
+            bpy.context.view_layer.update()  # what is put back is no edit of the artist's
+        finally:
+            session.paused -= 1
