@@ -5,9 +5,8 @@
 
 Prints milliseconds a frame (median of sequential frames), everything counted: all of `scene.frame_set`. MODEL left out
 means the shipped one. Run it on an idle machine: the numbers are wall-clock time; on a busy one with --cpu-time, which
-counts the processor time of all threads. Strands have 24 vertices, unevenly spaced, as a groom of somebody else has;
-`even` are those whose vertices are the network's own. The shipped shot has a skinned body that the hair is kept out of;
-its motion is sampled as often as it is played, in turns.
+counts the processor time of all threads. Strands have 24 vertices, unevenly spaced, as a groom of somebody else has. The
+shipped shot has a skinned body that the hair is kept out of; its motion is sampled as often as it is played, in turns.
 """
 
 import os
@@ -35,15 +34,15 @@ def main() -> None:
     model = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
     dcc_addon.register()
     print(f"Blender {bpy.app.version_string}, {os.cpu_count()} cores")
-    for count, even in ((3000, False), (3000, True), (50000, False), (50000, True), (120000, False)):
-        found = live(scenes, model, count, even)
+    for count in (3000, 50000, 120000):
+        found = live(scenes, model, count)
         rate = ", ".join(f"{name} {value:.2f}" for name, value in found.items())
-        print(f"live, {count} strands x 24{' even' if even else ''}: {rate} [ms]", flush=True)
+        print(f"live, {count} strands x 24: {rate} [ms]", flush=True)
     for name, value in shipped_shot(scenes, model).items():
         print(f"shipped shot, {name}: {value:.2f}", flush=True)
 
 
-def live(scenes, model: str, count: int, even: bool) -> dict[str, float]:
+def live(scenes, model: str, count: int) -> dict[str, float]:
     """Median time of a frame with live hair and without it."""
     scenes.empty()
     scene = bpy.context.scene
@@ -51,8 +50,6 @@ def live(scenes, model: str, count: int, even: bool) -> dict[str, float]:
     rig = scenes.armature()
     scenes.dance(rig, (1, FRAMES))
     hair = scenes.hair(rig, count)
-    if even:
-        _even(hair.data)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = model
     bpy.context.view_layer.update()  # from now on there is something that a frame must evaluate
@@ -96,19 +93,6 @@ def shipped_shot(scenes, model: str) -> dict[str, float]:
     result["live, kept out of the body [ms]"] = median(scene, FRAMES)
     own.live = False
     return result | {"sampling, times playing": min(sampling) / min(playing)}
-
-
-def _even(data) -> None:
-    """Space the vertices of each strand evenly, as a network's strand has them."""
-    from dcc_addon.scene import curves
-    from neuralocks_core.groom import Groom
-    from neuralocks_core.strands.arclength import resample
-
-    counts = curves.counts(data)
-    points = curves.points(data)
-    for _ in range(8):  # the corners that a resampling cuts make its pieces a little uneven again
-        points = resample(Groom("hair", points, counts), 24)[0].reshape(-1, 3).astype(np.float32)
-    curves.write(data, points)
 
 
 def median(scene, frames: int) -> float:

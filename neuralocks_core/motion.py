@@ -107,6 +107,8 @@ class Clip:
     def shape_at(self, times) -> np.ndarray:
         """Blend shape weights (n, B) at times (n,) [s], linear between samples."""
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
+        if not self.shape.shape[1]:  # as most have none, and live hair asks in every frame
+            return np.zeros((len(times), 0))
         low, fraction = self._bracket(times)
         high = np.minimum(low + 1, len(self.times) - 1)
         return (1 - fraction)[:, None] * self.shape[low] + fraction[:, None] * self.shape[high]
