@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks rig evaluate`: the report card of mesh hair that moves on its bones, whatever moved it."""
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,22 +110,21 @@ def evaluate_rig(
     picked = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
     vertices, lock = some[picked], rig.chains.chain[rig.weights[picked, 1:].argmax(axis=1)]
     posed = _Posed(hair, vertices, moving)
-    points, carried = posed.all(say)
-    off = np.square(points - carried).sum(axis=-1).mean(axis=0)
+    off, jitter, seen = _moved(posed, moving, say)
     each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
     most = max(each, key=each.__getitem__)
     measures = {
         "joints": len(rig.chains),
         "chains": len(rig.chains.roots),
         "vertices": len(vertices),
-        "frames": len(points),
+        "frames": len(source.time_codes),
         "swing_mm": 1e3 * float(np.sqrt(off.mean())),
         "swing_most": rig.chains.chain_name(int(most)),
         "swing_most_mm": 1e3 * each[most],
-        "jitter_mm": _jitter(source.clip, moving, points),
+        "jitter_mm": jitter,
     }
     if rig.character.body is not None:
-        measures |= _depths(posed, points, carried, [rig.chains.chain_name(int(i)) for i in lock], say)
+        measures |= _depths(posed, seen, [rig.chains.chain_name(int(i)) for i in lock], say)
     notes = rigged_notes(source) + chain_notes(hair, chains) + _not_measured(hair)
     return RigCard(Path(baked), source.path, measures, notes)
 
@@ -133,37 +133,52 @@ class _Posed:
     """Some vertices of the hair, and the skin, as the animation poses them, in canonical space [m]."""
 
     def __init__(self, hair: RiggedHair, vertices: np.ndarray, moving: np.ndarray):
-        self.codes, self._clip = hair.source.time_codes, hair.source.clip
+        self.codes, self.clip = hair.source.time_codes, hair.source.clip
         self._character, self.skin = hair.source.character, hair.rig.character.body
         self._moving = moving
         self._hair = self._character.body.part(vertices, np.zeros((0, 3), int))
         self.at_rest = self._character.canonical(self._hair.points)
 
-    def all(self, say) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (T, V, 3) float32 of all samples, and where they would be carried rigidly."""
-        points = np.empty((2, len(self._clip.joints), len(self._hair.points), 3), np.float32)
-        for row, (joints, shape) in enumerate(zip(self._clip.joints, self._clip.shape)):
-            for which, here in enumerate((joints, _stiff(self._character, joints, self._moving))):
-                points[which, row] = self._hair.posed(self._character.skinning(here), shape)
-            say(row + 1, len(points[0]), "posing the hair")
-        return points[0], points[1]
+    def each(self, say) -> Iterator[np.ndarray]:
+        """Vertices (2, V, 3) of one sample after the other, and where they would be carried rigidly."""
+        for row, (joints, shape) in enumerate(zip(self.clip.joints, self.clip.shape)):
+            both = joints, _stiff(self._character, joints, self._moving)
+            yield np.stack([self._hair.posed(self._character.skinning(here), shape) for here in both])
+            say(row + 1, len(self.clip.joints), "posing the hair")
 
     def distances(self, row: int | None, points: np.ndarray) -> np.ndarray:
         """Signed distances (N,) [m] of points (N, 3) to the skin at a sample, or in bind pose."""
         if row is None:
             vertices = self._character.canonical(self.skin.points)
         else:
-            vertices = self.skin.posed(self._character.skinning(self._clip.joints[row]), self._clip.shape[row])
+            vertices = self.skin.posed(self._character.skinning(self.clip.joints[row]), self.clip.shape[row])
         return proven_distances(vertices, self.skin.triangles, points)
 
 
-def _depths(posed: _Posed, points: np.ndarray, carried: np.ndarray, locks: list[str], say) -> dict:
-    """What lies in the body of vertices (T, V, 3), as the animation moves them and as they would be carried rigidly."""
-    rows = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
-    at_rest, measured = posed.distances(None, posed.at_rest), []
+def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, dict[int, np.ndarray]]:
+    """Mean squared distances (V,) [m^2] of vertices from where they would be carried rigidly; the largest step [mm] of any
+    where all other joints have been still for SETTLED, NaN where they never are; and the vertices (2, V, 3) of the rows in
+    which distances to the body are measured. What is not asked for is not kept: long animation has gigabytes of it.
+    """
+    clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None
+    still = metrics.held(clip.joints[:, ~moving])
+    quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= SETTLED
+    wanted = set(np.linspace(0, len(clip.times) - 1, min(len(clip.times), FRAMES)).round().astype(int).tolist())
+    for row, both in enumerate(posed.each(say)):
+        total = total + np.square(both[0] - both[1]).sum(axis=-1)
+        if row and quiet[row - 1] and quiet[row]:
+            steps.append(metrics.jitter(np.stack([before, both[0]])))
+        if row in wanted:
+            seen[row] = both
+        before = both[0]
+    return total / len(clip.times), max(steps, default=float("nan")), seen
+
+
+def _depths(posed: _Posed, seen: dict[int, np.ndarray], locks: list[str], say) -> dict:
+    """What lies in the body of the vertices that were `seen`, as the animation moves them and as they would be carried rigidly."""
+    rows, at_rest, measured = list(seen), posed.distances(None, posed.at_rest), []
     with ThreadPoolExecutor(cores()) as pool:
-        both = pool.map(lambda row: posed.distances(row, np.concatenate([points[row], carried[row]])), rows)
-        for done, distance in enumerate(both):
+        for done, distance in enumerate(pool.map(lambda row: posed.distances(row, seen[row].reshape(-1, 3)), rows)):
             measured.append(distance.reshape(2, -1))
             say(done + 1, len(rows), "measuring distances to the body")
     result: dict = {"body_frames": len(rows)}
@@ -191,12 +206,3 @@ def _stiff(character: Character, joints: np.ndarray, moving: np.ndarray) -> np.n
         up = parents[joint]
         result[joint] = result[up] @ character.inverse_bind[up] @ bind[joint]
     return result
-
-
-def _jitter(clip, moving: np.ndarray, points: np.ndarray) -> float:
-    """Largest step [mm] of vertices (T, V, 3) where all other joints have been still for SETTLED; NaN where they never are."""
-    still = metrics.held(clip.joints[:, ~moving])
-    last = np.maximum.accumulate(np.where(still, -np.inf, clip.times))
-    quiet = clip.times - last >= SETTLED
-    steps = [points[row - 1 : row + 1] for row in np.flatnonzero(quiet) if row and quiet[row - 1]]
-    return max(map(metrics.jitter, steps)) if steps else float("nan")
