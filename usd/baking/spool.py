@@ -166,6 +166,9 @@ class Spool:
     def close(self) -> None:
         """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
         if kept(self.out):
+            for spare in self._spares:
+                with suppress(OSError):
+                    spare.unlink()
             self._lock.release()
         else:
             self.discard()

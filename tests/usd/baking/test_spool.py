@@ -79,7 +79,10 @@ def test_a_frame_is_written_over_one_that_nothing_needs_any_more(tmp_path):
         assert not spool.holds(0, code, 50)
     spool.write(1, 1.0, np.full((9, 3), 2.0))
     assert not list(spool.folder.glob("*.part"))
+    spool.write(0, 3.0, np.ones((50, 3)))
+    spool.forget(0, 3.0)
     spool.close()
+    assert not list(spool.folder.glob("*.part"))  # what was stopped leaves nothing that nobody goes on from
     again = Spool(tmp_path / "bake.usdc", "a")
     assert again.holds(1, 1.0, 9) and (read(again, 1.0, slice(0, 9), batch=1) == 2).all()
     again.discard()
