@@ -38,9 +38,9 @@ def inside_out(points: np.ndarray, triangles: np.ndarray) -> bool:
     """
     if not len(triangles):
         return False
-    points, a = np.asarray(points, float), np.ascontiguousarray(triangles.T)
-    middle = np.bincount(a.ravel(), minlength=len(points)) @ points / a.size
-    # One array a coordinate: triples are read five times as slowly.
-    x, y, z = np.ascontiguousarray((points - middle).T)[:, a]
+    points, corners = np.asarray(points, float), np.ascontiguousarray(triangles.T)
+    middle = np.bincount(corners.ravel(), minlength=len(points)) @ points / corners.size
+    # One array for each coordinate: to gather triples takes several times as long.
+    x, y, z = np.ascontiguousarray((points - middle).T)[:, corners]
     spanned = sum(p[0] * (q[1] * r[2] - q[2] * r[1]) for p, q, r in ((x, y, z), (y, z, x), (z, x, y)))
     return bool(spanned.sum() < INSIDE_OUT * np.abs(spanned).sum())

@@ -173,20 +173,20 @@ def _triangles(mesh) -> np.ndarray:
     """Corners (F, 3) int32 of the faces, cut into triangles."""
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    corners = mesh.attributes.get(".corner_vert")  # as a block; Blender gives the triangles' own one by one
-    if corners is None:
+    kept = mesh.attributes.get(".corner_vert")
+    if kept is None:  # before Blender 4.0
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
         return triangles
-    vertices = np.empty(len(mesh.loops), np.int32)
-    corners.data.foreach_get("value", vertices)
+    vertex_of = np.empty(len(mesh.loops), np.int32)
+    kept.data.foreach_get("value", vertex_of)
     mesh.loop_triangles.foreach_get("loops", triangles.ravel())
-    return vertices[triangles]
+    return vertex_of[triangles]
 
 
 def vertices(mesh) -> np.ndarray:
     """Points (V, 3) float32 of a mesh in its own space."""
     points, kept = np.empty((len(mesh.vertices), 3), np.float32), mesh.attributes.get("position")
-    if kept is None:  # in Blender 3.4
+    if kept is None:  # before Blender 3.5
         mesh.vertices.foreach_get("co", points.ravel())
     else:  # as a block, a hundred times faster
         kept.data.foreach_get("vector", points.ravel())
