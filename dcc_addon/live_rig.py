@@ -69,8 +69,7 @@ def bind(armature, sampled) -> Bound:
     bound, path = session.chains.get(armature.name_full), model_path(armature, "rig")
     file = path, stamp(path)
     if bound is None or bound.file != file:
-        patterns = armature.neuralocks_character.chains
-        bones = LiveBones.of(RigModel.load(path), sampled.rig, sampled.character, patterns)
+        bones = LiveBones.of(RigModel.load(path), sampled.rig, sampled.character)
         bound = Bound(bones, rotations.free_modes(armature, bones.bones), file)
         session.chains[armature.name_full] = bound
     rotations.check_free(armature, bound.bones.bones)

@@ -158,7 +158,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
             raise NeuralocksError(f"{path}: this is a folder; name the header that is to be written in it")
         sampled, model = ensure(context, armature), RigModel.load(model_path(armature, "rig"))
         # Says where the model is another rig's, as the shipped one is.
-        LiveBones.of(model, sampled.rig, sampled.character, armature.neuralocks_character.chains)
+        LiveBones.of(model, sampled.rig, sampled.character)
         check_ours([out, example_beside(out)], made_here)
         export_c(model, out)
         return f"C header written to {out}"

@@ -10,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.carried import CarriedHair
+from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rotation import flat, rotation_part, to_quaternion
 
 from .hidden import NONE
@@ -68,14 +69,13 @@ class LiveBones:
     chains: HairChains
 
     @classmethod
-    def of(cls, model: RigModel, rig: RigArrays, character: Character, patterns: str = "") -> "LiveBones":
+    def of(cls, model: RigModel, rig: RigArrays, character: Character) -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
         below = character.skeleton.below(character.head)
         model = replace(model, chains=model.chains.named_as(rig.paths, below))
-        joints = model.chains.match(rig.paths, below)
-        chains = chains_of(character, patterns, rig.name)
+        chains = placed_chains(model.chains, character)
         model.chains.check_same(chains)
-        return cls(model, tuple(rig.bones[j] for j in joints), joints, chains)
+        return cls(model, tuple(rig.bones[j] for j in chains.joints), chains.joints, chains)
 
     def follow(self, character: Character, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""

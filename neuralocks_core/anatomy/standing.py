@@ -10,8 +10,8 @@ from neuralocks_core.rotation import angle_between, rotation_part
 SAME = 1e-6
 """Entries of rotations that differ by less are the same."""
 STRAIGHTER = 45.0
-"""A quarter turn that brings legs, or a trunk without legs, nearer to the vertical than the nearest one does, by more than
-this [degrees], is meant in its place."""
+"""Where the nearest quarter turn leaves legs, or a trunk without legs, farther off the vertical than another one could, by more
+than this [degrees], the nearest of those that do not is meant."""
 ASKEW = 10.0
 """Legs and trunk that are less off the vertical by more than this [degrees], each, where they are than by any quarter turn
 were built askew."""
@@ -55,7 +55,9 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     if found:
         # Legs are upright on two feet and on four; a trunk without legs may be either's.
         others = quarters if legs is not None else [np.eye(3)]
-        turn = next((o for o in others if tilt(o, found[0]) < tilt(turn, found[0]) - STRAIGHTER), turn)
+        least = min(tilt(o, found[0]) for o in others) + STRAIGHTER
+        if tilt(turn, found[0]) > least:
+            turn = next(o for o in others if tilt(o, found[0]) <= least)
         if all(tilt(here, axis) < tilt(turn, axis) - ASKEW for axis in found):
             return placed
     elif np.degrees(angle_between(turn, here)) > NEAR:

@@ -148,8 +148,8 @@ class HairChains:
             )
         if missing:
             raise NeuralocksError(
-                f"model: it moves {len(self)} joints in {len(self.roots)} chains, but below this head there is no joint "
-                f"'{missing[0]}' ({len(missing)} of them missing); train a model for this rig (neuralocks rig train)"
+                f"model: below this head there is no joint '{missing[0]}', which it moves ({len(missing)} of {len(self)} are missing); "
+                "train a model for this rig (neuralocks rig train)"
             )
         joints: list[int] = []
         for name, parent in zip(self.names, self.parents):

@@ -120,6 +120,11 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
         )
     below = character.skeleton.below(character.head)
     inside = [joint for joint in hits if below[joint] and joint != character.head]
+    if not inside and hits == [character.head]:
+        raise NeuralocksError(
+            f"--chains {' '.join(patterns)}: joint '{leaf(names[character.head])}' is the head; name the first joints of the hair, "
+            "which hang below it"
+        )
     if not inside:
         above, head = carrier(names[character.head], *(names[joint] for joint in hits)), leaf(names[character.head])
         raise NeuralocksError(

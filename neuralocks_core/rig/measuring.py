@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair joints measured: which of them move, where their bones end, and how they lie in the bind pose."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import leaf
@@ -51,19 +53,45 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     chain = np.zeros(len(joints), int)
     for row, parent in enumerate(parents):
         chain[row] = chain[parent] if parent >= 0 else (parents[:row] < 0).sum()
-    _check_scale(skeleton, joints)
-    axes = character.bind_to_canonical[:3, :3] @ rotation_part(skeleton.bind[joints], "hair joint in bind pose")
+    origins, axes = _origins_and_axes(character, joints)
     return HairChains(
         names=names,
         joints=joints,
         parents=parents,
         chain=chain,
-        origins=places[joints],
+        origins=origins,
         axes=axes,
         bone_joint=bone_joint,
         bone_end=bone_end,
         bones=bones,
     )
+
+
+def placed_chains(chains: HairChains, character: Character) -> HairChains:
+    """A model's chains as they lie in the bind pose of a character, found by the names of their joints alone: the hair's mesh
+    may be hidden, of a lower level of detail, or in another file.
+
+    Args:
+        chains: the model's; their `bones` are kept.
+        character: whose skeleton has these joints.
+
+    Raises:
+        NeuralocksError: a joint is missing, mirrored or unevenly scaled.
+    """
+    skeleton = character.skeleton
+    joints = chains.match(skeleton.names, skeleton.below(character.head))
+    rows = {int(joint): row for row, joint in enumerate(joints)}
+    parents = [rows.get(int(skeleton.parents[joint]), -1) for joint in joints]
+    origins, axes = _origins_and_axes(character, joints)
+    return replace(chains, joints=joints, parents=parents, origins=origins, axes=axes)
+
+
+def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Canonical places (N, 3) [m] of joints (N,) in the bind pose, and their axes there as columns (N, 3, 3)."""
+    bind = character.skeleton.bind[joints]
+    _check_scale(character.skeleton, joints)
+    axes = character.bind_to_canonical[:3, :3] @ rotation_part(bind, "hair joint in bind pose")
+    return character.canonical(bind[:, :3, 3]), axes
 
 
 def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:

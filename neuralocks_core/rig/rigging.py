@@ -41,9 +41,14 @@ class HairRig:
         return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
 
 
-def assemble_rig(character: Character, meshes: list[SkinnedMesh], patterns: list[str] | None = None) -> HairRig:
-    """Find the chains of a character and part its meshes; `character.body` holds the meshes one after another."""
-    chains = find_chains(character, meshes, patterns)
+def assemble_rig(
+    character: Character, meshes: list[SkinnedMesh], chains: HairChains | list[str] | None = None
+) -> HairRig:
+    """Part a character's meshes, which `character.body` holds one after another, by its hair chains: those given, or found by
+    patterns or by themselves, see `find_chains`.
+    """
+    if not isinstance(chains, HairChains):
+        chains = find_chains(character, meshes, chains)
     skeleton = character.skeleton
     count = len(skeleton.names)
     moving = moving_joints(skeleton, chains)

@@ -16,7 +16,6 @@ from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.network import RigModel
 
 from ..border.amounts import check_number
@@ -143,34 +142,16 @@ def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHa
     """The shot, the model with the shot's names of its joints, where these are in the skeleton (N,), and how many times as
     large as the model's rig it is.
     """
-    given = {"skeleton": skeleton, "head": head, "joints": joints, "cuts": cuts, "unbaked": True}
-    # The model knows its joints: no guess is made about which ones are hair.
-    try:
-        hair = read_rigged_hair(shot, chains=model.chains.tops, **given)
-    except NoHairChains as error:
-        if (chains := _named_otherwise(shot, model.chains, given)) is None:
-            tops = model.chains.tops
-            raise NeuralocksError(
-                f"{shot}: no joint of the model's {len(tops)} hair chains ({tops[0]}, ...) is in it; "
-                "give a model trained for this rig (neuralocks rig train)"
-            ) from error
-        model = replace(model, chains=chains)
-        hair = read_rigged_hair(shot, chains=chains.tops, **given)
+    hair = read_rigged_hair(
+        shot, skeleton=skeleton, head=head, joints=joints, cuts=cuts, unbaked=True, model=model.chains
+    )
     character = hair.source.character
-    moved = model.chains.match(character.skeleton.names, character.skeleton.below(character.head))
+    names, below = character.skeleton.names, character.skeleton.below(character.head)
+    model = replace(model, chains=model.chains.named_as(names, below))
+    moved = model.chains.match(names, below)
     size = model.chains.check_same(hair.rig.chains)
     check_cuts(cuts, [hair.source])
     return hair, model, moved, size
-
-
-def _named_otherwise(shot, chains: HairChains, given: dict) -> HairChains | None:
-    """The model's chains as a shot calls them in which no name of theirs is found."""
-    try:
-        character = read_rigged_hair(shot, **given).source.character
-    except NeuralocksError:  # hair that cannot be found in it anyhow
-        return None
-    named = chains.named_as(character.skeleton.names, character.skeleton.below(character.head))
-    return None if named is chains else named
 
 
 def _held(hair: RiggedHair, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
@@ -215,8 +196,10 @@ def _with_samples(hair: RiggedHair, moved: np.ndarray, wanted: list[float]) -> l
     """What was asked for and the animation's own samples: the body must come out sample for sample."""
     own = _rotation_samples(hair, moved)
     # A frame and a sample at the same time, up to rounding, are one.
-    apart = [code for code in wanted if not any(np.isclose(own, code, rtol=0, atol=1e-6 * hair.border.frame))]
-    return sorted({*apart, *own})
+    edges = np.array([-np.inf, *own, np.inf])
+    after = np.searchsorted(edges, wanted)
+    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * hair.border.frame
+    return sorted({*np.array(wanted)[~near].tolist(), *own})
 
 
 def _rotation_samples(hair: RiggedHair, moved: np.ndarray) -> list[float]:

@@ -53,7 +53,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
         spec = Sdf.AttributeSpec(prim, name, kind)
         attribute = own.GetPrim().GetAttribute(name) if own else None
         samples = attribute.GetTimeSamples() if attribute else []
-        if not samples:
+        if not samples or _has_default(attribute):
             spec.default = array(_joined(attribute, Usd.TimeCode.Default(), rest[name]))
         for code in samples:
             layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
@@ -61,6 +61,8 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     places = [order.index(name) for name in moved]
     bind = to_quaternion(rotation_part(relative_to_parents(source.bind, source.parents)[joints]))
     attribute = own.GetRotationsAttr() if own else None
+    if _has_default(attribute):
+        spec.default = Vt.QuatfArray(_joined(attribute, Usd.TimeCode.Default(), rest["rotations"]))
     for code, turn in zip(codes, turns):
         values = _joined(attribute, code, rest["rotations"])
         # The second factors keep w > 0, so no sign flips between samples.
@@ -128,6 +130,11 @@ def _joined(attribute, code, rest: list) -> list:
     return values + rest[len(values) :]
 
 
+def _has_default(attribute) -> bool:
+    """Whether a channel has a value at no time, which is seen where nobody asks for one."""
+    return bool(attribute) and attribute.Get(Usd.TimeCode.Default()) is not None
+
+
 def _blend_shapes(layer, prim, animation) -> None:
     names, weights = animation.GetBlendShapesAttr(), animation.GetBlendShapeWeightsAttr()
     if not names.HasAuthoredValue():
@@ -136,7 +143,7 @@ def _blend_shapes(layer, prim, animation) -> None:
     spec.default = names.Get()
     if weights.HasAuthoredValue():
         spec = Sdf.AttributeSpec(prim, "blendShapeWeights", Sdf.ValueTypeNames.FloatArray)
-        if weights.Get(Usd.TimeCode.Default()) is not None:
+        if _has_default(weights):
             spec.default = weights.Get(Usd.TimeCode.Default())
         for code in weights.GetTimeSamples():
             layer.SetTimeSample(spec.path, code, weights.Get(code))

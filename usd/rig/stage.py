@@ -8,9 +8,11 @@ import numpy as np
 from pxr import Usd, UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import fits
+from neuralocks_core.rig.finding import NoHairChains, fits
+from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rig.network import rig_spec
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
@@ -64,6 +66,7 @@ def read_rigged_hair(
     cuts: list[float] | None = None,
     baked_first: bool = False,
     unbaked: bool = False,
+    model: HairChains | None = None,
 ) -> RiggedHair:
     """Read the rigged mesh hair of a stage.
 
@@ -77,8 +80,10 @@ def read_rigged_hair(
         cuts: as for `stage.read_shot`.
         baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
         unbaked: as for `read_rig`.
+        model: a model's chains, in whatever names they have here: no guess is made then about which joints are hair.
 
     Raises:
+        NoHairChains: of a model's chains there is no joint.
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
     """
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
@@ -98,7 +103,8 @@ def read_rigged_hair(
         try:
             _check_authored(prim)
             source = read_rig(stage, prim, border, head, skins=skins, **given)
-            rig = assemble_rig(source.character, core_meshes(source), chains)
+            wanted = chains if model is None else _of_model(model, source.character)
+            rig = assemble_rig(source.character, core_meshes(source), wanted)
         except NeuralocksError as error:
             errors.append(type(error)(_with_path(prim, error)))
             continue
@@ -118,6 +124,18 @@ def read_rigged_hair(
         )
     check_orients(found[0].source, found[0].rig.chains)
     return found[0]
+
+
+def _of_model(model: HairChains, character: Character) -> HairChains:
+    """A model's chains where they lie in a character, by the names that they have there."""
+    names, below = character.skeleton.names, character.skeleton.below(character.head)
+    chains = model.named_as(names, below)
+    if not {leaf(name) for name in names} & set(chains.names):
+        raise NoHairChains(
+            f"no joint of the model's {len(model.roots)} hair chains ({model.tops[0]}, ...) is in it; give a model trained for this "
+            "rig (neuralocks rig train)"
+        )
+    return placed_chains(chains, character)
 
 
 def _is_baked(source: StageRig) -> bool:

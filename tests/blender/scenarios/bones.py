@@ -91,6 +91,31 @@ def bones(folder: Path) -> None:
         assert apart(turns(f)[others], still[f][others]) < 1e-6
 
 
+def bones_without_their_mesh(folder: Path) -> None:
+    """A model knows its bones: they move where the mesh is not rendered, and where there is none."""
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+
+    def live() -> np.ndarray:
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        rig.neuralocks_character.rig_live = True
+        bpy.context.scene.frame_set(11)
+        assert not messages(), messages()
+        found = np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+        rig.neuralocks_character.rig_live = False
+        return found
+
+    whole = live()
+    skin.hide_render = True
+    assert apart(live(), whole) < SAME
+    bpy.data.objects.remove(skin)
+    assert apart(live(), whole) < SAME
+
+
 def keyed_bones(folder: Path) -> None:
     """Hair bones that the artist has keyed, as a key on the whole character does: the baked keys show all the same, and
     muted give the artist's back, as they do for bones without keys.

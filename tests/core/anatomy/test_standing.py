@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.anatomy.standing import lies, standing
@@ -19,6 +20,16 @@ SEATED = np.array([[0, 0.1, 0], [0, 0.7, 0], [0.2, 0.1, 0.9], [-0.2, 0.1, 0.9]])
 @pytest.mark.parametrize("joints, lying", [(UPRIGHT, False), (FLAT, True), (ON_ALL_FOURS, False), (SEATED, False)])
 def test_legs_and_trunk_lie(joints, lying):
     assert lies(joints, Humanoid(NAMED), np.array([0, 1, 0])) == (lying, True)
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+@pytest.mark.parametrize("angle", range(0, 360, 30))
+def test_by_whatever_angle_parents_turn_a_character_it_stands(axis, angle):
+    """Upside down, too: from there lying is nearer than standing, but no better."""
+    placed = Rotation.from_euler(axis, angle, degrees=True).as_matrix()
+    for humanoid in (Humanoid(NAMED), Humanoid({"hips": 0, "head": 1})):
+        found = standing(placed, UPRIGHT, humanoid, np.array([0, 1.0, 0]))
+        np.testing.assert_allclose(found @ [0, 1, 0], [0, 1, 0], atol=1e-9)
 
 
 def test_without_legs_a_level_trunk_may_be_an_animals():

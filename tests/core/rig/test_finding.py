@@ -226,7 +226,7 @@ def test_joint_orients_and_facing_cancel():
         (tail("hair", 3, step=(0, 0, 0)), None, "has no length"),
         (tail("hair", 2), ["nothing*"], "no joint has such a name"),
         (tail("hair", 2), ["chest"], "'chest' does not hang below the head joint 'head', but from 'hips'"),
-        (tail("hair", 2), ["head"], "but from 'neck': name that with --head neck"),
+        (tail("hair", 2), ["head"], "joint 'head' is the head; name the first joints of the hair"),
     ],
 )
 def test_bad_rigs_are_refused(extra, patterns, words):

@@ -91,6 +91,33 @@ def test_the_header_passes_on_no_more_of_a_teleport_and_of_a_spin_than_the_bake(
     np.testing.assert_allclose(felt[:, 0, 0], (asked[:, 0, 0] + asked[:, 1, 0]) / 2, atol=0.01)
 
 
+@pytest.mark.parametrize("rate", [30, 60, 120, 240, 500])
+def test_a_sudden_start_and_turn_are_felt_alike_at_any_rate(tmp_path, rate):
+    """A controller sets somebody off at 2 m/s, and turns the head by 45 degrees, within one frame, however short that is; of
+    20 g and 50 rad/s that last for a tenth of a second as little is passed on as by a bake.
+    """
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    program, who, t = compiled(tmp_path, HISTORY_HARNESS), character(), np.arange(round(2 * rate) + 1) / rate
+    steps, since = np.array(model.spec.bins)[:, None, None], np.maximum(0, t - 1)
+    lasting = np.minimum(since, 0.1)
+    for place, turn in (
+        (2.0 * since, 0 * t),
+        (0 * t, np.where(t > 1, np.pi / 4, 0)),
+        (20 * 9.81 * lasting * (since - 0.5 * lasting), 50 * lasting),
+    ):
+        joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+        joints[:, who.head, 0, 3] += place
+        joints[:, who.head, :3, :3] = from_vector(np.outer(turn, [0, 1, 0]))
+        wanted = RigSampler(model.spec, who, Clip(t, joints)).features([1.2])[0, 15:]
+        quaternions = to_quaternion(joints[:, who.head, :3, :3])
+        rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
+        ours = run_c(program, rows, len(wanted))[round(1.2 * rate)]
+        # Blow by blow the two may lie in neighbouring steps; all in all they are the same.
+        felt, asked = ((steps * values.reshape(-1, 2, 3)).sum(axis=0) for values in (ours, wanted))
+        assert np.abs(felt - asked).max() < 0.15 * np.abs(asked).max(), (felt, asked)
+
+
 def test_a_report_gives_the_size_that_the_compiler_finds(tmp_path):
     export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
     program = """#include "hair.h"

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import from_vector
@@ -27,6 +27,41 @@ def test_a_model_for_another_rig_is_refused(tmp_path):
     model = model_for(read_rigged_hair(EXAMPLE / "character.usda"))
     with pytest.raises(NeuralocksError, match="rig train"):
         bake_rig(shot, tmp_path / "out.usda", model)
+
+
+@pytest.mark.parametrize("without", ["hidden", "inactive", "coarse"])
+def test_the_hairs_mesh_need_not_be_there(tmp_path, without):
+    """A model knows its joints: hidden hair, a stage of animation alone and a level of detail whose last joints move nothing are
+    baked like the whole.
+    """
+    plain = small_shot(tmp_path / "plain.usda")
+    model = model_for(read_rigged_hair(plain))
+    stage = Usd.Stage.Open(str(small_shot(tmp_path / "shot.usda")))
+    mesh = stage.GetPrimAtPath("/Who/Hair")
+    if without == "hidden":
+        UsdGeom.Imageable(mesh).MakeInvisible()
+    elif without == "inactive":
+        mesh.SetActive(False)
+    else:
+        UsdSkel.BindingAPI(mesh).GetJointIndicesPrimvar().Set([2] * 3 + [3] * 6)
+    stage.Save()
+    baked = [
+        bake_rig(tmp_path / f"{name}.usda", tmp_path / f"{name}_out.usda", model).path for name in ("plain", "shot")
+    ]
+    np.testing.assert_array_equal(*(hair_turns(path, range(1, 26)) for path in baked))
+
+
+def test_what_the_body_is_at_no_time_stays(tmp_path):
+    """Values at the default time beside samples are what a viewer shows that asks for no time."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    stage = Usd.Stage.Open(str(shot))
+    rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+    rotations.Set([Gf.Quatf(0.8, 0, 0.6, 0)] * 6)
+    stage.Save()
+    baked = Usd.Stage.Open(str(bake_rig(shot, tmp_path / "out.usda", model).path))
+    found = UsdSkel.Animation(baked.GetPrimAtPath("/Who/Rig/NeuralocksHair")).GetRotationsAttr()
+    assert list(found.Get()) == list(rotations.Get()) and found.GetTimeSamples() == rotations.GetTimeSamples()
 
 
 @pytest.mark.parametrize("prefix", ["Anna_hair_", "tuft_"])
