@@ -22,6 +22,7 @@ TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 LIMBS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
 BY_HAND = "given by hand"
+_SPINE = ("spine", "chest", "torso", "waist", "abdomen")
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
@@ -194,6 +195,10 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
         if trunk:
             put("neck", meeting, f"where the ways from head and arms meet, '{leaf(names[meeting])}'")
             put("upper_chest", trunk[0], f"below the neck '{leaf(names[meeting])}'")
+    spine = [joint for joint in head_way[1:] if any(word in keys[joint] for word in _SPINE)]
+    if arms and spine and (meeting is None or meeting in head_way[head_way.index(spine[-1]) + 1 :]):
+        # Arms that hang from the root, as in exports of deforming bones alone, or from another copy of the trunk.
+        put("upper_chest", spine[0], f"nearest the head, '{leaf(names[spine[0]])}', since the arms hang from elsewhere")
     if arms:
         put("upper_chest", meeting, "where the ways from head and arms meet")
     if legs:

@@ -5,6 +5,8 @@ Evaluated here rather than by a UsdSkelSkeletonQuery, which exists only below a 
 test holds the two together.
 """
 
+from functools import cached_property
+
 import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 
@@ -67,14 +69,21 @@ class JointSource:
         self._animation = UsdSkel.Animation(self.animation) if self.animation else None
         self._columns = self._animated_joints()
 
-    @property
+    @cached_property
     def samples(self) -> list[float]:
-        """Ascending time codes with an authored sample: the animation's and the moving parents'."""
-        times = set(self.placement.samples)
+        """Ascending time codes with an authored sample: the animation's and the moving parents'. Keys of what stays as it is are
+        no motion: where they begin before it, the character would stand there, and hair would start with a blow.
+        """
+        channels = [(self.placement.samples, self.placement.at)]
         if self._columns is not None:
-            for attribute in self._channels() + (self._animation.GetBlendShapeWeightsAttr(),):
-                times.update(attribute.GetTimeSamples())
-        return sorted(times)
+            every = self._channels() + (self._animation.GetBlendShapeWeightsAttr(),)
+            channels += [(attribute.GetTimeSamples(), attribute.Get) for attribute in every]
+        moving, still = set(), set()
+        for times, at in channels:
+            moves = any(not np.array_equal(at(times[0]), at(time)) for time in times[1:])
+            (moving if moves else still).update(times)
+        last = max(moving, default=-np.inf)
+        return sorted(moving | {time for time in still if time > last})
 
     @property
     def animated(self) -> bool:
