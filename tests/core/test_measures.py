@@ -147,3 +147,10 @@ def test_a_network_reads_no_more_than_it_learned():
     assert np.array_equal(read(*large)[:4], HIGHEST[:4].astype(np.float32))
     small = _ball(centre - [0, 0.1, 0], 0.03, HEAD), trunk
     assert np.array_equal(read(*small)[:4], LOWEST[:4].astype(np.float32))
+
+
+def test_what_is_not_known_is_the_middle_of_what_was_learned():
+    """At a corner of it hair of a head without skin moved otherwise than on any trained body."""
+    bounded = np.isfinite(LOWEST)
+    low, high = LOWEST[bounded], HIGHEST[bounded]
+    assert (np.abs(AVERAGE[bounded] - (low + high) / 2) < 0.05 * (high - low)).all()

@@ -99,7 +99,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
         return []
     hidden, loose = _unused_meshes(bare[0].source.prim.GetStage())
     return [
-        f"{rig.path}: moves no visible mesh, so hair is kept out of no body; "
+        f"{rig.path}: moves no visible mesh, so hair is kept out of no body and moves as an average head's; "
         f"{_meant(hidden.get(rig.path, []), loose, rig) or 'bind its mesh to it'}"
         for rig in bare
     ]

@@ -57,6 +57,11 @@ RIGS = {
         "pelvis\n spine_01\n  spine_03\n   clavicle_l\n    upperarm_l\n   clavicle_r\n    upperarm_r\n   neck_01\n    head",
         {"head": "head", "neck": "neck_01", "upper_chest": "spine_03", "left_shoulder": "clavicle_l"},
     ),
+    "deforming bones alone, arms below the root": (
+        "root\n pelvis\n  spine_01\n   spine_02\n    spine_03\n     neck_01\n      head\n clavicle_l\n  upperarm_l\n clavicle_r\n"
+        "  upperarm_r",
+        {"head": "head", "neck": "neck_01", "upper_chest": "spine_03", "left_upper_arm": "upperarm_l"},
+    ),
     "Mixamo": (
         "mixamorig:Hips\n mixamorig:Spine2\n  mixamorig:Neck\n   mixamorig:Head\n    mixamorig:HeadTop_End\n"
         "  mixamorig:LeftShoulder\n   mixamorig:LeftArm\n  mixamorig:RightShoulder\n   mixamorig:RightArm",

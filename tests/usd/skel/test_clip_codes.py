@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdSkel
+from pxr import Gf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.runtime import StrandModel
 from usd.shot.stage import read_shot
@@ -41,6 +41,36 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
     np.testing.assert_array_equal(same, plain)
     np.testing.assert_allclose(standing.time_codes[[0, -1]], [1 - 0.1 * rate, 9])
     assert np.abs(other - plain).max() > 0.1
+
+
+def test_keys_of_what_stands_still_are_no_motion(tmp_path):
+    """A parent or scales with the same value at all their keys, of which some lie before the motion and between its samples:
+    the character would stand, and start with a blow. Later ones hold it, as without them.
+    """
+    path = write_shot(tmp_path, Recipe(frames=9))
+
+    def read():
+        rig = read_shot(path).rigs[0]
+        times = rig.border.seconds([1, 3, 5, 9, 12])
+        return rig, StrandModel.load().sampler(rig.character, rig.clip).vectors(times)
+
+    plain, wanted = read()
+    stage = Usd.Stage.Open(str(path))
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    scales, turn = animation.GetScalesAttr(), UsdGeom.Xformable(stage.GetDefaultPrim()).AddTranslateOp(opSuffix="keyed")
+    bind = scales.Get(1.0)
+    scales.Clear()
+    for code in (-20, -4, 2.5, 6.5):
+        scales.Set(bind, code)
+    for code in (-50, 3.5):
+        turn.Set((0, 0, 0), code)
+    stage.Save()
+    keyed, vectors = read()
+    np.testing.assert_array_equal(keyed.time_codes, plain.time_codes)
+    np.testing.assert_allclose(vectors, wanted, atol=1e-5)
+    scales.Set(bind, 30)
+    stage.Save()
+    assert read()[0].time_codes[-1] == 30
 
 
 def stepped(folder, samples, step=13.0, end=40):
