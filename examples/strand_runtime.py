@@ -106,10 +106,19 @@ class Runtime:
         return (self.fixed["rest"] + moved) @ to_world[:3, :3].T + to_world[:3, 3]
 
 
-def limited(vectors: np.ndarray, longest: float) -> np.ndarray:
-    """Vectors (n, 3), those beyond a length cut to it."""
+def limited(vectors: np.ndarray, longest) -> np.ndarray:
+    """Vectors (n, 3), those beyond a length, or one each (n, 1), cut to it."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors * np.minimum(1, longest / np.maximum(length, 1e-9))
+
+
+def softened(times: np.ndarray, places: np.ndarray, dt: float = 1 / 30) -> np.ndarray:
+    """A path (T, 3) whose velocity changes at a sample by no more than 6 g would change it in the time to the next, or in dt."""
+    spans = np.diff(times)
+    velocity = np.diff(places, axis=0) / spans[:, None]
+    longest = 6 * 9.81 * np.maximum((spans[1:] + spans[:-1]) / 2, dt)[:, None]
+    velocity[1:] = velocity[0] + np.cumsum(limited(np.diff(velocity, axis=0), longest), axis=0)
+    return np.concatenate([places[:1], places[0] + np.cumsum(velocity * spans[:, None], axis=0)])
 
 
 def turned(transforms: np.ndarray) -> np.ndarray:
@@ -136,7 +145,7 @@ class Motion:
         rotations = Rotation.from_matrix(turned(world).reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
         for last, q in zip(rotations, rotations[1:]):
             q *= np.where((last * q).sum(-1, keepdims=True) < 0, -1, 1)
-        self._curve = CubicSpline(self._times, world[:, 0, :3, 3], bc_type="natural")
+        self._curve = CubicSpline(self._times, softened(self._times, world[:, 0, :3, 3]), bc_type="natural")
         self._turn = CubicSpline(self._times, rotations, bc_type="natural")
 
     def drawn(self, code: float) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 
 from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import SEMANTIC
+from neuralocks_core.blows import softened
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import MEASURES, measures_read
@@ -163,9 +164,16 @@ class BoundarySampler:
         parts = clip.parts if spec.bins else [clip]
         self._cuts = np.array([part.start for part in parts[1:]])
         self._stepped = [Stepped.of(part, self.joints) for part in parts]
-        self._tracks = [Track(character, each.clip, self.joints) for each in self._stepped]
+        felt = [self._felt(each.clip) for each in self._stepped]
+        self._tracks = [Track(character, each, self.joints) for each in felt]
         self._bin_weights = spec.bin_weights
         self._shape_cache: dict[bytes, np.ndarray] = {}
+
+    def _felt(self, clip: Clip) -> Clip:
+        """A part of the clip with as much of its blows as is passed on."""
+        if self.spec.linear != "gravity":
+            return clip
+        return softened(clip, self.character, self.GRAVITY_LIMIT, self.spec.dt)
 
     def vectors(
         self, times, material=(0.0,) * MATERIALS, strength: float = 1.0, joints: np.ndarray | None = None

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
+from neuralocks_core.blows import softened
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -173,6 +174,25 @@ def test_a_teleport_is_bounded():
     values = history(BoundarySampler(SPEC, person(), clip).vectors(np.arange(60) / 30))
     assert np.isfinite(values).all()
     assert np.linalg.norm(values[..., :3], axis=-1).max() <= BoundarySampler.GRAVITY_LIMIT + 1e-5
+
+
+@pytest.mark.parametrize("rate", [24, 30, 60, 144])
+def test_a_sudden_start_is_felt_alike_in_all_frames_after_it(rate):
+    """At 4 m/s from one frame to the next: limited step by step alone, twice as much was passed on in each second frame of 60 a
+    second, in which two steps shared the blow.
+    """
+    times = np.arange(0, 2, 1 / rate)
+    path = moved(times, lambda t: np.stack([4.0 * np.maximum(t - 0.5, 0), 0 * t, 0 * t], -1))
+    sampler = BoundarySampler(SPEC, person(), path)
+    blow = history(sampler.vectors(times[(times > 0.7) & (times < 1.3)])).sum(axis=1)[:, 0] * SPEC.dt
+    assert np.ptp(blow) < 0.15 * np.abs(blow).mean(), blow
+    assert np.abs(blow).mean() == pytest.approx(6 * max(1 / rate, SPEC.dt), rel=0.1)
+
+
+def test_a_path_without_blows_is_read_as_it_is():
+    times = np.arange(0, 2, 1 / 60)
+    path = moved(times, lambda t: np.stack([0.3 * np.sin(12 * t), 0.2 * np.sin(9 * t), 0 * t], -1))
+    assert softened(path, person(), 6.0, SPEC.dt) is path
 
 
 def test_unknown_description_asks_for_an_update():

@@ -47,6 +47,11 @@ _CLIP = (
     f"step, which are less than {STEP:g} frames apart and more than {ALONE:g} times as far from the samples around them; no frame less than "
     f"{STEP:g} frames before a step is a sample"
 )
+_BLOWS = (
+    " The places that the spline goes through are those of the samples, but where the velocity from sample to sample, (p_i+1 - p_i) / "
+    "(t_i+1 - t_i), changes at a sample by a vector longer than 6 * 9.81 max((t_i+1 - t_i-1) / 2, dt): it changes by one so long, "
+    "and the path goes on from there as it would. A loop stays as it is."
+)
 _SPACES = "(3, 3) without scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
 
 STRAND_INPUT = {
@@ -134,8 +139,8 @@ def _history(spec: BoundarySpec) -> str:
         "hair that a joint below it carries: of `canonical_to_head`'s origin) and t_k = t - k dt: "
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
-        "natural cubic spline through them, of the place and of the quaternion's components; `pose` and `gravity` are of the "
-        "pose that is drawn. Of animation on twos to fours, in which poses are held for two to four samples each, the "
+        "natural cubic spline through them, of the place and of the quaternion's components, signs continuous; `pose` and `gravity` are of the "
+        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} Of animation on twos to fours, in which poses are held for two to four samples each, the "
         "samples that repeat a pose are left out, and at their times t is that of the pose's first. Before the first sample "
         "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still"
     )
