@@ -4,7 +4,8 @@
 FOLDER is what `neuralocks export -o FOLDER --shot SHOT` wrote, BAKED what `neuralocks bake SHOT -o BAKED --no-resolve`
 did, with `--material NAME=VALUE` where that is given here (bend, weight, damping or clumping). Nothing of Neuralocks is
 imported: this is a worked example of `description.json` for whoever writes the same in an engine, and prints how far its
-strands lie from the bake's. The stage must be in metres, Y up. The network's strands have 24 vertices, even in arc length.
+strands lie from the bake's. The stage must be in metres, Y up, its animation on ones, without cuts and without blend shapes that
+change. The network's strands have 24 vertices, even in arc length.
 Where the groom's are otherwise, the bake lays them along the network's with their own lengths, which this example does not:
 there the median tells whether the runtime is right, and tips differ by millimetres, as on the shipped shot.
 """
@@ -136,8 +137,8 @@ def joints_of(facts: dict) -> list[str]:
 class Motion:
     """Joints' world transforms at any time, as a bake reads them from a stage; an engine has its own way."""
 
-    def __init__(self, stage: Usd.Stage, joints: list[str]):
-        self._prim = next(p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton))
+    def __init__(self, stage: Usd.Stage, skeleton: str, joints: list[str], origin: np.ndarray):
+        self._prim = stage.GetPrimAtPath(skeleton)
         self._query = UsdSkel.Cache().GetSkelQuery(UsdSkel.Skeleton(self._prim))
         self._pick = [list(self._query.GetJointOrder()).index(joint) for joint in joints]
         codes = clip_codes(stage, self._query.GetAnimQuery().GetJointTransformTimeSamples())
@@ -145,7 +146,7 @@ class Motion:
         rotations = Rotation.from_matrix(turned(world).reshape(-1, 3, 3)).as_quat().reshape(len(codes), -1, 4)
         for last, q in zip(rotations, rotations[1:]):
             q *= np.where((last * q).sum(-1, keepdims=True) < 0, -1, 1)
-        self._curve = CubicSpline(self._times, softened(self._times, world[:, 0, :3, 3]), bc_type="natural")
+        self._curve = CubicSpline(self._times, softened(self._times, world[:, 0, :3] @ origin), bc_type="natural")
         self._turn = CubicSpline(self._times, rotations, bc_type="natural")
 
     def drawn(self, code: float) -> np.ndarray:
@@ -155,7 +156,7 @@ class Motion:
         return (local @ np.array(place.GetLocalToWorldTransform(self._prim))).transpose(0, 2, 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 3) of the first joint and rotations (T, n, 3, 3) of all; straight on before the clip, still after it."""
+        """Places (T, 3) of the hair's origin on the first joint and rotations (T, n, 3, 3) of all; straight on before the clip, still after it."""
         inside = np.clip(times, *self._times[[0, -1]])
         places = self._curve(inside) + np.minimum(times - inside, 0)[:, None] * self._curve(inside, 1)
         turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()
@@ -197,11 +198,16 @@ def evenly(points: np.ndarray, at: list[np.ndarray]) -> np.ndarray:
 
 def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float]) -> np.ndarray:
     """How far this runtime's strands lie from a bake's in the same material, at each vertex in each sample [m]."""
-    files = json.loads((folder / "description.json").read_text("utf-8"))["grooms"]["files"]
+    described = json.loads((folder / "description.json").read_text("utf-8"))
+    if "grooms" not in described:
+        sys.exit(f"{folder}: holds no groom; let neuralocks export write it with --shot SHOT")
+    files = described["grooms"]["files"]
     stage, result, found = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), []
     for name, facts in files.items():
         at, curves = shares(curves_at(stage, facts["prim"])), curves_at(result, facts["prim"])
-        runtime, motion = Runtime(folder, name, material), Motion(stage, joints_of(facts))
+        runtime = Runtime(folder, name, material)
+        origin = [*runtime.fixed["canonical_to_head"][:3, 3] / runtime.fixed["size"], 1]
+        motion = Motion(stage, facts["skeleton"], joints_of(facts), np.array(origin))
         boundary = runtime.model["boundary"]
         for code in curves.GetPointsAttr().GetTimeSamples():
             now = code / stage.GetTimeCodesPerSecond()

@@ -6,7 +6,7 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySpec
 from neuralocks_core.errors import about
-from neuralocks_core.materials import Material
+from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES
 from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
@@ -81,7 +81,9 @@ RIG_INPUT = {
 """How the features of a rig model are made, but for the history (`_history`), and what becomes of its answer."""
 
 SLIDERS = {
-    "bend, weight, damping": "change `material` in the boundary vectors and in `held`; then, once, where the model is anchored, "
+    "bend, weight, damping": "bend is what bakes and Blender call stiffness. "
+    + ", ".join(f"{name} goes from {low:g} to {high:g}" for name, (low, high) in RANGES.items())
+    + ", motion strength from 0 to 4. They change `material` in the boundary vectors and in `held`; then, once, where the model is anchored, "
     "`anchor` anew: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
     "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
@@ -89,6 +91,11 @@ SLIDERS = {
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that it has with D: its rest length, unless the model\'s `output` is "displacement"',
+    "a game": "the clip is what has been so far: keep the samples of the last (steps + 2) dt seconds, each put in when the animation "
+    "has been updated, with the time of that pose, and ask for the newest one's time: of frames drawn between two updates each "
+    "would be a stop. Put in no pose that is not finite. Keep times in double. Clear it at a cut",
+    "blend shapes": "roots and `shape` here are those of the clip's first sample. Where the animation changes blend shapes, a bake "
+    "moves roots with the skin below them, and measures `shape` anew in each frame",
     "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
     "goes on in a straight line and does not turn. A bake finds cuts, or is told them (`--cuts`)",
     "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
@@ -141,7 +148,8 @@ def _history(spec: BoundarySpec) -> str:
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
         "natural cubic spline through them, of the place and of the quaternion's components, signs continuous; `pose` and `gravity` are of the "
         f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} Of animation on twos to fours, in which poses are held for two to four samples each, the "
-        "samples that repeat a pose are left out, and at their times t is that of the pose's first. Before the first sample "
+        "samples that repeat a pose are left out, and at their times t is that of the pose's first; one that shows for longer than "
+        "1/6 s is a stop, whose samples stay (a bake looks at four poses in a row, which this only nears). Before the first sample "
         "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still"
     )
 

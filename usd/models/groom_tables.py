@@ -57,7 +57,7 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
         grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
-        File name -> {"prim", "strands", "joints": {"head": joint path, "upper chest": joint path, "pose": joint paths}}.
+        File name -> {"prim", "skeleton": prim path, "strands", "joints": {"head": joint path, "upper chest": joint path, "pose": joint paths}}.
 
     Raises:
         NeuralocksError: what stops a bake of the shot.
@@ -68,7 +68,8 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
     for name, item in zip(names, read.grooms, strict=True):
         arrays, joints = tables(item, runner)
         np.savez(put(name), **arrays)
-        written[name] = {"prim": item.path, "strands": len(arrays["rest"]), "joints": joints}
+        rig = item.attachment.rig.path
+        written[name] = {"prim": item.path, "skeleton": rig, "strands": len(arrays["rest"]), "joints": joints}
     return written
 
 
