@@ -21,7 +21,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
     Args:
         model: path of a `.neuralocks` file.
-        folder: made if it does not exist; files of the same names are replaced.
+        folder: made if it does not exist; files of an earlier export are replaced.
         shot: a USD file; of each of its grooms, what no frame changes (`groom_tables`) is written, too.
         grooms, skeleton, head, joints: as for `bake`.
 
@@ -29,8 +29,8 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         The files written, `description.json` among them.
 
     Raises:
-        NeuralocksError: the model cannot be read, the folder not be written, or a `description.json` of somebody else is
-            in it.
+        NeuralocksError: the model cannot be read, the folder not be written, or a file of somebody else has the name of
+            one that is to be written.
     """
     file = model_file.read(model)
     folder = as_path(folder, "folder")
@@ -40,11 +40,13 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         )
     if not _ours(folder / DESCRIPTION):
         raise NeuralocksError(f"{folder / DESCRIPTION}: is of something else; move it, or choose another folder")
-    description = described(file)
+    description, again = described(file), (folder / DESCRIPTION).exists()
     tables = {}
     with ExitStack() as all_or_none:
 
         def put(name: str) -> Path:
+            if not again and (folder / name).exists():
+                raise NeuralocksError(f"{folder / name}: is of something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
         if shot is not None:

@@ -45,6 +45,19 @@ def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, 
     assert len(written) == 2 and list(tmp_path.iterdir()) == [shot]
 
 
+def test_a_graph_of_something_else_is_not_written_over(tmp_path, capsys):
+    """An earlier export is."""
+    (tmp_path / "tail.onnx").write_text("mine")
+    assert status("export", "-o", tmp_path) == 1
+    assert "tail.onnx: is of something else" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["tail.onnx"] and (
+        tmp_path / "tail.onnx"
+    ).read_text() == "mine"
+    (tmp_path / "tail.onnx").unlink()
+    for _ in range(2):
+        assert status("export", "-o", tmp_path) == 0
+
+
 def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
     for text in ('{"units": 1}', "notes"):
         (tmp_path / "description.json").write_text(text)
