@@ -45,7 +45,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     with ExitStack() as all_or_none:
 
         def put(name: str) -> Path:
-            if not again and (folder / name).exists():
+            if not again and (folder / name).is_file():
                 raise NeuralocksError(f"{folder / name}: is of something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
