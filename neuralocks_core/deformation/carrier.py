@@ -92,7 +92,7 @@ class Carrier:
 
     def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
         # The inverse of a rotation: rows times R are columns times its transpose. All rows at once: a product of each
-        # strand's few takes ten times as long.
+        # strand's few takes twice as long.
         return (vectors.reshape(-1, 3) @ self._facing).reshape(vectors.shape)
 
     def carry(
