@@ -156,7 +156,7 @@ class Motion:
         return (local @ np.array(place.GetLocalToWorldTransform(self._prim))).transpose(0, 2, 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 3) of the hair's origin on the first joint and rotations (T, n, 3, 3) of all; straight on before the clip, still after it."""
+        """Places (T, 3) of the hair's origin and rotations (T, n, 3, 3) of the joints; straight on before the clip, still after."""
         inside = np.clip(times, *self._times[[0, -1]])
         places = self._curve(inside) + np.minimum(times - inside, 0)[:, None] * self._curve(inside, 1)
         turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sudden starts and stops of a character, limited where they happen: at a sample of its clip."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from neuralocks_core.character import Character
@@ -33,4 +35,4 @@ def softened(clip: Clip, character: Character, most: float, step: float) -> Clip
     path = place[0] + np.cumsum(velocity * spans[:, None], axis=0)
     joints = clip.joints.copy()
     joints[1:, :, :3, 3] += (path - place[1:])[:, None]
-    return Clip(clip.times, joints, clip.shape)
+    return replace(clip, joints=joints)

@@ -140,7 +140,7 @@ def weighed(mesh_object) -> Iterator[None]:
 
 
 def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
-    """They are read again only when a few of them, or the groups, have changed."""
+    """Put the weights of a mesh into the session, step by step; only where a few of them, or the groups, are others than there."""
     some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
     probe = len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
     name, edits, rows = mesh.name_full, session.edits, []

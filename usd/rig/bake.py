@@ -145,13 +145,12 @@ def _read(shot, skeleton, head, model: RigModel, cuts, joints) -> tuple[RiggedHa
     hair = read_rigged_hair(
         shot, skeleton=skeleton, head=head, joints=joints, cuts=cuts, unbaked=True, model=model.chains
     )
-    character = hair.source.character
-    names, below = character.skeleton.names, character.skeleton.below(character.head)
-    model = replace(model, chains=model.chains.named_as(names, below))
-    moved = model.chains.match(names, below)
-    size = model.chains.check_same(hair.rig.chains)
+    here = hair.rig.chains
+    if here.names != model.chains.names:
+        model = replace(model, chains=replace(model.chains, names=here.names))
+    size = model.chains.check_same(here)
     check_cuts(cuts, [hair.source])
-    return hair, model, moved, size
+    return hair, model, here.joints, size
 
 
 def _held(hair: RiggedHair, carriers: np.ndarray, turns: np.ndarray) -> list[str]:

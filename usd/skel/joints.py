@@ -80,7 +80,8 @@ class JointSource:
             channels += [(attribute.GetTimeSamples(), attribute.Get) for attribute in every]
         moving, still = set(), set()
         for times, at in channels:
-            moves = any(not np.array_equal(at(times[0]), at(time)) for time in times[1:])
+            first = at(times[0]) if times else None
+            moves = any(not np.array_equal(first, at(time)) for time in times[1:])
             (moving if moves else still).update(times)
         last = max(moving, default=-np.inf)
         return sorted(moving | {time for time in still if time > last})

@@ -100,16 +100,20 @@ def bones_without_their_mesh(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
 
+    def pose() -> np.ndarray:
+        bpy.context.scene.frame_set(11)
+        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+
     def live() -> np.ndarray:
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
         rig.neuralocks_character.rig_live = True
-        bpy.context.scene.frame_set(11)
+        found = pose()
         assert not messages(), messages()
-        found = np.array([np.array(bone.matrix) for bone in rig.pose.bones])
         rig.neuralocks_character.rig_live = False
         return found
 
-    whole = live()
+    still, whole = pose(), live()
+    assert apart(whole, still) > 1e-3
     skin.hide_render = True
     assert apart(live(), whole) < SAME
     bpy.data.objects.remove(skin)
