@@ -51,6 +51,28 @@ def test_the_hairs_mesh_need_not_be_there(tmp_path, without):
     np.testing.assert_array_equal(*(hair_turns(path, range(1, 26)) for path in baked))
 
 
+def test_a_joint_that_hangs_from_another_one_is_not_the_models(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    shot.write_text(shot.read_text().replace("hair_0/hair_1/hair_2", "hair_0/hair_2"))
+    with pytest.raises(NeuralocksError, match="joint 'hair_2' hangs from another joint here"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+
+
+def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path):
+    """Both would be two samples, of which no program can tell the times apart."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot))
+    stage = Usd.Stage.Open(str(shot))
+    rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+    values = {code + 3e-8: rotations.Get(code) for code in rotations.GetTimeSamples()}
+    rotations.Clear()
+    for code, value in values.items():
+        rotations.Set(value, code)
+    stage.Save()
+    assert bake_rig(shot, tmp_path / "out.usda", model).samples == len(values)
+
+
 def test_what_the_body_is_at_no_time_stays(tmp_path):
     """Values at the default time beside samples are what a viewer shows that asks for no time."""
     shot = small_shot(tmp_path / "shot.usda")
