@@ -17,8 +17,10 @@ def layer_of(armature, scene):
     evaluated before others; None where it moves in none.
     """
     seen = bpy.context.view_layer if bpy.context.scene == scene else None
-    ordered = sorted(scene.view_layers, key=lambda layer: (layer != seen, layer.depsgraph is None))
-    return next((layer for layer in ordered if _moves(armature, scene, layer, "VIEWPORT")), None)
+    if seen is not None and _moves(armature, scene, seen, "VIEWPORT"):
+        return seen
+    others = sorted(scene.view_layers, key=lambda layer: layer.depsgraph is None)
+    return next((layer for layer in others if layer != seen and _moves(armature, scene, layer, "VIEWPORT")), None)
 
 
 def elsewhere(armature, scene, graph) -> bool:

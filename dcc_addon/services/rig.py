@@ -109,7 +109,11 @@ def joint_weights(body: BodyArrays, bones: tuple[str, ...]) -> tuple[np.ndarray,
         joint, weight = joint_of_group[group], body.weights[:, 2]
         kept = (joint >= 0) & (weight > 0)
         vertex, joint, weight = vertex[kept], joint[kept], weight[kept]
-        order = np.lexsort((joint, -weight, vertex))
+        # The strongest first, of equal ones the first joint. Rows come nearly in the order of the vertices, which a sort by one
+        # number makes use of: `np.lexsort` by all three takes six times as long.
+        order = np.argsort(vertex * len(bones) + joint, kind="stable")
+        vertex, joint, weight = vertex[order], joint[order], weight[order]
+        order = np.argsort(2 * weight.max(initial=0) * vertex - weight, kind="stable")
         vertex, joint, weight = vertex[order], joint[order], weight[order]
         rank = np.arange(len(vertex)) - np.searchsorted(vertex, vertex)
         strong = rank < INFLUENCES
