@@ -11,10 +11,14 @@ class NeuralocksError(ValueError):
     """
 
 
+class CannotWrite(NeuralocksError):
+    """The file system refuses, a full disk say: nothing is wrong with the input, and what is finished is worth keeping."""
+
+
 @contextmanager
 def about(subject):
     """Errors of what is done meanwhile begin with the subject: the path of the file that is read, say."""
     try:
         yield
     except NeuralocksError as error:
-        raise NeuralocksError(f"{subject}: {error}") from None
+        raise type(error)(f"{subject}: {error}") from None

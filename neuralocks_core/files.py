@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError
 
 
 @contextmanager
@@ -21,8 +21,8 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     the way to `path` are made. Enter it before long work, to learn in time that a folder cannot be written.
 
     Raises:
-        NeuralocksError: it is a folder's name, or for every OSError in the block; nothing is left of it, and what was under
-            `path` stays.
+        NeuralocksError: it is a folder's name, or (CannotWrite) for every OSError in the block; nothing is left of it, and what
+            was under `path` stays.
     """
     path = Path(path)
     if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it leads to
@@ -45,7 +45,7 @@ def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Write arrays at once under the final name; what is killed over it leaves `<stem>.<process>.tmp` beside it.
 
     Raises:
-        NeuralocksError: the file system refuses.
+        CannotWrite: the file system refuses.
     """
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
     try:
@@ -88,11 +88,11 @@ def as_path(given, name: str) -> Path:
         raise NeuralocksError(f"{name}: {given!r} is no path; give text or a pathlib.Path") from None
 
 
-def cannot_write(path: str | os.PathLike, error: OSError) -> NeuralocksError:
+def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:
     """The one line for a file system that refuses."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return NeuralocksError(f"{path}: no space left on the disk; free some, or choose another folder")
+        return CannotWrite(f"{path}: no space left on the disk; free some, or choose another folder")
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
-        return NeuralocksError(f"{path}: there is a file, not a folder, on the way; choose another folder")
+        return CannotWrite(f"{path}: there is a file, not a folder, on the way; choose another folder")
     fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
-    return NeuralocksError(f"{path}: cannot be written ({fact}); choose a folder you can write to")
+    return CannotWrite(f"{path}: cannot be written ({fact}); choose a folder you can write to")

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from pxr import Sdf
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import named, names_damage
@@ -75,8 +75,8 @@ def write_samples(
         Frames taken over from an interrupted bake of the same inputs, counted for each groom.
 
     Raises:
-        NeuralocksError: the file cannot be written. Nothing is left then, neither under its name nor beside it; only a
-            stop by the user, or too little space to go on, leaves the finished frames, to go on from.
+        NeuralocksError: it cannot be made. Nothing is left then, neither under its name nor beside it; only a stop by the user, or
+            a disk that is full (CannotWrite), leaves the finished frames, to go on from.
     """
     check_not_input(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
@@ -86,7 +86,7 @@ def write_samples(
     try:
         return _write(shot, codes, batched, poser, spool, facts, velocities, progress or silent)
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) or stopped():
+        if isinstance(error, KeyboardInterrupt | CannotWrite) or stopped():
             spool.close()
         else:
             spool.discard()
@@ -241,8 +241,7 @@ def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bo
         kept = min(waiting, len(codes)) if len(items) == 1 else len(codes)
         size += 1.03 * frame * ((1 + velocities) * len(codes) + kept)
     if size - left > (free := shutil.disk_usage(spool.folder).free):
-        spool.close()
-        raise NeuralocksError(
+        raise CannotWrite(
             f"{spool.out}: needs {math.ceil((size - left) / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "
             "free some, bake fewer frames or choose another folder"
         )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pxr import Tf
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError
 
 
 def names_damage(function):
@@ -41,7 +41,7 @@ def named(out: Path) -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException as error:
-        raise NeuralocksError(
+        raise CannotWrite(
             f"{out}: cannot be written ({first_line(error)}); check the folder and the space on its disk"
         ) from None
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .command import counted, note, noting_when_stopped, print_json
+from .command import counted, note, noting_when_cut_short, print_json
 from .options import (
     AsJson,
     Cuts,
@@ -56,7 +56,7 @@ def bake_command(
     from ..baking.bake import bake
     from .progress import progress_bar
 
-    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("baking") as progress:
+    with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("baking") as progress:
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
@@ -113,7 +113,7 @@ def simulate_command(
     from ..baking.simulate import simulate
     from .progress import progress_bar
 
-    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("simulating") as progress:
+    with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("simulating") as progress:
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,

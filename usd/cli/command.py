@@ -13,7 +13,7 @@ from pathlib import Path
 
 import typer
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError
 from neuralocks_core.json_values import plain
 
 from ..border.stopping import deferred, stoppable, stopped
@@ -112,12 +112,12 @@ def note(notes) -> None:
 
 
 @contextmanager
-def noting_when_stopped(notes: Callable[[], list[str]]) -> Iterator[None]:
-    """In this block, Ctrl-C also prints what a user should know of the work that is left."""
+def noting_when_cut_short(notes: Callable[[], list[str]]) -> Iterator[None]:
+    """In this block, Ctrl-C or a full disk also prints what a user should know of the work that is left."""
     try:
         yield
-    except BaseException:
-        if stopped():
+    except BaseException as error:
+        if stopped() or isinstance(error, CannotWrite):
             note(notes())
         raise
 

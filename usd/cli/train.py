@@ -8,7 +8,7 @@ import typer
 
 from neuralocks_core.errors import NeuralocksError
 
-from .command import note, noting_when_stopped
+from .command import note, noting_when_cut_short
 from .options import Head, Joints, Out, Seed, Skeleton, pairs
 
 SEVERAL = ("--groom", "--motion")
@@ -81,7 +81,7 @@ def train_command(
     from .progress import progress_bar
 
     settings = {"minutes": minutes, "steps": steps, "static": static, "device": device, "seed": seed}
-    with noting_when_stopped(lambda: _how_to_go_on(out)), progress_bar("training") as progress:
+    with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, rollouts=rollouts, processes=processes,

@@ -17,8 +17,10 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.baking.spool import kept
+from usd.cli.app import main
 from usd.shot.stage import read_shot
 
+from ...full_disk import room_for
 from ..shots import Recipe, samples, write_shot
 
 ROOT = Path(__file__).parents[3]
@@ -174,6 +176,25 @@ def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
     assert process.returncode == 130 and not out.exists(), "the bake was over before it could be stopped"
     done = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
     assert said.endswith(f"note: the same command goes on from here, with {done} frames done\nstopped\n")
+
+
+@pytest.mark.parametrize("save_every", [1, 1 << 30])
+def test_a_disk_that_fills_up_leaves_finished_frames_to_go_on_from(tmp_path, model, monkeypatch, capsys, save_every):
+    shot, out = write_shot(tmp_path, Recipe(strands=500)), tmp_path / "bake.usdc"
+    words = ["bake", str(shot), "-o", str(out), "--model", str(model)]
+    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", save_every)
+    whole = bake(shot, out, model).path.read_bytes()
+    out.unlink()
+    with pytest.raises(SystemExit) as ended, room_for(len(whole) // 2):
+        main(words)
+    assert ended.value.code == 1 and not out.exists()
+    *_, note, error = capsys.readouterr().err.splitlines()
+    done = kept(out)
+    assert note == f"note: the same command goes on from here, with {done} frames done" and done >= 3
+    assert error.startswith(f"error: {out}: ") and "space" in error
+    assert bake(shot, out, model).resumed >= done - 1
+    assert out.read_bytes() == whole
+    assert [path.name for path in tmp_path.iterdir()] == ["shot.usda", "bake.usdc"]
 
 
 def test_frames_of_other_inputs_are_not_taken_over(tmp_path, model, still_model):
