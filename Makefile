@@ -1,6 +1,7 @@
 # make demo   see moving hair: installs the runtime without torch, bakes the shipped shot, makes a picture and a clip
 # make test   installs everything that the tests need, and runs the linter and all tests
 # make addon  builds the Blender extension into dist/
+# make lowest runs the tests of what needs no torch with the oldest packages that pyproject.toml allows
 # PYTHON=/path/to/python3.11 chooses another interpreter (3.11 or newer).
 
 PYTHON ?= python3
@@ -13,7 +14,7 @@ INSTALL = $(BIN)/python $(PIP_INSTALL)
 # One thread a process: the tests run in two processes, and small matrices only get slower with more.
 ONE_THREAD = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: demo test lint tests blender addon bench clean
+.PHONY: demo test lint tests lowest blender addon bench clean
 
 demo: $(VENV)/installed-demo
 	$(BIN)/neuralocks demo -o $(OUT)
@@ -26,6 +27,17 @@ lint: $(VENV)/installed-test
 
 tests: $(VENV)/installed-test blender
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -q
+
+# "name>=1.2,<2" is "name==1.2" at the least. Old packages warn of newer ones below them, and tidy up
+# less well.
+FLOORS = $(shell $(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+    print(*(n.split(",")[0].replace(">=", "==") for n in p["dependencies"] + p["optional-dependencies"]["preview"]))')
+lowest: $(VENV)/installed-test
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/python $(PIP_INSTALL) $(FLOORS) pytest pytest-timeout pytest-xdist hypothesis rtree trimesh hatchling onnx
+	$(ONE_THREAD) .venv-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning \
+	    -W ignore::pytest.PytestUnraisableExceptionWarning \
+	    --ignore tests/core/physics --ignore tests/core/training --ignore tests/blender
 
 addon: $(VENV)/installed-test
 	$(BIN)/python dcc_addon/build.py

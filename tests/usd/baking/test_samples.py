@@ -166,7 +166,7 @@ def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_pat
 
 
 def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
-    shot, out = write_shot(tmp_path, Recipe(frames=40, strands=2000, vertices=16)), tmp_path / "bake.usdc"
+    shot, out = write_shot(tmp_path, Recipe(frames=300, strands=2000, vertices=16)), tmp_path / "bake.usdc"
     command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while len(list(tmp_path.glob(".bake.usdc.baking/*.frame"))) < 3 and process.poll() is None:
