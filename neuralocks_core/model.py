@@ -12,6 +12,7 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.shortcomings import shortcomings
 
 FORMAT = 1
 KINDS = {
@@ -46,14 +47,7 @@ class ModelFile:
 
     def shortcomings(self) -> list[str]:
         """What its own report says against using it, as notes for a user."""
-        held_out = self.meta["report"].get("held out")
-        error = held_out.get("motion") if isinstance(held_out, dict) else None
-        if not isinstance(error, int | float) or error <= 1:
-            return []
-        fact = (
-            f"its motion error on motion and strands that it never saw is {error:.2f}, where hair carried rigidly has 1"
-        )
-        return [f"{self.path}: {fact}; train longer, or with other options"]
+        return shortcomings(self.path, self.kind, self.meta["report"])
 
 
 @cache

@@ -55,11 +55,12 @@ def installing() -> str:
 
 def environment() -> dict[str, str]:
     """This process's environment without what belongs to Blender's own Python; the packages lying beside the add-on can
-    be found.
+    be found. Numpy shares no small matrices among threads, which would wait for each other beside Blender's.
     """
     import neuralocks_core
 
     kept = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")} | {"PYTHONUTF8": "1"}
+    kept.setdefault("OPENBLAS_NUM_THREADS", "1")
     root = Path(neuralocks_core.__file__).resolve().parent.parent
     # A source checkout serves the child too. A site-packages folder does not: its compiled packages are for Blender's
     # Python.

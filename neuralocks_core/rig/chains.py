@@ -71,6 +71,10 @@ class HairChains:
             raise NeuralocksError("hair chains: a joint comes before its parent; get an undamaged model")
         if bones < 1 or not 0 <= self.bone_joint.min() <= self.bone_joint.max() < count or self.bone_end.max() >= count:
             raise NeuralocksError("hair chains: a bone names a joint that is not there; get an undamaged model")
+        led = self.parents >= 0
+        known = (self.chain >= 0) & (self.chain < count - led.sum())
+        if not known.all() or (self.chain[led] != self.chain[self.parents[led]]).any():
+            raise NeuralocksError("hair chains: a joint is of another chain than its parent; get an undamaged model")
         if not all(np.isfinite(getattr(self, name)).all() for name in ("origins", "axes", "bones")):
             raise NeuralocksError("hair chains: NaN or infinity in the bind pose; repair the skeleton")
 

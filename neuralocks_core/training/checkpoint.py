@@ -61,12 +61,14 @@ def load(
     modules: dict[str, torch.nn.Module],
     optimisers: Sequence[torch.optim.Optimizer] = (),
     settings: dict | None = None,
+    like: dict | None = None,
 ) -> dict:
     """Fill modules (and optimisers) from a checkpoint; returns its JSON values.
 
     Args:
         path, modules, optimisers: as for `save`.
         settings: must be what was saved as the JSON value of this name.
+        like: what else must be among the JSON values, of the same kinds; numbers not negative.
 
     Raises:
         NeuralocksError: it is damaged, or belongs to other settings.
@@ -80,6 +82,8 @@ def load(
             raise _Unfit("damaged")
         if other := [name for name, value in (settings or {}).items() if had.get(name) != value]:
             raise _Unfit(f"it has other settings in {', '.join(other)}")
+        if not all(name in meta and _alike(meta[name], value) for name, value in (like or {}).items()):
+            raise _Unfit("damaged")
         if odd := _not_finite(arrays):
             raise _Unfit(f"NaN or infinity in {odd}")
         tensors = {name: torch.from_numpy(value) for name, value in arrays.items() if name != "meta"}
@@ -95,6 +99,13 @@ def load(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None
     return meta
+
+
+def _alike(value, like) -> bool:
+    """Whether a JSON value is of the kind of another; a number not negative, and whole where that is."""
+    if type(like) not in (int, float):
+        return type(value) is type(like)
+    return type(value) in {int, type(like)} and 0 <= value < float("inf")
 
 
 def _fill(optimiser: torch.optim.Optimizer, tensors: dict[str, torch.Tensor]) -> None:

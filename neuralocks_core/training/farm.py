@@ -9,6 +9,7 @@ import signal
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -39,7 +40,7 @@ class RolloutFarm:
 
     def __enter__(self) -> RolloutFarm:
         try:
-            with _one_thread_each(), _deaf_to_interrupts():
+            with _one_thread_each(), _without_interrupts():
                 for process in self._processes:
                     process.start()
         except BaseException:  # one that cannot start leaves none of the others at work
@@ -95,17 +96,28 @@ def _one_thread_each() -> Iterator[None]:
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """What is started meanwhile leaves Ctrl-C, which a terminal sends to all, to the trainer, and tells no traceback."""
+def _without_interrupts() -> Iterator[None]:
+    """Ctrl-C, which a terminal sends to all, comes at the end of this block; what is started in it never hears of it, and tells
+    no traceback.
+    """
+    came = []
     try:
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        before = signal.signal(signal.SIGINT, lambda *_: came.append(True))
     except ValueError:  # not the main thread, which alone has a say in this
         yield
         return
+    held = None
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
+        resource_tracker.ensure_running()  # when the first process starts it, it lets signals through
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a handler is not inherited, this is
     try:
         yield
     finally:
+        if held is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
         signal.signal(signal.SIGINT, before)
+    if came:
+        signal.raise_signal(signal.SIGINT)
 
 
 def save(path: Path, rollout: Rollout) -> None:
@@ -145,7 +157,7 @@ def _path(folder: Path, index: int) -> Path:
 
 
 def _work(scene: TrainingScene, folder: Path, indices: range, tell: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not inherited, as on Windows
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is only held back until now, on Windows not even that
     parent = multiprocessing.parent_process()
     try:
         maker = RolloutMaker(scene)

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
@@ -30,6 +29,7 @@ from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.option_checks import changed, check_options
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
 from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.threads import threads
 from neuralocks_core.training.work import (
     CODES,
     beginning_of,
@@ -120,7 +120,7 @@ def _trained(
     count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
     processes = processes if count else 0
     with (
-        _threads_beside(processes),
+        threads(max(1, torch.get_num_threads() - processes)),  # a core is left to each process that makes rollouts
         RolloutFarm(scene, work / "rollouts", count, processes) as farm,
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
@@ -182,8 +182,8 @@ class _Run:
         settings, now = json.loads(json.dumps([settings, asdict(self._options, dict_factory=_plain)]))
         self.meta = {"settings": settings, "options": now, "changed": [], "step": 0, "seconds": 0.0, "curve": []}
         if resume:
-            kept = checkpoint.load(saved, {"net": self.net}, self._optimisers, settings)
-            since = [*kept.get("changed", []), *changed(kept.get("options", {}), now)]
+            kept = checkpoint.load(saved, {"net": self.net}, self._optimisers, settings, self.meta)
+            since = [*map(str, kept["changed"]), *changed(kept["options"], now)]
             self.meta = {**kept, "options": now, "changed": since}
 
     def train(self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]) -> Gauge:
@@ -253,17 +253,6 @@ class _Reporter:
     def __call__(self, done: float, message: str) -> None:
         if self._progress:
             self._progress(int(1000 * done), 1000, message)
-
-
-@contextmanager
-def _threads_beside(processes: int) -> Iterator[None]:
-    """Leave a core to each process that makes rollouts."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(max(1, before - processes))
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:

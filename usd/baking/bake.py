@@ -112,6 +112,7 @@ def bake(
     notes = [
         *known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins),
         *_unheard(strand_model, look),
+        *strand_model.file.shortcomings(),
     ]
     if tell:
         tell(notes)
@@ -164,7 +165,8 @@ def described(shot: Shot) -> list[dict]:
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:
     """The note on constants that are not as in the one material that a model was trained with."""
-    varied = model.meta["training"].get("options", {}).get("random_materials", True)
+    options = model.meta["training"].get("options")
+    varied = options.get("random_materials", True) if isinstance(options, dict) else True
     plain = replace(material, clumping=Material.clumping)  # whose effect no network learns
     if varied or plain == Material():
         return []

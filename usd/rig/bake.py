@@ -17,6 +17,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import RigModel
+from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
@@ -106,7 +107,11 @@ def bake_rig(
     codes = _with_samples(hair, moved, wanted)
     clip = replace(hair.source.clip, loop=True) if loop else hair.source.clip
     carried = CarriedHair(model, moved, hair.source.character, clip)
-    notes = [*_renamed(trained, model.chains), *_resized(source.path, size)]
+    notes = [
+        *shortcomings("model", "rig", model.report),
+        *_renamed(trained, model.chains),
+        *_resized(source.path, size),
+    ]
     notes += _known(hair, moved, wanted, model, loop, cuts is None)
     if strength != 1 and not model.dynamic:
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")

@@ -10,6 +10,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
 from neuralocks_core.progress import Progress
+from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.extras import check_training
@@ -49,7 +50,8 @@ def train_rig(
         chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
         early: write the model before its report is measured, too, which takes minutes: who stops that has the model.
-        tell: called with notes for the user before the training, whose minutes some of them would save.
+        tell: called with notes for the user before the training, whose minutes some of them would save, and with what the
+            report says against the model at last.
         progress: called with (done, total, message).
 
     Returns:
@@ -98,6 +100,8 @@ def train_rig(
             tell([f"{out}: is written, without the report that was being measured"])
         raise
     write(model)
+    if tell:
+        tell(shortcomings(out, "rig", model.report))
     return model
 
 

@@ -25,6 +25,7 @@ from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
+from neuralocks_core.training.threads import threads
 
 _VELOCITY = 20.0
 """Of squared errors of the motion from one sample to the next, against squared errors of places."""
@@ -47,6 +48,7 @@ _ROOM, _HELD_ROOM = 0.006, 0.012
 mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
 
 
+@threads(1)
 def train_dynamic(
     rig: HairRig,
     material: RigMaterial = RigMaterial(),

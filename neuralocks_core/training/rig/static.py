@@ -20,6 +20,7 @@ from neuralocks_core.training.muon import muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
+from neuralocks_core.training.threads import threads
 
 _POOL = 512
 """Poses to draw from."""
@@ -33,6 +34,7 @@ _LEARNING = 700
 """Thousandths of the work that are learning, as by default; the rest is the report."""
 
 
+@threads(1)
 def train_static(
     rig: HairRig,
     material: RigMaterial = RigMaterial(),

@@ -9,6 +9,7 @@ import pytest
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
+from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.graph import rig_graph
 from tests.core.rig.builders import model_of, random_features, random_model
 
@@ -62,3 +63,20 @@ def test_model_file_round_trip(tmp_path):
         RigModel.load(path)
     with pytest.raises(NeuralocksError, match="numbers per avatar"):
         model.evaluate(np.zeros(7))
+
+
+@pytest.mark.parametrize(
+    ("forged", "said"),
+    [
+        ({"chain": [99] * 16}, "another chain than its parent"),
+        ({"chain": [-1] * 16}, "another chain than its parent"),
+        ({"chain": [0, 1, *[0] * 14]}, "another chain than its parent"),
+        ({"parents": [3] * 16}, "comes before its parent"),
+        ({"bone_joint": [40] * 16}, "names a joint that is not there"),
+    ],
+)
+def test_forged_chains_are_refused_in_one_line(forged, said):
+    values = random_model().chains.to_json()
+    assert len(HairChains.from_json(values)) == 16
+    with pytest.raises(NeuralocksError, match=said):
+        HairChains.from_json(values | forged)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checkpoints: NaN is never kept, and whatever a damaged one holds is one line."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,25 @@ def test_a_damaged_checkpoint_is_one_line(tmp_path, changes):
     with pytest.raises(NeuralocksError, match=r"c.npz: this checkpoint does not fit \(") as caught:
         checkpoint.load(path, {"net": net}, optimisers, {"a": 1})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"step": "x"}, {"step": 1.5}, {"step": True}, {"step": -1}, {"seconds": None}, {"seconds": "inf"},
+              {"seconds": float("inf")}, {"changed": 5}, {"curve": {}}, {"options": [1]}, {"more": 1}]
+)  # fmt: skip
+def test_values_of_another_kind_than_were_kept_are_one_line(tmp_path, wrong):
+    net, optimisers = learning()
+    path, kept = tmp_path / "c.npz", {"step": 3, "seconds": 2, "changed": ["a"], "curve": [[1]], "options": {"a": 1}}
+    like = {"step": 0, "seconds": 0.0, "changed": [], "curve": [], "options": {}}
+    checkpoint.save(path, kept, {"net": net}, optimisers)
+    assert checkpoint.load(path, {"net": net}, optimisers, like=like) == kept
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    like |= {name: 0 for name in wrong if name not in like}  # what is not there at all
+    changed = {name: wrong.get(name, value) for name, value in kept.items()}
+    np.savez(path, **{**arrays, "meta": np.frombuffer(json.dumps(changed).encode(), np.uint8)})
+    with pytest.raises(NeuralocksError, match=r"c.npz: this checkpoint does not fit \(damaged"):
+        checkpoint.load(path, {"net": net}, optimisers, like=like)
 
 
 def test_what_is_not_finite_does_not_take_the_place_of_what_is(tmp_path):

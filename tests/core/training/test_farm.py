@@ -94,7 +94,7 @@ class _Scene:
     """Stands in for one that the solver refuses; it knows whether Ctrl-C was heard where it arrived."""
 
     def __init__(self):
-        self.deaf = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+        self.deaf = sys.platform != "win32" and signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
     def __getattr__(self, name):
         raise NeuralocksError(f"warp: is not installed; install it (deaf: {self.deaf})")
@@ -115,6 +115,28 @@ def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path
         said = f"warp: is not installed; install it (deaf: {deaf}), and try again"
         assert str(workers.failure("try again")) == said
     assert capfd.readouterr().err == ""
+
+
+def test_ctrl_c_while_processes_start_is_heard_once_they_run(tmp_path, monkeypatch):
+    """To make them takes seconds, in which a terminal's Ctrl-C was lost."""
+    started = []
+
+    class Process:
+        pid = None
+
+        def __init__(self, **_):
+            pass
+
+        def start(self):
+            signal.raise_signal(signal.SIGINT)
+            started.append(self)
+
+    monkeypatch.setattr(farm.multiprocessing.get_context("spawn"), "Process", Process)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), farm.RolloutFarm(_Scene(), tmp_path, 2, processes=2):
+        raise AssertionError("it was not heard")
+    assert len(started) == 2 and signal.getsignal(signal.SIGINT) is before
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 @pytest.mark.parametrize(

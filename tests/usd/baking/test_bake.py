@@ -155,7 +155,13 @@ def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
         return bake(shot, tmp_path / "b.usdc", which, frames=[2], **options).notes
 
     assert any("weight and damping change nothing" in note for note in notes(one, material={"damping": 20}))
-    for which, options in ((one, {}), (one, {"material": {"clumping": 60}}), (still_model, {"material": "weight=2"})):
+    forged = model_file.write(tmp_path / "forged.neuralocks", known.meta | {"training": {"options": 3}}, known.graphs)
+    for which, options in (
+        (forged, {"material": {"damping": 20}}),
+        (one, {}),
+        (one, {"material": {"clumping": 60}}),
+        (still_model, {"material": "weight=2"}),
+    ):
         assert not any("change nothing" in note for note in notes(which, **options))
 
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a model's own report says against using it. A report comes out of a file, and may hold anything."""
+
+from collections.abc import Mapping
+
+
+def shortcomings(subject, kind: str, report: Mapping) -> list[str]:
+    """Notes for a user on a model that learned too little to be worth using; mostly none.
+
+    Args:
+        subject: what the notes begin with, the model's path say.
+        kind: `strands` or `rig`.
+        report: of the model, as training left it.
+    """
+    facts = _of_strands(report) if kind == "strands" else _of_a_rig(report)
+    return [f"{subject}: {fact}; train longer, or with other options" for fact in facts]
+
+
+def _of_strands(report: Mapping) -> list[str]:
+    error = _number(report, "held out", "motion")
+    if error is None or error <= 1:
+        return []
+    return [
+        f"its motion error on motion and strands that it never saw is {error:.2f}, where hair carried rigidly has 1"
+    ]
+
+
+def _of_a_rig(report: Mapping) -> list[str]:
+    facts = []
+    errors = report.get("motion_error")
+    of_springs = [_number(errors, name) for name in errors if "spring" in str(name)] if isinstance(errors, dict) else []
+    error, springs = _number(errors, "dynamic network"), min((e for e in of_springs if e is not None), default=1.0)
+    if error is not None and error >= min(springs, 1.0):
+        facts.append(
+            f"its motion error on motion that it never saw is {error:.2f}, where spring bones have {springs:.2f} and hair "
+            "carried rigidly 1"
+        )
+    off, rigid = (_number(report, "tip_error_mm", name) for name in ("network", "rigid"))
+    if off is not None and rigid is not None and off >= rigid > 0:
+        facts.append(
+            f"in held poses the hair's tips are {off:.0f} mm from where they would hang, where hair carried rigidly is "
+            f"{rigid:.0f} mm off"
+        )
+    return facts
+
+
+def _number(values, *names: str) -> float | None:
+    """The number under names in dicts, each in the one before; None where there is none."""
+    for name in names:
+        values = values.get(name) if isinstance(values, Mapping) else None
+    return values if isinstance(values, int | float) and not isinstance(values, bool) else None
