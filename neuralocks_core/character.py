@@ -259,7 +259,8 @@ class Character:
             return np.array([0.0, 0.08, 0.02])
         points = (self.body.points[self.head_skin] - self.canonical_to_bind[:3, 3]) @ self.facing.T
         low, high = points.min(axis=0), points.max(axis=0)
-        # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured over the ears.
+        # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured over the ears, and
+        # where an elf's stand higher, is no more than its depth.
         skull = points[points[:, 1] > high[1] / 2]
-        width = np.ptp(skull[:, 0]) if high[1] > 0 and len(skull) else high[0] - low[0]
+        width = np.ptp(skull[:, [0, 2]], axis=0).min() if high[1] > 0 and len(skull) else high[0] - low[0]
         return np.array([(low[0] + high[0]) / 2, high[1] - 0.65 * width, (low[2] + high[2]) / 2])

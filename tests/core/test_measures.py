@@ -76,6 +76,16 @@ def test_what_is_worn_is_no_part_of_head_or_back(skin, worn):
     assert body_measures(bare)[:2] == pytest.approx([0.1, 0.2], abs=0.005)
 
 
+def test_an_elfs_ears_do_not_lower_the_middle_of_its_head():
+    """They are skin, and stand above half of its height: hair was grown on the shoulders."""
+    points, faces, joints = _skin()
+    ear = (np.abs(points[:, 0]) > 0.07) & (points[:, 1] > 1.68)
+    elf = points + np.where(ear, np.sign(points[:, 0]) * 0.2, 0)[:, None] * [1, 0, 0]
+    before, after = (_dressed((p, faces, joints)) for p in (points, elf))
+    assert ear.sum() > 4 and after.head_width - before.head_width > 0.35
+    assert np.abs(after.head_centre - before.head_centre).max() < 0.015
+
+
 @pytest.mark.parametrize("worn", WORN)
 def test_where_skin_cannot_be_told_every_mesh_counts(worn):
     """A head that hangs together with nothing may be a hat as well."""

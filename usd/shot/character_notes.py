@@ -57,8 +57,8 @@ def untrained(rig: StageRig) -> list[str]:
         return []
     each = [f"its {MEASURES[i]} is {measures[i]:.3g} m (trained: {LOWEST[i]:g} to {HIGHEST[i]:g})" for i in far]
     return [
-        f"{rig.path}: {', '.join(each)}; a network draws its hair as if that were the nearest trained; if it shows, train a "
-        "model on this character; if a hat or the like is one piece with its skin, part them"
+        f"{rig.path}: {', '.join(each)}; the shipped model, and any that was not trained on this character, draws its hair as if "
+        "that were the nearest trained; if it shows, train one on it; if a hat or the like is one piece with its skin, part them"
     ]
 
 
