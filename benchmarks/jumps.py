@@ -37,9 +37,9 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", nargs="?")
-    parser.add_argument("--style", action="append")
+    parser.add_argument("--style", action="extend", nargs="+")
     parser.add_argument(
-        "--motion", action="append", default=[], help="BVH or USD clips in place of poses and scripted ones"
+        "--motion", action="extend", nargs="+", default=[], help="BVH or USD clips in place of poses and scripted ones"
     )
     parser.add_argument("--strands", type=int, default=300, help="of each style")
     arguments = parser.parse_args()

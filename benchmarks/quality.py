@@ -132,13 +132,19 @@ def main() -> None:
     parser.add_argument("--model", help="the shipped one if left out")
     parser.add_argument("--static", help="a model trained without history, with the same budget")
     parser.add_argument("--character", default=CHARACTER, help="examples/shot/body.usdc if left out")
-    parser.add_argument("--style", action="append")
+    parser.add_argument("--style", action="extend", nargs="+")
     parser.add_argument(
-        "--kind", action="append", choices=(*KINDS, *WILD, *FOREIGN), help="all but spin, tumble and bang if left out"
+        "--kind",
+        action="extend",
+        nargs="+",
+        choices=(*KINDS, *WILD, *FOREIGN),
+        help="all but spin, tumble and bang if left out",
     )
-    parser.add_argument("--motion", action="append", default=[], help="BVH or USD clips in place of the scripted ones")
+    parser.add_argument(
+        "--motion", action="extend", nargs="+", default=[], help="BVH or USD clips in place of the scripted ones"
+    )
     parser.add_argument("--seconds", type=float, default=8.0, help="of each file")
-    parser.add_argument("--groom", action="append", default=[], help="hair files in place of grown hair")
+    parser.add_argument("--groom", action="extend", nargs="+", default=[], help="hair files in place of grown hair")
     parser.add_argument("--shape", type=int, help="number of a random body shape")
     parser.add_argument("--floor", action="store_true", help="also what forgetting costs the solver")
     parser.add_argument("--json", action="store_true")

@@ -220,7 +220,10 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     train_minutes: FloatProperty(
         name="Minutes",
-        description="How long a training may take; it begins with what the shipped model has learned, so five minutes are worth it",
+        description=(
+            "About how long a training takes. Strands begin with what the shipped model has learned, so five minutes are "
+            "worth it; hair bones begin with nothing, and take four at least, six of which are enough"
+        ),
         default=15.0,
         min=0.05,
         max=720.0,

@@ -8,6 +8,9 @@ import json
 import os
 import sys
 
+LEARNED, AROUND = 30.0, 220.0
+"""Seconds that the bones' network learns at least, and that the simulations before and the report after it take."""
+
 
 def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
@@ -71,10 +74,11 @@ def _train_rig(settings: dict, say) -> None:
     from usd.rig.train import train_rig
 
     say(0, 1, "Reading the character")
+    seconds = 60 * settings["minutes"]
     train_rig(
         settings["character"],
         settings["out"],
-        seconds=60 * settings["minutes"],
+        seconds=max(min(seconds, LEARNED), seconds - AROUND),
         chains=settings.get("chains") or None,
         head=settings.get("head"),
         tell=_tell,

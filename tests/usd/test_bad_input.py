@@ -171,7 +171,24 @@ def test_a_hair_file_in_place_of_a_stage_is_told_to_be_imported(tmp_path, model,
 def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called(tmp_path):
     Usd.Stage.CreateNew(str(tmp_path / "groom.usda")).Save()
     stops = inspect(tmp_path / "groom.usda")["stops"]
-    assert "no UsdSkel skeleton" in stops[0] and "no BasisCurves prim" in stops[1]
+    assert "no UsdSkel skeleton; export the character" in stops[0] and "no BasisCurves prim" in stops[1]
+
+
+def test_a_groom_alone_is_told_to_be_put_on_its_character(tmp_path, model):
+    """As `neuralocks import` writes it; and where it misses a layer, that is the cause."""
+    shot = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    stage.RemovePrim(RIG)
+    stage.Save()
+    for missing, remedy in (
+        (None, "if it holds hair alone, sublayer or reference it"),
+        ("lost.usda", "bring along what"),
+    ):
+        if missing:
+            Sdf.Layer.FindOrOpen(str(shot)).subLayerPaths.append(missing)
+        with pytest.raises(NeuralocksError, match=f"no UsdSkel skeleton; .*{remedy}") as caught:
+            bake(shot, tmp_path / "out.usdc", model)
+        assert str(caught.value).removeprefix(f"{tmp_path}/") in inspect(shot)["stops"]
 
 
 def test_where_a_character_stands_that_cannot_be_used_stops_nothing_more(tmp_path):

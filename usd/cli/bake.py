@@ -100,7 +100,7 @@ def simulate_command(
     subframes: Subframes = 1,
     material: Materials = None,
     strands: Annotated[
-        int | None, typer.Option(help="Simulate at most so many strands; the others follow them.")
+        int | None, typer.Option(help="Simulate at most so many strands, 2000 if left out; the others follow them.")
     ] = None,
     loop: Loop = False,
     cuts: Cuts = None,

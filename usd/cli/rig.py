@@ -37,9 +37,13 @@ def train(
     ] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
     clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
-    bend: Annotated[float | None, typer.Option(help="Stiffness over line density, in m^4/s^2.")] = None,
-    weight: Annotated[float | None, typer.Option(help="Times gravity.")] = None,
-    damping: Annotated[float | None, typer.Option(help="Of motion in the head's frame [1/s]. Dynamic only.")] = None,
+    bend: Annotated[
+        float | None, typer.Option(help="Stiffness over line density, in m^4/s^2; 0.01 if left out.")
+    ] = None,
+    weight: Annotated[float | None, typer.Option(help="Times gravity; 1 if left out.")] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="Of motion in the head's frame [1/s], 6 if left out. Dynamic only.")
+    ] = None,
     seed: Seed = 0,
     chains: Chains = None,
     head: Head = None,

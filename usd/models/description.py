@@ -4,12 +4,13 @@
 import numpy as np
 
 from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.errors import about
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES
 from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
+from neuralocks_core.stepped import LONGEST
 
 from ..border.units import FASTEST, SLOWEST
 from ..skel.clip_codes import ALONE, CLOSE, SAME, STAND, STEP
@@ -31,9 +32,11 @@ GRAPHS = {
 }
 
 _STEPS = {
-    "f_k": "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer than 6",
-    "v_k": "v_k = T(R_head(t_k)) (p(t_k) - p(t_k+1)) / dt, no longer than 25",
-    "s_k": "s_k = T(R_head(t_k)) r / dt with r the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than 25",
+    "f_k": "a_k = (p(t_k) - 2 p(t_k+1) + p(t_k+2)) / dt^2; f_k = T(R_head(t_k)) (g - a_k) / 9.81 - gravity, no longer "
+    f"than {BoundarySampler.GRAVITY_LIMIT:g}",
+    "v_k": f"v_k = T(R_head(t_k)) (p(t_k) - p(t_k+1)) / dt, no longer than {BoundarySampler.SPEED_LIMIT:g}",
+    "s_k": "s_k = T(R_head(t_k)) r / dt with r the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than "
+    f"{BoundarySampler.SPIN_LIMIT:g}",
     "c_k": "c_k the same of the upper chest, in the head's axes too",
 }
 """What a step of the history may be made of."""
@@ -49,7 +52,8 @@ _CLIP = (
 )
 _BLOWS = (
     " The places that the spline goes through are those of the samples, but where the velocity from sample to sample, (p_i+1 - p_i) / "
-    "(t_i+1 - t_i), changes at a sample by a vector longer than 6 * 9.81 max((t_i+1 - t_i-1) / 2, dt): it changes by one so long, "
+    "(t_i+1 - t_i), changes at a sample by a vector longer than "
+    f"{BoundarySampler.GRAVITY_LIMIT:g} * 9.81 max((t_i+1 - t_i-1) / 2, dt): it changes by one so long, "
     "and the path goes on from there as it would. A loop stays as it is."
 )
 _SPACES = "(3, 3) without scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
@@ -149,7 +153,7 @@ def _history(spec: BoundarySpec) -> str:
         "natural cubic spline through them, of the place and of the quaternion's components, signs continuous; `pose` and `gravity` are of the "
         f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} Of animation on twos to fours, in which poses are held for two to four samples each, the "
         "samples that repeat a pose are left out, and at their times t is that of the pose's first; one that shows for longer than "
-        "1/6 s is a stop, whose samples stay (a bake looks at four poses in a row, which this only nears). Before the first sample "
+        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row, which this only nears). Before the first sample "
         "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still"
     )
 

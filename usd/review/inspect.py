@@ -30,7 +30,7 @@ from ..shot.curve_ends import groom_between, undrawn
 from ..shot.curves import find_curves, rest_counts
 from ..shot.gaps import gaps
 from ..shot.hair_search import HairSearch
-from ..shot.lacking import no_groom
+from ..shot.lacking import no_groom, no_skeleton
 from ..shot.made_from import baked_from_others
 from ..shot.motion_notes import motion_notes
 from ..shot.notes import (
@@ -95,9 +95,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     if rigs:
         spoils += [left_out(error) for error in errors]
     else:
-        stops += [str(error) for error in errors] or [
-            f"{path.name}: holds no UsdSkel skeleton; export the character with its armature"
-        ]
+        stops += [str(error) for error in errors] or [str(no_skeleton(stage, Path(path.name)))]
     curves = find_curves(stage)
     told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils, bool(curves))} for rig in rigs]

@@ -26,6 +26,16 @@ def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
     return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
 
 
+def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
+    """The error for a stage without a Skeleton: hair alone, or a character exported without its armature."""
+    remedy = "export the character with its armature"
+    if any(prim.IsA(UsdGeom.BasisCurves) for prim in stage.Traverse()):
+        remedy = (
+            "if it holds hair alone, sublayer or reference it in the shot of its character, on the head; else " + remedy
+        )
+    return nothing_found(stage, path, "UsdSkel skeleton", remedy)
+
+
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
     """The error for a stage that lacks what a bake needs; where layers are missing, it names those as the likely cause."""
     missing = composition_notes(stage, path)

@@ -22,7 +22,7 @@ from .character_notes import lies_down, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
 from .hair_search import HairSearch
-from .lacking import no_groom, nothing_found
+from .lacking import no_groom, no_skeleton
 from .notes import (
     composition_notes,
     groom_notes,
@@ -229,7 +229,7 @@ def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tup
         if not prims:
             raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
     if not prims:
-        raise nothing_found(stage, path, "UsdSkel skeleton", "export the character with its armature")
+        raise no_skeleton(stage, path)
     rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)
     if errors and (not rigs or skeleton):
         raise errors[0]
