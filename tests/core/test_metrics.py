@@ -112,6 +112,13 @@ def test_what_stops_at_once_has_settled_at_its_last_moving_sample():
     assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
 
 
+def test_what_creeps_on_slower_than_still_has_settled():
+    """Even where that is more than a tenth of a slow motion."""
+    points = np.zeros((len(TIMES), 1, 24, 3))
+    points[:, 0, :, 0] = np.where(TIMES < 0.5, 0.05 * TIMES, 0.025 + 0.008 * (TIMES - 0.5))[:, None]
+    assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
+
+
 def test_echo_of_a_decaying_swing():
     """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; nothing that stands echoes."""
     points, _ = swinging(amplitude=0.2, frequency=4, decay=3)

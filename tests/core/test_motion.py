@@ -29,6 +29,11 @@ def test_a_loop_goes_on():
     assert np.allclose(clip.at([0.4]), clip.at([-1.6]))
 
 
+def test_a_loop_that_walks_on_ends_with_its_last_sample():
+    clip = moved([0.0, 1.0, 2.0], lambda t: np.stack([t, 0 * t, 0 * t], axis=-1), loop=True)
+    assert np.array_equal(clip.at([clip.end])[0], clip.joints[-1])
+
+
 def test_a_joint_that_grows_is_half_grown_halfway():
     clip = moved([0.0, 1.0], head_turn=lambda t: rotation.from_vector(np.outer(t, [0, 1.0, 0])))
     grown = clip.joints.copy()

@@ -292,3 +292,10 @@ def test_a_giant_is_measured_at_its_size():
     points = np.float32([[0, 64 * 0.103, 0], [64 * 0.098, 0, 0]])
     rough = resolver.rough_distance(points, resolver.character.skeleton.bind, np.zeros(0))
     np.testing.assert_allclose(rough, resolver.at_rest.distance(points)[0], atol=64e-3)
+
+
+@pytest.mark.parametrize("size", [1, 10, 64])
+def test_what_hardly_moves_on_a_person_stands_still_on_a_giant(size):
+    """Half a millimetre of a person."""
+    resolver = pushed(size, 0.005)[1]
+    assert not len(resolver._near.head.moving)

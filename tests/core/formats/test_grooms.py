@@ -35,6 +35,11 @@ def test_points_counts_unit_and_axis(folder, name):
     assert groom.name == Path(name).stem
 
 
+def test_hair_files_are_z_up_where_nothing_else_is_said(folder):
+    groom = formats.read(put(folder, "a.hair", FILES["a.hair"]), unit="m")
+    np.testing.assert_allclose(groom.points, POINTS[:, [0, 2, 1]] * [1, 1, -1], rtol=1e-6)
+
+
 def test_what_else_the_files_hold(folder):
     text = formats.read(put(folder, "text.tfx", FILES["text.tfx"]))
     np.testing.assert_allclose(text.root_uv, [[0.25, 0.0], [0.25, 0.1], [0.25, 0.2]], rtol=1e-6)

@@ -49,6 +49,14 @@ def test_a_hat_carries_its_hair_as_a_head_would(dynamic):
     assert (tips[:, ~hats] == still[:, ~hats]).all()
 
 
+def test_a_hat_that_is_shifted_without_a_turn_carries_its_hair():
+    who, model = rig()
+    motion = clip(who.skeleton, "hat", 0 * NODDING, "hat")
+    hat = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("hat")
+    motion.joints[20:, who.skeleton.below(hat), 1, 3] += 0.05
+    assert CarriedHair(model, model.chains.joints, who, motion).carriers.tolist() == [who.head, hat]
+
+
 @pytest.mark.parametrize("degrees", [0, 0.2])
 def test_a_hat_that_stays_on_the_head_changes_no_bit(degrees):
     """Up to what files round; the head itself nods."""

@@ -207,6 +207,18 @@ def test_a_last_joint_with_skin_moves():
     np.testing.assert_allclose(chains.bones[1], [0, -0.10, 0], atol=1e-12)
 
 
+def test_skin_that_a_last_joint_hardly_moves_does_not_lengthen_its_bone():
+    who = character(tail("hair", 2, step=(0, -0.06, 0)))
+    mesh = skin(who, {"hair_1": [[0, 1.6, -0.1]] * 2 + [[0, 1.3, -0.1]], "hair_2": [[0, 1.44, -0.1]] * 3})
+    share = np.where(np.arange(6) == 2, 0.1, 0.0)[:, None]
+    mesh = replace(
+        mesh,
+        joint_indices=np.hstack([mesh.joint_indices, np.full((6, 1), mesh.joint_indices[-1, 0])]),
+        joint_weights=np.hstack([mesh.joint_weights - share, share]),
+    )
+    np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], [0, -0.10, 0], atol=1e-12)
+
+
 def test_joint_orients_and_facing_cancel():
     """The same rig with turned joints and a turned body has the same chains in canonical space."""
     plain = find_chains(character(tail("hair", 3)))
