@@ -73,6 +73,23 @@ def test_moving_skin_is_found_where_it_is():
     assert np.abs(value - 0.004).max() < 1e-3
 
 
+def test_hair_beside_the_head_is_not_below_the_skin_that_it_is_farther_from():
+    """A collar around the head, which begins 17 mm from there: its plane goes on, and the hair would be pushed out of it."""
+    ring = np.linspace(0, 2 * np.pi, 65)[:-1]
+    rings = np.stack([np.cos(ring), np.sin(ring), 0 * ring], axis=1) * np.linspace(0.118, 0.15, 5)[:, None, None]
+    faces = [
+        [(r * 64 + c, (r + 1) * 64 + c, (r + 1) * 64 + d), (r * 64 + c, (r + 1) * 64 + d, r * 64 + d)]
+        for r in range(4)
+        for c, d in zip(range(64), [*range(1, 64), 0])
+    ]
+    points, count = np.concatenate([HEAD.vertices, rings.reshape(-1, 3)]), len(HEAD.vertices)
+    triangles = np.concatenate([HEAD.faces, np.reshape(faces, (-1, 3)) + count])
+    body = Body(points, triangles, np.zeros((len(points), 1), int), np.ones((len(points), 1)))
+    posed = NearBody(body, np.eye(4), np.arange(len(points)) < count, LOW, HIGH).posed(np.eye(4)[None], None, LOW, HIGH)
+    beside = (rings[0] / 0.118 * 0.101 - [0, 0, 0.003]).astype(np.float32)
+    np.testing.assert_allclose(posed.distance(beside)[0], 0.001, atol=5e-4)
+
+
 def test_what_lies_behind_a_thin_part_is_not_below_its_front():
     # As thick as a shoulder: what is known of its front reaches down to where its back has long been left.
     slab = trimesh.creation.box((0.3, 0.3, 0.02)).subdivide_to_size(0.015)

@@ -47,3 +47,13 @@ def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch, wrap):
     drawn = one if item.beyond is None else one[item.beyond.hair]
     assert 1e-3 < np.abs(drawn - rigid).max() < 0.1
     assert len(one) == item.point_count and np.isfinite(one).all()
+
+
+def test_a_head_that_moves_by_a_tenth_of_a_millimetre_takes_its_hair_along(tmp_path):
+    item = read_shot(write_shot(tmp_path)).grooms[0]
+    placer, rest = placing.GroomPlacer(item), np.zeros((item.groom.strand_count, 24, 3), np.float32)
+    joints = item.attachment.rig.joints_at(1.0)
+    moved = joints.copy()
+    moved[:, 1, 3] += 1e-4
+    here, there = (placer.points(1.0, pose, lambda strands: rest[strands]) for pose in (joints, moved))
+    np.testing.assert_allclose(there - here, [[0, 1e-4, 0]] * len(here), atol=1e-6)

@@ -1,7 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files of a shot's grooms for other runtimes; what they hold is tested with the example that reads them."""
 
-from usd.models.groom_tables import file_names
+import pytest
+
+from neuralocks_core import model as model_file
+from neuralocks_core.runtime import StrandModel
+from usd.models.groom_tables import file_names, tables
+from usd.shot.stage import read_shot
+
+from ..shots import Recipe, write_shot
+
+
+def test_the_size_of_a_head_is_the_same_in_any_unit(tmp_path, model):
+    runner = StrandModel(model_file.read(model, "strands"))
+    for unit in (1.0, 0.01):
+        (groom,) = read_shot(write_shot(tmp_path, Recipe(unit=unit), f"{unit}")).grooms
+        assert tables(groom, runner)[0]["size"] == pytest.approx(1)
 
 
 def test_no_disk_takes_two_grooms_files_for_one():

@@ -57,6 +57,18 @@ def test_whoever_reads_the_copy_is_told_that_it_is_old(folder):
     assert not any("changed since" in note for note in inspect(folder / "hair.usda")["spoils"])
 
 
+def test_a_copy_is_old_as_soon_as_two_degrees_differ(folder):
+    stage = Usd.Stage.Open(str(folder / "shot.usda"))
+    rotations = stage.GetPrimAtPath("/Who/Motion").GetAttribute("rotations")
+    values = list(rotations.Get(9))
+    values[1] = values[1] * Gf.Quatf(Gf.Rotation(Gf.Vec3d(0, 1, 0), 2).GetQuat())
+    rotations.Set(values, 9)
+    stage.Save()
+    assert any(
+        "rig bake of /Who/Motion, which has changed since" in note for note in inspect(folder / "hair.usda")["spoils"]
+    )
+
+
 def test_what_was_copied_is_found_through_references(folder):
     (folder / "set.usda").write_text(
         '#usda 1.0\n(\n  metersPerUnit = 1\n)\ndef "Hero" (references = @./on_hair.usda@</Who>)\n{\n}\n'

@@ -50,6 +50,19 @@ def test_the_body_stays_sample_for_sample(tmp_path):
     assert stage.GetRootLayer().subLayerPaths[0] == "./shot.usda"
 
 
+def test_a_channel_keeps_both_its_samples_and_what_it_shows_at_no_time(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(shot))
+    own = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetTranslationsAttr()
+    still = own.Get()
+    own.Set(Vt.Vec3fArray([still[0] + Gf.Vec3f(0, 1, 0), *still[1:]]), 5)
+    stage.GetRootLayer().Save()
+    bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))
+    result = Usd.Stage.Open(str(tmp_path / "out.usda"))
+    baked = result.GetAttributeAtPath(f"/Who/Rig/{BAKED}.translations")
+    assert baked.Get() == still != baked.Get(5) == own.Get(5)
+
+
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path):
     """As of strands, see test_bake.py."""
     for name in ("show", "layout", "cache"):
@@ -113,6 +126,16 @@ def test_a_loop_is_seamless(tmp_path):
     bake_rig(shot, tmp_path / "open.usda", model)
     first, last = hair_turns(tmp_path / "open.usda", [1, 25])
     assert np.abs(first - last).max() > 1e-3
+
+
+def test_hair_goes_on_in_a_loop_past_the_clip(tmp_path):
+    """The animation is of 24 frames; UsdSkel holds its last pose from there on."""
+    shot = small_shot(tmp_path / "shot.usda")
+    model = model_for(read_rigged_hair(shot), dynamic=True)
+    bake_rig(shot, tmp_path / "out.usda", model, loop=True, frames="1:60")
+    once, again = (hair_turns(tmp_path / "out.usda", codes) for codes in (range(6, 13), range(30, 37)))
+    np.testing.assert_allclose(again, once, atol=1e-5)
+    assert np.ptp(once, axis=0).max() > 0.01
 
 
 def test_hair_starts_anew_after_a_cut(tmp_path):

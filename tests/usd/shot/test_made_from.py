@@ -57,6 +57,18 @@ def test_what_was_published_anew_is_told(tmp_path, model, name, prim, attribute,
     assert not any("bake again" in note for note in inspect(tmp_path / "over.usdc")["spoils"])
 
 
+def test_one_key_that_differs_by_little_makes_another_animation(tmp_path, model):
+    shot, out = write_shot(tmp_path), tmp_path / "hair.usdc"
+    bake(shot, out, model, frames="1:2")
+    stage = Usd.Stage.Open(str(shot))
+    rotations = stage.GetAttributeAtPath("/Hero/Rig/Motion.rotations")
+    values = rotations.Get(5)
+    values[3] = values[3] * Gf.Quatf(1, 0, 1e-4, 0)
+    rotations.Set(values, 5)
+    stage.Save()
+    assert OLD.format("animation") in inspect(out)["spoils"]
+
+
 @pytest.mark.parametrize("recipe", [Recipe(unit=0.01, up="Z"), Recipe(bound="mesh"), Recipe(bound="none", frames=3)])
 def test_a_set_that_shows_a_bake_elsewhere_is_no_other_shot(tmp_path, model, recipe):
     """Placed, turned, seen through a reference or flattened, shifted in time, or counted in another unit."""
