@@ -222,7 +222,7 @@ class SceneSettings(bpy.types.PropertyGroup):
         name="Minutes",
         description=(
             "About how long a training takes. Strands begin with what the shipped model has learned, so five minutes are "
-            "worth it; hair bones begin with nothing, and take four at least, six of which are enough"
+            "worth it; hair bones begin with nothing, and take two at least; four are enough"
         ),
         default=15.0,
         min=0.05,

@@ -8,7 +8,7 @@ import json
 import os
 import sys
 
-LEARNED, AROUND = 30.0, 220.0
+LEARNED, AROUND = 30.0, 100.0
 """Seconds that the bones' network learns at least, and that the simulations before and the report after it take."""
 
 
