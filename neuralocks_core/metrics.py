@@ -79,7 +79,12 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
 
 def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]."""
-    return np.linalg.norm(np.diff(points, axis=0), axis=-1) / np.diff(times)[:, None, None]
+    far = np.empty((len(points) - 1, *points.shape[1:-1]), np.result_type(points, np.float32))
+    for frame, (before, after) in enumerate(
+        zip(points, points[1:])
+    ):  # all differences at once would be as large as all points
+        far[frame] = np.linalg.norm(after - before, axis=-1)
+    return far / np.diff(times)[:, None, None]
 
 
 def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
@@ -195,12 +200,12 @@ def droop(displacement: np.ndarray, down: np.ndarray) -> float:
         displacement: (T, S, K, 3) [m] canonical.
         down: unit vectors of gravity in canonical axes, (T, 3).
     """
-    return 100 * _mean(np.einsum("tsi,ti->ts", np.asarray(displacement, float)[:, :, -1], down))
+    return 100 * _mean(np.einsum("tsi,ti->ts", np.asarray(displacement[:, :, -1], float), down))
 
 
 def tip_curves(displacement: np.ndarray) -> np.ndarray:
     """Mean displacement of the tips (T, 3) [m] in canonical space: the curve that a person compares."""
-    return np.asarray(displacement, float)[:, :, -1].mean(axis=1)
+    return np.asarray(displacement[:, :, -1], float).mean(axis=1)
 
 
 def held(joints_relative: np.ndarray) -> np.ndarray:

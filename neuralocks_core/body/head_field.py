@@ -17,10 +17,15 @@ ROOM = 0.03
 EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
 MOST_NODES = 3_000_000
+SAME = 7
+"""Digits after the point [m] to which a head is told from another, and made."""
 
 
 def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> "HeadField":
-    """The HeadField of these, made once for all grooms of a head and for the bakes that follow."""
+    """The HeadField of these, made once for all grooms of a head, for copies of it that stand otherwise, and for the bakes that
+    follow.
+    """
+    points = np.round(points, SAME)  # a copy that is turned differs by rounding
     digest = hashlib.sha256()
     for array in (points, triangles, still):
         digest.update(np.ascontiguousarray(array).tobytes())

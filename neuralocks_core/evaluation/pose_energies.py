@@ -11,6 +11,9 @@ from neuralocks_core.motion import G
 from neuralocks_core.rotation import unit
 from neuralocks_core.strands.bends import bends
 
+BLOCK = 64
+"""Frames at a time: what is made of each takes twenty times its own memory."""
+
 
 def energies(
     points: np.ndarray, rest: np.ndarray, down: np.ndarray, material: Material | None = None
@@ -30,21 +33,24 @@ def energies(
         strand without twist.
     """
     material = material or Material()
-    points, rest = np.asarray(points, float), np.asarray(rest, float)
+    rest = np.asarray(rest, float)
     length = np.linalg.norm(np.diff(rest, axis=1), axis=2)
     length = np.maximum(length, 1e-9)
     mass = np.zeros(rest.shape[:2])
     mass[:, :-1] += length / 2
     mass[:, 1:] += length / 2
     total = mass.sum()
-    drop = np.einsum("tskc,tc->tsk", points - rest, down)
     between = (length[:, 1:] + length[:, :-1]) / 2
-    change = curvature(points) - curvature(rest[None])
-    bend = 0.5 * material.bend * (np.square(change).sum(axis=-1) / between).sum(axis=(1, 2))
-    return {
-        "gravity": -G * material.weight * (mass * drop).sum(axis=(1, 2)) / total,
-        "bend": bend / total,
-    }
+    at_rest = curvature(rest[None])
+    found = {"gravity": np.zeros(len(points)), "bend": np.zeros(len(points))}
+    for first in range(0, len(points), BLOCK):
+        some = slice(first, first + BLOCK)
+        now = np.asarray(points[some], float)
+        drop = np.einsum("tskc,tc->tsk", now - rest, down[some])
+        found["gravity"][some] = -G * material.weight * (mass * drop).sum(axis=(1, 2)) / total
+        change = curvature(now) - at_rest
+        found["bend"][some] = 0.5 * material.bend * (np.square(change).sum(axis=-1) / between).sum(axis=(1, 2)) / total
+    return found
 
 
 def stretch_energy(lengths: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -99,6 +99,8 @@ def bake(
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
     cuts = given_cuts(cuts, loop)
+    if progress:
+        progress(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}

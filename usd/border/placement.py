@@ -10,6 +10,9 @@ from neuralocks_core.errors import NeuralocksError
 
 from .arrays import column_matrix
 
+KEPT = 64
+"""So many places of a prim are remembered: in a crowd each groom is held against the same few of each character."""
+
 
 class Placement:
     """Local-to-world transforms of one prim in stage space; evaluated once where nothing above it moves."""
@@ -27,16 +30,24 @@ class Placement:
                     break
             walk = walk.GetParent()
         self.samples = sorted(set(self.samples))
+        self._known: dict[float, np.ndarray] = {}
         # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
         self._still = None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
 
     def at(self, time_code: float) -> np.ndarray:
-        """Transform (4, 4) at a time code.
+        """Transform (4, 4) at a time code; not to be written to.
 
         Raises:
             NeuralocksError: it is not finite or flattens space.
         """
-        return self._still if self._still is not None else self._evaluate(Usd.TimeCode(time_code))
+        if self._still is not None:
+            return self._still
+        if time_code not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self._known[time_code] = self._evaluate(Usd.TimeCode(time_code))
+            self._known[time_code].flags.writeable = False
+        return self._known[time_code]
 
     @property
     def reference(self) -> np.ndarray:

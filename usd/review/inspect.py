@@ -36,6 +36,7 @@ from ..shot.motion_notes import motion_notes
 from ..shot.notes import (
     another_head,
     composition_notes,
+    few,
     groom_notes,
     layer_notes,
     left_out,
@@ -93,7 +94,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
     rigs, errors = read_each_rig(stage, find_skeletons(stage), border, head, all_shapes=True, joints=joints)
     if rigs:
-        spoils += [left_out(error) for error in errors]
+        spoils += few([left_out(error) for error in errors], "skeletons are left out")
     else:
         stops += [str(error) for error in errors] or [str(no_skeleton(stage, Path(path.name)))]
     curves = find_curves(stage)

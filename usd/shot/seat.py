@@ -204,12 +204,7 @@ def some_ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = Non
 
 def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
     """The way of a groom that lies right on the head as it is at a time code."""
-    return np.linalg.inv(_carried(rig, when)) @ rig.border.to_core @ placement.at(when)
-
-
-def _carried(rig: StageRig, when: float) -> np.ndarray:
-    """What the head does to bind world [m] at a time code, (4, 4)."""
-    return rig.character.carrying(rig.joints_at(when)) if "head" in rig.character.humanoid else np.eye(4)
+    return np.linalg.inv(rig.carrying_at(when)) @ rig.border.to_core @ placement.at(when)
 
 
 def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
@@ -222,7 +217,7 @@ def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
     if with_skeleton <= STEADY:
         return with_skeleton, np.inf
     return with_skeleton, _drift(
-        placement, lambda time: rig.border.from_core @ _carried(rig, time) @ rig.border.to_core
+        placement, lambda time: rig.border.from_core @ rig.carrying_at(time) @ rig.border.to_core
     )
 
 
@@ -242,7 +237,7 @@ def _drift(placement: Placement, against: Callable[[float], np.ndarray]) -> floa
     """How much a moving prim moves against something else in stage space, as a share: 0 if that is what moves it."""
     times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
     places = np.stack([placement.at(time) for time in times])
-    relative = np.stack([np.linalg.inv(against(time)) for time in times]) @ places
+    relative = np.linalg.inv(np.stack([against(time) for time in times])) @ places
     turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
     reach = max(1.0, np.abs(places[..., 3]).max(), np.abs(relative[..., 3]).max())
     return float(max(turned / np.abs(relative[0, :3, :3]).max(), moved / reach))

@@ -25,6 +25,7 @@ from .hair_search import HairSearch
 from .lacking import no_groom, no_skeleton
 from .notes import (
     composition_notes,
+    few,
     groom_notes,
     layer_notes,
     left_out,
@@ -233,7 +234,7 @@ def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tup
     rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)
     if errors and (not rigs or skeleton):
         raise errors[0]
-    return rigs, [left_out(error) for error in errors]
+    return rigs, few([left_out(error) for error in errors], "skeletons are left out")
 
 
 def _check_animated(rigs: list[StageRig]) -> None:

@@ -57,6 +57,18 @@ class StageRig:
     time_codes: np.ndarray = field(repr=False)
     notes: list[str] = field(repr=False)
     by_hand: dict[str, str] = field(default_factory=dict, repr=False)
+    _carrying: dict[tuple[int, float], np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+
+    def carrying_at(self, time_code: float) -> np.ndarray:
+        """What the carrying joint does to bind world [m] at a time code, (4, 4), remembered: each groom of a crowd asks each
+        character for it at the same few; nothing where it has no head.
+        """
+        if "head" not in self.character.humanoid:
+            return np.eye(4)
+        key = self.character.carrying_joint, time_code
+        if key not in self._carrying:
+            self._carrying[key] = self.character.carrying(self.joints_at(time_code))
+        return self._carrying[key]
 
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
