@@ -29,8 +29,9 @@ def random_clip(
     seconds: float,
     rate: float = 30.0,
     shape: np.ndarray | None = None,
+    wild: float = 0.2,
 ) -> Clip:
-    """A random motion of one to three gestures over swaying and posture; in one of five the whole body spins or tumbles.
+    """A random motion of one to three gestures over swaying and posture; in a share of them the whole body spins or tumbles.
 
     Args:
         character: who moves.
@@ -38,6 +39,7 @@ def random_clip(
         seconds: length.
         rate: samples a second.
         shape: blend shape weights (B,).
+        wild: that share.
     """
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
@@ -45,7 +47,7 @@ def random_clip(
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
-    wild = [rng.choice(WILD)] if rng.random() < 0.2 else []
+    wild = [rng.choice(WILD)] if rng.random() < wild else []
     for kind in dict.fromkeys(str(k) for k in (*chosen, *wild)):
         _GESTURES[kind](puppet, _Dice(rng, seconds))
     return puppet.clip(shape)

@@ -43,6 +43,8 @@ _CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
 """About how long each takes [s], so that progress goes evenly."""
 _MOMENTS = 16
 """Of each simulated motion, from which those in motion are drawn."""
+_WILD = 0.0
+"""Share of clips that spin or tumble: so small a network learns these at the cost of all other motion."""
 _ROOM, _HELD_ROOM = 0.006, 0.012
 """Kept from the body over the material's margin while learning, in motion and in held poses [m]: the network cannot hit the
 mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
@@ -154,7 +156,7 @@ def _simulated(rig, material, spec, clips, seconds, rng, say) -> tuple[np.ndarra
     parts, read, posed = [], [], []
     for first in range(0, clips, 16):
         say(first, clips, f"simulating motion, {first} of {clips} clips")
-        few = [random_clip(rig.character, rng, seconds, rate=RATE) for _ in range(min(16, clips - first))]
+        few = [random_clip(rig.character, rng, seconds, rate=RATE, wild=_WILD) for _ in range(min(16, clips - first))]
         parts.append(simulate_motions(rig, material, spec, few))
         for motion, features in zip(few, parts[-1][0]):
             samples = rng.choice(len(features), min(_MOMENTS, len(features)), replace=False)
