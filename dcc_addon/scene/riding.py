@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..services import following
 from ..services import rig as rig_service
 from . import curves
 
@@ -34,7 +35,7 @@ def carriers(
     if named is not None:  # which is no part of a neck that the artist calls the head
         below[named] = False
     able = np.flatnonzero(below)
-    found = {name: rig_service.carrier_below(place, heads, able, moved) for name, place in places.items()}
+    found = {name: following.carrier_below(place, heads, able, moved) for name, place in places.items()}
     return {name: joint for name, joint in found.items() if joint is not None}
 
 
@@ -69,7 +70,7 @@ def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> st
         return ""
     middle = points[:: max(1, len(points) // PROBES)].mean(axis=0, dtype=float)
     path = places[shown, :3, :3] @ middle + places[shown, :3, 3]
-    far = metres * rig_service.strays(path, [way[shown] for way in ways])
+    far = metres * following.strays(path, [way[shown] for way in ways])
     if not far >= FAR:
         return ""
     return (

@@ -12,6 +12,7 @@ import numpy as np
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.motion import Clip
 
+from ..services import following
 from ..services import rig as rig_service
 from ..services.axes import to_core
 from ..services.hidden import unhidden
@@ -242,7 +243,7 @@ class _Recording:
         for other in self._tracked:
             joint = carriers.get(other, self._head)
             joints = self._heads if joint == self._head else self._moved(joint)
-            own = rig_service.on_joint(places[other], places[""], joints, self._bind[joint])
+            own = following.on_joint(places[other], places[""], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
         yield done
         arrays = []

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from pxr import Sdf
 
-from dcc_addon.services import axes, bones, card, names, panel_errors, rig
+from dcc_addon.services import axes, bones, card, following, names, panel_errors, rig
 from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.leaps import leaps_told
 from dcc_addon.services.mirror import mirrored
@@ -160,10 +160,10 @@ def test_what_goes_with_the_head_alone_is_on_it():
     turning[:, :3, :3] = from_vector(np.outer(np.linspace(0, 1, 5), [0, 0, 1]))
     hat, bind = np.eye(4), np.eye(4)
     hat[:3, 3], bind[:3, 3] = (0, -1, 0), (0, 0, 1.6)
-    np.testing.assert_allclose(rig.on_joint(turning @ hat, still, turning, bind), bind @ hat, atol=1e-12)
-    assert rig.on_joint(still @ hat, still, still, bind) is None
-    assert rig.on_joint(turning @ hat, turning, turning, bind) is None
-    assert rig.on_joint(still @ hat, still, turning, bind) is None
+    np.testing.assert_allclose(following.on_joint(turning @ hat, still, turning, bind), bind @ hat, atol=1e-12)
+    assert following.on_joint(still @ hat, still, still, bind) is None
+    assert following.on_joint(turning @ hat, turning, turning, bind) is None
+    assert following.on_joint(still @ hat, still, turning, bind) is None
 
 
 def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along():
@@ -176,9 +176,9 @@ def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along():
     hidden = jaw.copy()
     hidden[2, :3, :3] = 0
     joints = {3: heads @ beard, 4: hidden, 5: jaw, 6: jaw @ beard}
-    assert rig.carrier_below(jaw @ beard, heads, [3, 4, 5, 6], joints.__getitem__) == 5
-    assert rig.carrier_below(heads @ beard, heads, [3, 4, 5, 6], joints.__getitem__) is None
-    assert rig.carrier_below(np.tile(beard, (5, 1, 1)), heads, [3, 4, 5, 6], joints.__getitem__) is None
+    assert following.carrier_below(jaw @ beard, heads, [3, 4, 5, 6], joints.__getitem__) == 5
+    assert following.carrier_below(heads @ beard, heads, [3, 4, 5, 6], joints.__getitem__) is None
+    assert following.carrier_below(np.tile(beard, (5, 1, 1)), heads, [3, 4, 5, 6], joints.__getitem__) is None
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
