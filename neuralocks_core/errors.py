@@ -21,4 +21,4 @@ def about(subject):
     try:
         yield
     except NeuralocksError as error:
-        raise type(error)(f"{subject}: {error}") from None
+        raise NeuralocksError(f"{subject}: {error}") from None

@@ -80,10 +80,8 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
 def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]."""
     far = np.empty((len(points) - 1, *points.shape[1:-1]), np.result_type(points, np.float32))
-    for frame, (before, after) in enumerate(
-        zip(points, points[1:])
-    ):  # all differences at once would be as large as all points
-        far[frame] = np.linalg.norm(after - before, axis=-1)
+    for frame in range(len(far)):  # all differences at once would be as large as all points
+        far[frame] = np.linalg.norm(points[frame + 1] - points[frame], axis=-1)
     return far / np.diff(times)[:, None, None]
 
 

@@ -15,7 +15,7 @@ from ..session import session
 from .armature import matrix
 from .binding import carrier, carrying_bone
 
-PROBES = 200
+PROBES = 500
 """Vertices whose weights are compared with what is known."""
 WEIGHED = 4000
 """Vertices whose weights are read in one step."""

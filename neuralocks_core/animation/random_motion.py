@@ -47,8 +47,8 @@ def random_clip(
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
-    wild = [rng.choice(WILD)] if rng.random() < wild else []
-    for kind in dict.fromkeys(str(k) for k in (*chosen, *wild)):
+    rare = [rng.choice(WILD)] if rng.random() < wild else []
+    for kind in dict.fromkeys(str(k) for k in (*chosen, *rare)):
         _GESTURES[kind](puppet, _Dice(rng, seconds))
     return puppet.clip(shape)
 

@@ -12,7 +12,7 @@ from neuralocks_core.rotation import unit
 from neuralocks_core.strands.bends import bends
 
 BLOCK = 64
-"""Frames at a time: what is made of each takes twenty times its own memory."""
+"""Frames at a time: what is made of each takes several times its own memory."""
 
 
 def energies(

@@ -12,7 +12,7 @@ def threads(count: int) -> Iterator[None]:
     """In this block, or in a function that it decorates, torch works in so many threads, and afterwards in as many as before.
 
     Threads that share small matrices wait for each other. Where other programs want the cores as well, that is nearly all
-    that they do: the tiny network of a rig then takes ten to twenty times as long in two threads as in one.
+    that they do: the tiny network of a rig then takes seven to twenty times as long in two threads as in one.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(count)

@@ -11,7 +11,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.materials import Material
-from neuralocks_core.progress import Progress
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 
 from ..border.amounts import check_number
@@ -99,8 +99,7 @@ def bake(
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
     cuts = given_cuts(cuts, loop)
-    if progress:
-        progress(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
+    (progress or silent)(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"strength": strength, "resolve": resolve, "loop": loop}

@@ -76,7 +76,7 @@ def write_samples(
 
     Raises:
         NeuralocksError: it cannot be made. Nothing is left then, neither under its name nor beside it; only a stop by the user, or
-            a disk that is full (CannotWrite), leaves the finished frames, to go on from.
+            a file system that refuses, as of a full disk (CannotWrite), leaves the finished frames, to go on from.
     """
     check_not_input(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}

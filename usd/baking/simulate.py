@@ -14,7 +14,7 @@ from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import RUN_IN, simulated
 from neuralocks_core.files import as_path
-from neuralocks_core.progress import Progress
+from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import cores
 from neuralocks_core.strands.locks import whole_locks
 
@@ -72,6 +72,7 @@ def simulate(
     check_number("--strands", count, 1, whole=True)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
     cuts = given_cuts(cuts, loop)
+    (progress or silent)(0, 1, "reading the shot")
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
     options = {"volume": float(volume), "loop": loop}

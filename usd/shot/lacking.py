@@ -11,6 +11,7 @@ from neuralocks_core.rig.hair_names import says_hair
 
 from ..border.values import as_names
 from ..skel.source import find_skeletons
+from .curves import find_curves
 from .notes import composition_notes
 
 MOST_VARIANTS = 64
@@ -29,7 +30,7 @@ def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
 def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
     """The error for a stage without a Skeleton: hair alone, or a character exported without its armature."""
     remedy = "export the character with its armature"
-    if any(prim.IsA(UsdGeom.BasisCurves) for prim in stage.Traverse()):
+    if find_curves(stage):
         remedy = (
             "if it holds hair alone, sublayer or reference it in the shot of its character, on the head; else " + remedy
         )
