@@ -34,7 +34,7 @@ FLOORS = $(shell $(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproj
     print(*(n.split(",")[0].replace(">=", "==") for n in p["dependencies"] + p["optional-dependencies"]["preview"]))')
 lowest: $(VENV)/installed-test
 	$(PYTHON) -m venv .venv-lowest
-	.venv-lowest/bin/python $(PIP_INSTALL) $(FLOORS) pytest pytest-timeout pytest-xdist hypothesis rtree trimesh hatchling onnx
+	.venv-lowest/bin/python $(PIP_INSTALL) $(FLOORS) -e ".[test]" onnx
 	$(ONE_THREAD) .venv-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning \
 	    -W ignore::pytest.PytestUnraisableExceptionWarning \
 	    --ignore tests/core/physics --ignore tests/core/training --ignore tests/blender
