@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.boundary import BoundarySampler, BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.materials import RANGES, Material
+from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
@@ -22,6 +23,8 @@ from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
 STEP = 2.0**-15
 """[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes."""
+SHAPES = 0.6
+"""Weights of the body's blend shapes lie between minus and plus that."""
 FOLLOW = 0.04
 """[m] How far from the body hair still follows a change of its shape."""
 PREROLL = 30
@@ -196,7 +199,7 @@ class RolloutMaker:
 
     def _shape(self, rng) -> np.ndarray:
         count = 0 if self.scene.character.body is None else len(self.scene.character.body.shapes)
-        return rng.uniform(-1, 1, count) * rng.choice([0.0, 0.6])
+        return rng.uniform(-1, 1, count) * rng.choice([0.0, SHAPES])
 
     def _motion(self, rng, shape) -> tuple[Clip, np.ndarray, int]:
         from neuralocks_core.animation.random_motion import random_clip
@@ -224,6 +227,17 @@ class RolloutMaker:
         distance, nearest = self._surface.query(rest)
         offset = sum(w * offsets[nearest] for w, offsets in zip(shape, body.shapes.values())) @ facing.T
         return rest + offset[:, :1] + np.exp(-distance / FOLLOW)[..., None] * (offset - offset[:, :1])
+
+
+def learned_measures(character: Character) -> np.ndarray:
+    """The lowest and the highest `body_measures` (2, 10) [m] among a training's bodies, by the extremes of each blend shape and
+    some random draws.
+    """
+    count = 0 if character.body is None else len(character.body.shapes)
+    each = SHAPES * np.eye(count)
+    drawn = np.random.default_rng(0).uniform(-SHAPES, SHAPES, (100 if count else 0, count))
+    every = np.array([body_measures(character, shape) for shape in [np.zeros(count), *each, *-each, *drawn]])
+    return np.array([every.min(axis=0), every.max(axis=0)])
 
 
 def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:

@@ -28,7 +28,7 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.option_checks import changed, check_options
 from neuralocks_core.training.regression import RegressionOptions, RolloutBank
-from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.rollouts import TrainingScene, learned_measures
 from neuralocks_core.training.threads import threads
 from neuralocks_core.training.work import (
     CODES,
@@ -256,8 +256,10 @@ class _Reporter:
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:
-    """For the card: strands of each groom, and where their codes come from, or how well they tell them."""
-    strands = {"strands": [int(groom.valid.sum()) for groom in scene.grooms]}
+    """For the card: measures of the body, strands of each groom, and where their codes come from, or how well they tell them."""
+    lowest, highest = learned_measures(scene.character).round(4).tolist()
+    strands = {"measures": {"lowest": lowest, "highest": highest}}
+    strands["strands"] = [int(groom.valid.sum()) for groom in scene.grooms]
     if beginning:
         return strands | {"began with": beginning.card()}
     errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]

@@ -4,7 +4,7 @@
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from neuralocks_core import model as model_file
@@ -20,6 +20,7 @@ from ..border.time_codes import given_cuts, time_codes
 from ..shot.notes import asked_notes, out_of_place
 from ..shot.recorded import given_facts
 from ..shot.stage import Shot, StageGroom, read_shot
+from .model_notes import model_notes
 from .posing import GroomPoser
 from .samples import write_samples
 
@@ -112,8 +113,7 @@ def bake(
     facts |= given_facts(cuts, joints)
     notes = [
         *known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins),
-        *_unheard(strand_model, look),
-        *strand_model.file.shortcomings(),
+        *model_notes(strand_model, look, shot),
     ]
     if tell:
         tell(notes)
@@ -161,19 +161,6 @@ def described(shot: Shot) -> list[dict]:
             "how": item.attachment.how,
         }
         for item in shot.grooms
-    ]
-
-
-def _unheard(model: StrandModel, material: Material) -> list[str]:
-    """The note on constants that are not as in the one material that a model was trained with."""
-    options = model.meta["training"].get("options")
-    varied = options.get("random_materials", True) if isinstance(options, dict) else True
-    plain = replace(material, clumping=Material.clumping)  # whose effect no network learns
-    if varied or plain == Material():
-        return []
-    return [
-        "the model was trained with one material, so stiffness, weight and damping change nothing; "
-        "train one with random_materials=True, as the other ways of training do"
     ]
 
 

@@ -10,6 +10,7 @@ from neuralocks_core import model
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.measures import body_measures
 from tests.core.rigs import person, straight_hair
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -190,6 +191,8 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True, keep_work=True)
     card = model.read(out).meta["training"]
     assert card["steps"] == 4 and "resumed with other options" not in card
+    lowest, own, highest = card["measures"]["lowest"], body_measures(scene.character), card["measures"]["highest"]
+    assert np.all(lowest <= own + 1e-4) and np.all(own <= np.add(highest, 1e-4))
     told = []
     other = RegressionOptions(steps=6, collision=9.0, **tiny)
     train_strands(scene, out, other, rollouts=4, resume=True, tell=told.extend)

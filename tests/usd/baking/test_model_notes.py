@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bake tells of its model: characters and materials that it never learned."""
+
+from dataclasses import replace
+
+import pytest
+
+from neuralocks_core.materials import Material
+from neuralocks_core.measures import body_measures
+from neuralocks_core.runtime import StrandModel
+from usd.baking.model_notes import model_notes
+from usd.shot.stage import read_shot
+
+from ..shots import write_shot
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    return read_shot(write_shot(tmp_path_factory.mktemp("shot")))
+
+
+def _notes(model, shot, card: dict) -> list[str]:
+    plain = StrandModel.load(model).file
+    return model_notes(StrandModel(replace(plain, meta=plain.meta | {"training": card})), Material(), shot)
+
+
+def _learned(shot, **changes) -> dict:
+    own = body_measures(shot.rigs[0].character).tolist()
+    lowest, highest = ([changes.get(end, {}).get(i, own[i]) for i in range(10)] for end in ("lowest", "highest"))
+    return {"measures": {"lowest": lowest, "highest": highest}}
+
+
+def test_a_model_of_another_body_is_told(model, shot):
+    assert _notes(model, shot, _learned(shot)) == []
+    # A head 30 mm narrower than all that was learned, and one a millimetre narrower.
+    half = body_measures(shot.rigs[0].character)[0]
+    (note,) = _notes(model, shot, _learned(shot, lowest={0: half + 0.03}, highest={0: half + 0.04}))
+    assert note.startswith(
+        "/Hero/Rig: the model was trained on another body: head half width 0.1 m (trained: 0.13 to 0.14)"
+    )
+    assert _notes(model, shot, _learned(shot, lowest={0: half + 0.001}, highest={0: half + 0.04})) == []
+    # Joints of shoulders differ by centimetres from rig to rig of one body.
+    arms = body_measures(shot.rigs[0].character)[6]
+    assert _notes(model, shot, _learned(shot, highest={6: arms - 0.02})) == []
+    (note,) = _notes(model, shot, _learned(shot, highest={6: arms - 0.05}))
+    assert "upper arm half distance" in note
+
+
+@pytest.mark.parametrize(
+    "measures", [None, 3, "wide", [1], {"lowest": [0.1]}, {"lowest": ["a"] * 10, "highest": [10**400] * 10}]
+)
+def test_a_card_may_hold_anything(model, shot, measures):
+    assert _notes(model, shot, {"measures": measures}) == []
+    assert _notes(model, shot, {}) == []
+
+
+def test_a_material_that_was_never_learned_is_told(model, shot):
+    plain = StrandModel.load(model).file
+    one = StrandModel(replace(plain, meta=plain.meta | {"training": {"options": {"random_materials": False}}}))
+    assert model_notes(one, Material(clumping=0.5), shot) == [] == model_notes(one, Material(), shot)
+    (note,) = model_notes(one, replace(Material(), weight=2 * Material.weight), shot)
+    assert "stiffness, weight and damping change nothing" in note
