@@ -3,6 +3,11 @@
 
 from collections.abc import Mapping
 
+HELD, HELD_BEGUN = "held out", "held out, begun with"
+"""Under what a strand model's report has the gauge on motion and strands that were never learned from."""
+NO_BETTER = 1.02
+"""So many times the error of the model that a training began with is more than chance."""
+
 
 def shortcomings(subject, kind: str, report: Mapping) -> list[str]:
     """Notes for a user on a model that learned too little to be worth using; mostly none.
@@ -17,12 +22,17 @@ def shortcomings(subject, kind: str, report: Mapping) -> list[str]:
 
 
 def _of_strands(report: Mapping) -> list[str]:
-    error = _number(report, "held out", "motion")
-    if error is None or error <= 1:
+    error, begun = (_number(report, name, "motion") for name in (HELD, HELD_BEGUN))
+    if error is None:
         return []
-    return [
-        f"its motion error on motion and strands that it never saw is {error:.2f}, where hair carried rigidly has 1"
-    ]
+    unseen = f"its motion error on motion and strands that it never saw is {error:.2f}, where"
+    if error > 1:
+        return [f"{unseen} hair carried rigidly has 1"]
+    return (
+        []
+        if begun is None or error <= NO_BETTER * begun
+        else [f"{unseen} the model that it began with has {begun:.2f}"]
+    )
 
 
 def _of_a_rig(report: Mapping) -> list[str]:

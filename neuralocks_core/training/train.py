@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
@@ -16,6 +17,7 @@ import torch
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
+from neuralocks_core.shortcomings import HELD, HELD_BEGUN
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
@@ -129,7 +131,7 @@ def _trained(
         run = _Run(scene, method, RolloutBank(scene_out, coder.codes_of), saved, beginning, resume and saved.exists())
         if tell and run.meta["changed"]:
             tell([f"{work}: goes on with other options than it was begun with: {', '.join(run.meta['changed'])}"])
-        gauge = run.train(farm, held_farm, report)
+        told = run.train(farm, held_farm, report)
     card = {**run.card(), **_inputs_of(scene, coder, beginning), "options": asdict(options, dict_factory=_plain)}
     description = {
         "kind": "strands",
@@ -138,7 +140,7 @@ def _trained(
         "anchored": options.anchored,
         "static": options.static,
         "training": {**card, "curve": run.meta["curve"]},
-        "report": {"held out": gauge.to_json()},
+        "report": {name: gauge.to_json() for name, gauge in told.items()},
         "credits": list(beginning.credits) if beginning else [],
     }
     return description, strand_graphs(coder, run.net, options.output)
@@ -175,6 +177,7 @@ class _Run:
         if beginning:
             beginning.fill(self.net)
         self.net.to(self._options.device)
+        self._begun = deepcopy(self.net) if beginning else None
         self._optimisers = self._options.optimisers(self.net)
         settings = {"method": method.name, "boundary": scene.spec.to_json(), "anchored": self._options.anchored}
         settings |= {name: getattr(self._options, name, None) for name in ("output", "motion", "static", "optimiser")}
@@ -186,8 +189,10 @@ class _Run:
             since = [*map(str, kept["changed"]), *changed(kept["options"], now)]
             self.meta = {**kept, "options": now, "changed": since}
 
-    def train(self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]) -> Gauge:
-        """Until the budget is used; what the gauge says in the end.
+    def train(
+        self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]
+    ) -> dict[str, Gauge]:
+        """Until the budget is used; what the gauge says in the end, and what it says of the model that was begun with.
 
         Raises:
             NeuralocksError: a process of the solver failed.
@@ -213,7 +218,7 @@ class _Run:
         if gauge is None:
             self._wait(held_farm, report)
             gauge = self._measured(held_farm)
-        return gauge
+        return {HELD: gauge} | ({HELD_BEGUN: self._gauge(self._begun)} if self._begun else {})
 
     def card(self) -> dict:
         """How it was trained, for the model card."""
@@ -234,9 +239,10 @@ class _Run:
     def _measured(self, held_farm: RolloutFarm) -> Gauge | None:
         """The gauge on the held-out rollouts that there are by now, None before the first."""
         self.held.add(held_farm.files())
-        if not self.held.rollouts:
-            return None
-        return measure(self.net, self.held, self._options.output, self._history, self._options.anchored)
+        return self._gauge(self.net) if self.held.rollouts else None
+
+    def _gauge(self, net: StrandNet) -> Gauge:
+        return measure(net, self.held, self._options.output, self._history, self._options.anchored)
 
     def _save(self, step: int, seconds: float, gauge: Gauge | None) -> None:
         curve = [*self.meta["curve"], *_told(seconds, gauge)]

@@ -38,6 +38,23 @@ def test_the_shipped_models_have_none():
     assert shortcomings("", "rig", RigModel.load(None).report) == []
 
 
+@pytest.mark.parametrize(
+    ("motion", "begun", "told"),
+    [
+        (0.3, 0.31, None),
+        (0.31, 0.308, None),  # by chance
+        (0.33, 0.3, "is 0.33, where the model that it began with has 0.30"),
+        (1.2, 1.0, "is 1.20, where hair carried rigidly has 1"),
+        (0.9, None, None),
+    ],
+)
+def test_of_strands(motion, begun, told):
+    report = {"held out": {"motion": motion}} | ({} if begun is None else {"held out, begun with": {"motion": begun}})
+    assert [note.split("never saw ")[1].split(";")[0] for note in shortcomings("a", "strands", report)] == [
+        told
+    ] * bool(told)
+
+
 @pytest.mark.parametrize("report", [{"held out": 3}, {"held out": {"motion": "1.2"}}, {"held out": {"motion": True}}])
 def test_of_strands_with_a_forged_report(report):
     assert shortcomings("a.neuralocks", "strands", report) == []

@@ -7,9 +7,10 @@ from typing import Annotated
 import typer
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.shortcomings import HELD, HELD_BEGUN
 
-from .command import note, noting_when_cut_short
-from .options import Head, Joints, Out, Seed, Skeleton, pairs
+from .command import note, noting_when_cut_short, print_json
+from .options import AsJson, Head, Joints, Out, Seed, Skeleton, pairs
 
 SEVERAL = ("--groom", "--motion")
 """Options that take as many words as follow: a shell's `--motion clips/*.bvh`."""
@@ -75,8 +76,11 @@ def train_command(
     seed: Seed = 0,
     credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
     keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Train a strand model for a character (extra 'train')."""
+    from neuralocks_core import model
+
     from ..models.train import train
     from .progress import progress_bar
 
@@ -87,7 +91,23 @@ def train_command(
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, rollouts=rollouts, processes=processes,
             credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
-    typer.echo(str(path))
+    meta = model.read(path).meta
+    if as_json:
+        print_json({"model": str(path), "training": meta["training"], "report": meta["report"]})
+        return
+    typer.echo(f"{path}: {meta['training']['steps']:,} steps in {meta['training']['minutes']:g} min")
+    typer.echo(_reached(meta["report"]))
+
+
+def _reached(report: dict) -> str:
+    """What a training's report says, for a terminal."""
+    held, begun = report[HELD], report.get(HELD_BEGUN)
+    before = f", the model that it began with {begun['motion']:.2f}" if begun else ""
+    return (
+        f"on motion and strands that it never saw: motion error {held['motion']:.2f} (hair carried rigidly 1{before}), "
+        f"motion {held['motion_ratio']:.0%} of the solver's, position {held['position']:.1f} % of strand length off "
+        f"(rigidly {held['rigid']:.1f} %)"
+    )
 
 
 def _how_to_go_on(out: Path) -> list[str]:

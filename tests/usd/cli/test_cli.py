@@ -193,12 +193,6 @@ def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys
     assert os.listdir(tmp_path / "model") == ["rig.onnx"]
 
 
-def test_so_many_variations_as_fit_into_memory(capsys):
-    words = ("train", "--character", "c.usda", "--groom", "library", "-o", "m.neuralocks", "--variations", "51")
-    assert status(*words) == 2
-    assert "--variations" in capsys.readouterr().err
-
-
 def test_a_seed_is_one_of_numpys(capsys):
     for words in (("grow", "bob"), ("train",), ("rig", "train", "c.usda")):
         assert status(*words, "--character", "c.usda", "-o", "o.usda", "--seed", "-1") == 2
@@ -209,12 +203,6 @@ def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     assert status("bake", "--help") == 0
     assert "mute it to have the shot back. A bake that was stopped goes on" in capsys.readouterr().out
-
-
-def test_help_tells_what_a_training_begins_with_where_nothing_is_said(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "300")
-    assert status("train", "--help") == 0
-    assert "[default: (shipped, where it fits)]" in capsys.readouterr().out
 
 
 def test_the_version_is_told(capsys):
@@ -355,49 +343,3 @@ def test_a_hair_file_becomes_a_usd_groom(tmp_path, capsys):
     points = np.asarray(UsdGeom.BasisCurves(prim).GetPointsAttr().Get())
     assert np.array_equal(again[0].points, points)
     assert write_groom(tmp_path / "third.usda", again[0]).exists()
-
-
-def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_path, capsys):
-    pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    out = tmp_path / "m.neuralocks"
-    selfsupervised = ("--method", "selfsupervised")
-    for words, said in (
-        (("--method", "magic"), "selfsupervised"),
-        (("--paper",), "--method"),
-        (("--minutes", "0"), "--minutes"),
-        (("--minutes", "nan"), "--minutes"),
-        (("--steps", "-1"), "--steps"),
-        (("--rollouts", "0"), "--rollouts"),
-        ((*selfsupervised, "--set", "colour=red"), "undetached"),
-        ((*selfsupervised, "--set", "form=round"), "constant"),
-        ((*selfsupervised, "--set", "rate=nan"), "rate"),
-        ((*selfsupervised, "--set", "style=1,nan"), "style"),
-        (("--set", "minutes=-5"), "--minutes"),
-        (("--set", "rate=-1"), "rate"),
-        (("--set", "clips=0"), "clips"),
-        (("--set", "clips=10000000"), "clips=10000000: must be at most 10,000"),
-        ((*selfsupervised, "--set", "poses=100000000"), "poses=100000000: must be at most 10,000"),
-        (("--set", "mirror=5"), "mirror=5"),
-        ((*selfsupervised, "--set", "warmup=1.5"), "warmup=1.5"),
-        (("--set", "motion=magic"), "modulated"),
-        (("--set", "seed=-1"), "--seed"),
-        (("--processes", "100000"), "at most 256"),
-        (("--device", "abacus"), "--device abacus"),
-    ):
-        assert status("train", "--character", tmp_path / "nope.usda", "-o", out, *words) == 1
-        error = capsys.readouterr().err
-        assert error.count("\n") == 1 and said in error and "nope" not in error
-
-
-def test_settings_are_words_for_fields():
-    pytest.importorskip("torch", reason="the extra 'train' is not installed")
-    from neuralocks_core.physics.bend_twist import Cosserat
-    from neuralocks_core.training.moment_options import SelfSupervisedOptions
-    from usd.models.train import parsed
-
-    words = {"form": "direct", "paper_adhesion": "yes", "style": "1,2.5", "poses": "4", "rate": "1e-4", "steps": "7"}
-    values = parsed(SelfSupervisedOptions, words)
-    assert values == {
-        "form": Cosserat.DIRECT, "paper_adhesion": True, "style": (1.0, 2.5), "poses": 4, "rate": 1e-4, "steps": 7
-    }  # fmt: skip
-    assert SelfSupervisedOptions.paper(**values).output == "displacement"
