@@ -29,7 +29,7 @@ def main() -> None:
 def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
     """Write the model whose weights are (1 - share) of `model`'s and `share` of `begun`'s."""
     from neuralocks_core import model as model_file
-    from neuralocks_core.boundary import BoundarySpec
+    from neuralocks_core.boundary_spec import BoundarySpec
     from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.export import strand_graphs
     from neuralocks_core.training.networks import StrandNet

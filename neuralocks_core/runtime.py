@@ -13,7 +13,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 import numpy as np
 
 from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.motion import Clip

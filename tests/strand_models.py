@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 
 
 def write_random_model(

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.network_sizes import K
 from neuralocks_core.onnx_graph import OnnxWeights

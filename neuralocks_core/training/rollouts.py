@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import body_measures

@@ -15,7 +15,8 @@ from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core import model
 from neuralocks_core.animation.cuts import find_cuts
-from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card

@@ -6,7 +6,8 @@ import pytest
 
 from neuralocks_core import rotation
 from neuralocks_core.blows import softened
-from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.clumping import COLUMN, Locks
 from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
 from neuralocks_core.errors import NeuralocksError

@@ -9,7 +9,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from examples.strand_runtime import differences
 from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from tests.strand_models import write_random_model
 from tests.usd.shots import HEAD, JOINTS, Recipe, strand_points, write_shot
 from usd.baking.bake import bake

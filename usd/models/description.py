@@ -4,7 +4,8 @@
 import numpy as np
 
 from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySampler, BoundarySpec
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import about
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES

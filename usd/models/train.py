@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.number_words import plain_number

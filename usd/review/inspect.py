@@ -7,7 +7,7 @@ import numpy as np
 from pxr import UsdGeom
 
 from neuralocks_core.anatomy.humanoid import NoHead
-from neuralocks_core.boundary import POSE_JOINTS
+from neuralocks_core.boundary_spec import POSE_JOINTS
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path

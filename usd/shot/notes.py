@@ -9,7 +9,8 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
-from neuralocks_core.boundary import POSE_JOINTS, joints_read
+from neuralocks_core.boundary import joints_read
+from neuralocks_core.boundary_spec import POSE_JOINTS
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
 from neuralocks_core.rig.network import held_features

@@ -13,7 +13,7 @@ from tests.core.rigs import person, straight_hair
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.beginning import Beginning
 from neuralocks_core.training.export import strand_graphs

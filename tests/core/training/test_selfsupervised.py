@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.mesh import vertex_normals

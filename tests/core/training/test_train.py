@@ -15,7 +15,7 @@ from tests.core.rigs import person, straight_hair
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.training import checkpoint, methods

@@ -5,7 +5,7 @@ import pytest
 from pxr import Sdf, Usd
 
 from neuralocks_core import model
-from neuralocks_core.boundary import BoundarySpec
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
