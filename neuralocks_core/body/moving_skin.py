@@ -22,6 +22,13 @@ MOST_SAMPLES = 60_000
 THIN = 0.002
 """A point that lies farther below a sample than the body is thick there, by more than this [m], is not below it."""
 MOST_CELLS = 4_000_000
+SAME_SIDE, AROUND = 0.2, 3.0
+"""A sample's neighbours are those whose normals are turned from its own by less than the angle of this cosine, and that are not
+farther than so many spacings."""
+REACH = 3.2
+"""Squared distance, in squared spacings beyond that of the nearest, at which a sample has no weight any more."""
+BESIDE = 4.0
+"""Squared distance beside the nearest sample, in squared spacings, at which its plane tells nothing."""
 
 
 class Box:
@@ -77,10 +84,10 @@ class Skin:
         far, near = tree.query(place, k=np.arange(1, count + 1))
         near[:, 0] = np.arange(len(place))
         # Skin on the other side of a thin part is no neighbour; the sample itself stands in for it.
-        other = np.einsum("ni,nki->nk", normal, normal[near]) < 0.2
+        other = np.einsum("ni,nki->nk", normal, normal[near]) < SAME_SIDE
         own = np.arange(len(place))[:, None]
         self.thick = _thickness(place, normal, tree)
-        self.near = np.where(other | (far > 3 * spacing[:, None]), own, near).astype(np.int32)
+        self.near = np.where(other | (far > AROUND * spacing[:, None]), own, near).astype(np.int32)
         self.counted = np.where((self.near == own) & (np.arange(count) > 0), 0, 1).astype(np.float32)
 
     def planes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -173,7 +180,7 @@ class PosedSkin:
         # Weights fall from the nearest sample on: smooth in the point and in the pose, at any height.
         first = near[:, 0]
         square = skin.square.take(first)
-        weight = np.maximum(1 - (squared - nearest[:, None]) / (3.2 * square)[:, None], 0)
+        weight = np.maximum(1 - (squared - nearest[:, None]) / (REACH * square)[:, None], 0)
         weight *= weight
         weight *= skin.counted.take(first, axis=0)
         normal = self._normal.take(near, axis=1)
@@ -184,7 +191,7 @@ class PosedSkin:
         value = np.einsum("nk,nk->n", height, weight) / np.einsum("nk->n", weight)
         direction = np.ascontiguousarray(np.einsum("ank,nk->an", normal, weight).T)
         direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
-        beyond = nearest - value * value > 4 * square
+        beyond = nearest - value * value > BESIDE * square
         beyond |= nearest - 0.5 * square > head * head
         # A shoulder is thinner than the grid goes down: what is below its front is behind its back.
         beyond |= -value > skin.thick.take(first) + np.float32(THIN)

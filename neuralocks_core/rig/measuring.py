@@ -14,6 +14,11 @@ from neuralocks_core.rotation import rotation_part
 
 NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
+DRIVEN = 0.3
+"""Skin that a joint moves with more than this share of its weight tells how far its bone reaches."""
+SHORT, SHORT_AFTER = 0.01, 0.2
+"""Skin that passes a last joint by less than this is no bone of its own: of a chain of one joint [m], of others in lengths of the
+bone before."""
 
 
 def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedMesh] | None) -> HairChains:
@@ -174,7 +179,7 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
     """
     joint, parent = own[0], int(character.skeleton.parents[own[0]])
     mask = np.isin(np.arange(len(places)), own)
-    points = [mesh.points[mesh.weight_on(mask) > 0.3] for mesh in meshes or ()]
+    points = [mesh.points[mesh.weight_on(mask) > DRIVEN] for mesh in meshes or ()]
     points = np.concatenate(points) if points else np.zeros((0, 3))
     if not len(points):
         return None
@@ -186,7 +191,7 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
     along = along / size
     length = float((reach @ along).max())
     # Skin that hardly passes the joint belongs to the bone before it: the joint is that bone's end.
-    if length < (0.01 if is_top else 0.2 * size):
+    if length < (SHORT if is_top else SHORT_AFTER * size):
         return None
     return places[joint] + length * along
 
