@@ -33,6 +33,8 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
             with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-", ignore_cleanup_errors=True) as folder:
                 part = Path(folder) / path.name
                 yield part
+                with open(part, "rb+") as file:  # else a power cut may leave the name with nothing under it
+                    os.fsync(file.fileno())
                 os.replace(part, path)
         except BaseException:
             remove_empty(made)

@@ -7,6 +7,7 @@ import json
 
 from . import unbound
 from .nodes import inputs_of, read_input, write_input
+from .remembered import remembered
 
 SIMULATION, DEFORM = "GeometryNodeXPBDSolver", "GeometryNodeDeformCurvesOnSurface"
 """Nodes at the heart of the modifiers that Blender puts on new hair: since 5.2 Hair Dynamics, before that Surface Deform."""
@@ -24,7 +25,7 @@ def mute_deformers(hair, kept: str = "muted") -> None:
     """
     settings = hair.neuralocks_hair
     text = getattr(settings, kept)
-    found, deforms = _remembered(text), False
+    found, deforms = remembered(text), False
     for modifier in hair.modifiers:
         shown = modifier.show_viewport or modifier.show_render
         if _moves(modifier, hair):
@@ -50,7 +51,7 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
         unbound.bind(hair.data, kept)
     if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
         return
-    found = _remembered(getattr(settings, kept))
+    found = remembered(getattr(settings, kept))
     off, resting = iter(_renamed(hair, found)), iter(_renamed_resting(hair, found))
     for name, before in found.items():
         inputs = not before or isinstance(before[0], str)
@@ -67,7 +68,7 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
 def off_meanwhile(hair) -> list[str]:
     """Names of the modifiers that are switched off as a whole while the hair is live, or plays a cache."""
     own = hair.neuralocks_hair
-    found = [name for kept in (own.muted, own.replaced) for name, before in _remembered(kept).items() if True in before]
+    found = [name for kept in (own.muted, own.replaced) for name, before in remembered(kept).items() if True in before]
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
 
@@ -96,14 +97,6 @@ def _renamed_resting(hair, found: dict) -> list:
     """Modifiers that could take the surface at rest, do not, and are not among those remembered by name."""
     inputs = [(m, _resting(m)) for m in hair.modifiers if m.name not in found]
     return [m for m, names in inputs if names and not any(read_input(m, name) for name in names)]
-
-
-def _remembered(text: str) -> dict[str, list]:
-    """By modifier: whether it was shown in the viewport and in renders; or the names of its inputs that were on."""
-    try:
-        return json.loads(text or "{}")
-    except json.JSONDecodeError:
-        return {}
 
 
 def _write(hair, modifier, names, value: bool) -> None:

@@ -10,6 +10,7 @@ from mathutils import Euler, Quaternion
 from neuralocks_core.errors import NeuralocksError
 
 from .animated import animated
+from .remembered import remembered
 
 SAME = 1e-7
 """Values that differ by less are the same turn."""
@@ -37,19 +38,11 @@ def kept(armature, bones) -> str:
     return json.dumps(found)
 
 
-def named(text: str) -> dict[str, list]:
-    """What `kept` found, by bone."""
-    try:
-        return json.loads(text or "{}")
-    except json.JSONDecodeError:
-        return {}
-
-
 def give_back(armature, text: str, keyed: bool = False) -> bool:
     """Turn bones as `kept` found them, those that are still there; whether there was anything to give back. With `keyed`
     those that animation has come to turn since, as Blender's Bake Action does, are left to that.
     """
-    found, written = named(text), animated(armature.animation_data) if keyed else set()
+    found, written = remembered(text), animated(armature.animation_data) if keyed else set()
     for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
         bone = _bone(armature, name, more, found) if armature.pose else None
         if bone is not None and (since := _written_since(bone, mode, more, written)):

@@ -47,7 +47,7 @@ def random_clip(
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
-    rare = [rng.choice(WILD)] if rng.random() < wild else []
+    rare = [rng.choice(WILD)] if wild and rng.random() < wild else []
     for kind in dict.fromkeys(str(k) for k in (*chosen, *rare)):
         _GESTURES[kind](puppet, _Dice(rng, seconds))
     return puppet.clip(shape)

@@ -34,6 +34,9 @@ _BESIDE = 0.02
 _COLLISION, _HELD_COLLISION, _HELD_ELASTIC = 1.5e-4, 2e-4, 2e-3
 """Of the skinned mesh's contact in motion and in held poses, and of gravity and bending in held poses [m^2/s^2], against
 squared errors [m^2]. Clips hold few of the poses that necks can take; energy needs no clip."""
+_DEEP = 3.0
+"""Contact in a held pose counts by its logarithm beyond this energy [m^2/s^2]: else the few poses in which a lock would lie
+deepest outweigh all those in which it would hang, and it stands out from the head in all of them."""
 _RATE = 3e-3
 _POOL = 256
 """Bodies held ready, as many in motion."""
@@ -110,7 +113,8 @@ def train_dynamic(
             # Near the body a small error is a deep one, which squared errors do not tell.
             elastic, collision = held.parts(net, _HELD)
             felt = contact_weight(done)
-            result["held"] = felt * _HELD_COLLISION * collision.mean() + _HELD_ELASTIC * elastic.mean()
+            bounded = _DEEP * torch.log1p(collision / _DEEP)
+            result["held"] = felt * _HELD_COLLISION * bounded.mean() + _HELD_ELASTIC * elastic.mean()
             result["moving"] = felt * _COLLISION * moving.parts(net, _MOVING)[1].mean()
         return result
 
