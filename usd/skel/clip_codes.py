@@ -26,7 +26,7 @@ often a frame or two wider than its samples: standing before them, it would star
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     """Ascending time codes (T,): the animation's samples, every frame in gaps wider than CLOSE, and the ends of a shot where
-    the character stands before or after its samples.
+    the character stands before or after its samples. Where these are too many to hold, one for every frame, with a note.
 
     Raises:
         NeuralocksError: there are too many.
@@ -44,8 +44,14 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
         if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
             samples = [start, *samples, end]
             first, last = start, end
-    count = (last - first) / frame + len(samples)
-    if not np.isfinite(count) or count * len(source.names) > LARGEST_CLIP:
+    spanned, most = (last - first) / frame, LARGEST_CLIP / len(source.names)
+    if np.isfinite(spanned) and spanned + 3 <= most < spanned + len(samples):
+        source.notes.append(
+            f"{source.path}: its animation has {len(samples):,} samples of {len(source.names)} joints, too many to hold; it is read "
+            "once a frame"
+        )
+        samples = [first, last]
+    if not spanned + len(samples) <= most:  # nor is NaN
         raise NeuralocksError(
             f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
             "remove stray keys, or samples and joints that the shot does not need"

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
 from usd.shot.stage import read_shot
 
@@ -131,3 +132,26 @@ def test_motion_that_is_sampled_finely_keeps_its_samples(tmp_path, end):
 def test_pairs_of_samples_that_are_near_the_next_ones_are_no_steps(tmp_path):
     samples = np.sort([*np.arange(1, 40, 0.6), *np.arange(1.2, 40, 0.6)])
     assert np.isin(samples, stepped(tmp_path, samples).time_codes).all()
+
+
+def test_more_samples_than_can_be_held_are_read_once_a_frame(tmp_path, monkeypatch):
+    """A take with motion blur, of which frames alone can be held; a span of too many frames is refused as ever."""
+    path = write_shot(tmp_path, Recipe(frames=9))
+    stage = Usd.Stage.Open(str(path))
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    turns = animation.GetRotationsAttr()
+    for code in np.arange(1, 9, 0.125):
+        turns.Set(turns.Get(float(code)), float(code))
+    stage.Save()
+    every = read_shot(path).rigs[0]
+    joints = len(every.source.names)
+    monkeypatch.setattr("usd.skel.clip_codes.LARGEST_CLIP", 12 * joints)
+    rig = read_shot(path).rigs[0]
+    np.testing.assert_array_equal(rig.time_codes, np.arange(1, 10))
+    np.testing.assert_array_equal(rig.clip.joints, every.clip.joints[np.isin(every.time_codes, rig.time_codes)])
+    (note,) = [note for note in rig.notes if "too many to hold" in note]
+    assert note.endswith(f"its animation has 65 samples of {joints} joints, too many to hold; it is read once a frame")
+    assert not any("too many" in note for note in every.notes)
+    monkeypatch.setattr("usd.skel.clip_codes.LARGEST_CLIP", 8 * joints)
+    with pytest.raises(NeuralocksError, match="spans time codes 1 to 9, too many samples to hold"):
+        read_shot(path)
