@@ -10,6 +10,5 @@ def remembered(text: str) -> dict[str, list]:
         found = json.loads(text or "{}")
     except (json.JSONDecodeError, RecursionError):
         return {}
-    return (
-        {name: values for name, values in found.items() if isinstance(values, list)} if isinstance(found, dict) else {}
-    )
+    pairs = found.items() if isinstance(found, dict) else ()
+    return {name: values for name, values in pairs if isinstance(values, list)}
