@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scenarios share: hair made live, and its points as they are shown and as they are baked."""
+"""What the scenarios share: hair made live, its points and its bones as they are shown, and its points as they are baked."""
 
 import os
 from unittest import SkipTest
@@ -24,6 +24,13 @@ def make_live(rig, strands, **look):
         setattr(strands.neuralocks_hair, name, value)
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     strands.neuralocks_hair.live = True
+
+
+def give_bone_model(rig, folder):
+    """Sample a rig, and give its hair bones a model of random weights, which lies in the folder."""
+    bpy.context.scene.neuralocks.armature = rig
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
 
 
 def messages():
@@ -55,6 +62,12 @@ def points_at(strands, frame, subframe=0.0):
     """Points (P, 3) of a hair object at a frame, as it is drawn."""
     bpy.context.scene.frame_set(frame, subframe=subframe)
     return scenes.points(strands)
+
+
+def bones_at(rig, frame, names=None):
+    """Matrices (J, 4, 4) of the bones of these names, else of all, at a frame, as they are drawn, in the rig's space."""
+    bpy.context.scene.frame_set(frame)
+    return np.array([np.array(bone.matrix) for bone in rig.pose.bones if names is None or bone.name in names])
 
 
 def baked_points(path, prim, frame):

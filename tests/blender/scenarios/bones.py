@@ -8,7 +8,18 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
+from tests.blender.checks import (
+    SAME,
+    apart,
+    baked_points,
+    bones_at,
+    give_bone_model,
+    make_live,
+    messages,
+    needs_usd,
+    points_at,
+    refused,
+)
 
 
 def bones(folder: Path) -> None:
@@ -28,15 +39,9 @@ def bones(folder: Path) -> None:
         bone = rig.pose.bones["hair.01"]
         assert bone.rotation_mode == "XYZ" and apart(np.array(bone.rotation_euler), np.array([0.3, 0.1, 0.2])) < 1e-6
 
-    def turns(frame):
-        scene.frame_set(frame)
-        graph = bpy.context.evaluated_depsgraph_get()
-        pose = rig.evaluated_get(graph).pose
-        return np.array([np.array(bone.matrix) for bone in pose.bones])
-
-    still = {f: turns(f) for f in (3, 11, 24)}
+    still = {f: bones_at(rig, f) for f in (3, 11, 24)}
     rig.neuralocks_character.rig_live = True
-    live = {f: turns(f) for f in (24, 3, 11)}
+    live = {f: bones_at(rig, f) for f in (24, 3, 11)}
     assert not messages(), messages()
     rig.neuralocks_character.rig_live = False
     as_groomed()
@@ -48,7 +53,7 @@ def bones(folder: Path) -> None:
         assert apart(live[f][hair], still[f][hair]) > 1e-3
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
     for f in still:
-        assert apart(turns(f), live[f]) < SAME
+        assert apart(bones_at(rig, f), live[f]) < SAME
     assert {c.data_path: len(c.keyframe_points) for c in scenes.fcurves(rig)} == before, "other keys were touched"
     track = rig.animation_data.nla_tracks["Neuralocks Hair"]
     keyed = {c.data_path.split('"')[1] for c in scenes.fcurves_of(track.strips[0].action)}
@@ -56,17 +61,17 @@ def bones(folder: Path) -> None:
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
     as_groomed()
     for f in still:
-        assert apart(turns(f), still[f]) < 1e-6
+        assert apart(bones_at(rig, f), still[f]) < 1e-6
     scene.neuralocks.subframes = 2  # as many keys as a USD animation has samples
     rig.neuralocks_character.rig_live = True
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    denser = {f: turns(f) for f in still}
+    denser = {f: bones_at(rig, f) for f in still}
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
     action = rig.animation_data.nla_tracks["Neuralocks Hair"].strips[0].action
     at = sorted({round(key.co[0], 3) for curve in scenes.fcurves_of(action) for key in curve.keyframe_points})
     assert at == [scene.frame_start + i / 2 for i in range(2 * (scene.frame_end - scene.frame_start) + 1)], at
     for f in still:
-        assert apart(turns(f), denser[f]) < SAME
+        assert apart(bones_at(rig, f), denser[f]) < SAME
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
     scene.neuralocks.subframes = 1
 
@@ -88,7 +93,7 @@ def bones(folder: Path) -> None:
     assert bpy.ops.neuralocks.export_c(filepath=str(folder / "hair.h")) == {"FINISHED"}
     assert "hair_02" in (folder / "hair.h").read_text()
     for f in still:
-        assert apart(turns(f)[others], still[f][others]) < 1e-6
+        assert apart(bones_at(rig, f)[others], still[f][others]) < 1e-6
 
 
 def bones_without_their_mesh(folder: Path) -> None:
@@ -96,23 +101,17 @@ def bones_without_their_mesh(folder: Path) -> None:
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     skin = scenes.body(rig)
     scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-
-    def pose() -> np.ndarray:
-        bpy.context.scene.frame_set(11)
-        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+    give_bone_model(rig, folder)
 
     def live() -> np.ndarray:
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
         rig.neuralocks_character.rig_live = True
-        found = pose()
+        found = bones_at(rig, 11)
         assert not messages(), messages()
         rig.neuralocks_character.rig_live = False
         return found
 
-    still, whole = pose(), live()
+    still, whole = bones_at(rig, 11), live()
     assert apart(whole, still) > 1e-3
     skin.hide_render = True
     assert apart(live(), whole) < SAME
@@ -127,15 +126,9 @@ def keyed_bones(folder: Path) -> None:
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.body(rig)
     scenes.dance(rig)
-    scene, first, second = bpy.context.scene, *(rig.pose.bones[name] for name in ("hair.01", "hair.02"))
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    first, second = (rig.pose.bones[name] for name in ("hair.01", "hair.02"))
+    give_bone_model(rig, folder)
     track = "Neuralocks Hair"
-
-    def turns(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
 
     for keyed in (False, True):
         first.rotation_mode, first.rotation_quaternion = "QUATERNION", (0.9, 0.3, 0.1, -0.3)
@@ -144,20 +137,20 @@ def keyed_bones(folder: Path) -> None:
             first.rotation_quaternion[1] = second.rotation_euler[0] = 0.02 * frame
             first.keyframe_insert("rotation_quaternion", frame=frame)
             second.keyframe_insert("rotation_euler", frame=frame)
-        still = {frame: turns(frame) for frame in (3, 17)}
+        still = {frame: bones_at(rig, frame) for frame in (3, 17)}
         rig.neuralocks_character.rig_live = True
-        live = {frame: turns(frame) for frame in still}
+        live = {frame: bones_at(rig, frame) for frame in still}
         assert apart(live[3], still[3]) > 0.01 and not messages(), messages()
         assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
         for muted, expected in ((False, live), (True, still), (False, live)):
             rig.animation_data.nla_tracks[track].mute = muted
             for frame, matrices in expected.items():
-                assert apart(turns(frame), matrices) < SAME, (keyed, muted, frame)
+                assert apart(bones_at(rig, frame), matrices) < SAME, (keyed, muted, frame)
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
         assert first.rotation_mode == "QUATERNION" and second.rotation_mode == "XYZ"
         assert not rig.animation_data.nla_tracks and not [a for a in bpy.data.actions if "Hair" in a.name]
         for frame, matrices in still.items():
-            assert apart(turns(frame), matrices) < 1e-6
+            assert apart(bones_at(rig, frame), matrices) < 1e-6
 
 
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
@@ -171,25 +164,20 @@ def keyed_anew(folder: Path) -> None:
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
-    scene, own, bone = bpy.context.scene, rig.neuralocks_character, rig.pose.bones["hair.01"]
+    own, bone = rig.neuralocks_character, rig.pose.bones["hair.01"]
     bone.rotation_euler = (0.1, 0.2, -0.1)
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    model = own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
+    model = own.rig_model
 
-    def turns(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(each.matrix) for each in rig.pose.bones])
-
-    still = turns(5)
+    still = bones_at(rig, 5)
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
-    keyed = turns(5)
+    keyed = bones_at(rig, 5)
     assert apart(still, keyed) > 0.01
 
     def same() -> bool:
         tracks = rig.animation_data.nla_tracks
         names = [track.name for track in tracks if not track.mute]
-        return names == ["Neuralocks Before Hair", "Neuralocks Hair"] and apart(turns(5), keyed) < SAME
+        return names == ["Neuralocks Before Hair", "Neuralocks Hair"] and apart(bones_at(rig, 5), keyed) < SAME
 
     own.rig_model = "/nowhere.neuralocks"
     refused(bpy.ops.neuralocks.bake_keys, "no such model")
@@ -208,7 +196,7 @@ def keyed_anew(folder: Path) -> None:
     rig.animation_data.nla_tracks["Neuralocks Hair"].is_solo = own.rig_live = True
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and same() and not own.rig_live
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
-    assert bone.rotation_mode == "XYZ" and apart(turns(5), still) < 1e-6
+    assert bone.rotation_mode == "XYZ" and apart(bones_at(rig, 5), still) < 1e-6
 
 
 def keys_under_live(folder: Path) -> None:
@@ -219,29 +207,23 @@ def keys_under_live(folder: Path) -> None:
     scenes.dance(rig)
     scene, own, bone = bpy.context.scene, rig.neuralocks_character, rig.pose.bones["hair.01"]
     bone.rotation_euler = turned = (0.3, 0.1, 0.2)
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-
-    def at(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+    give_bone_model(rig, folder)
 
     def as_before():
         assert bone.rotation_mode == "XYZ" and apart(np.array(bone.rotation_euler), np.array(turned)) < 1e-6
 
     own.rig_live = True
-    live = at(11)
+    live = bones_at(rig, 11)
     own.rig_live = False
     as_before()
     for muted in (False, True):
         assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
         rig.animation_data.nla_tracks["Neuralocks Hair"].mute = muted
-        at(9)
+        scene.frame_set(9)
         own.rig_live = True
-        at(11)
+        scene.frame_set(11)
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
-        assert apart(at(11), live) < SAME and not messages(), messages()
+        assert apart(bones_at(rig, 11), live) < SAME and not messages(), messages()
         own.rig_live = False
         as_before()
         bpy.context.view_layer.update()
@@ -257,9 +239,7 @@ def renamed_bones(folder: Path) -> None:
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
     scene = bpy.context.scene
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
     own, bone = (0.1, 0.2, -0.1), rig.pose.bones["hair.01"]
     bone.rotation_euler = own
     rig.neuralocks_character.rig_live = True

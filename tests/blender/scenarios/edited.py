@@ -9,6 +9,7 @@ import numpy as np
 
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at, refused
+from tests.blender.witness import ENGINE, film, witness
 
 
 def rearranged(_folder: Path) -> None:
@@ -25,50 +26,45 @@ def rearranged(_folder: Path) -> None:
     make_live(rig, strands)
     got = []
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        got.append(scenes.points(strands, graph))
 
-        def render(self, graph):
-            got.append(scenes.points(strands, graph))
-
-    bpy.utils.register_class(Witness)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
-    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "WITNESS", 8, 8
+    film(scene)
 
     edits = [(strip, "mute", True), (curve.driver, "expression", "0"), (constraint, "influence", 0.1)]
-    for beside, (thing, name, value) in zip((False, True, False), edits, strict=True):
-        was, before = getattr(thing, name), scenes.points(strands)
-        setattr(thing, name, value)
-        bpy.context.view_layer.update()
-        if beside:
+    with witness(look):
+        scene.render.engine = ENGINE
+        for beside, (thing, name, value) in zip((False, True, False), edits, strict=True):
+            was, before = getattr(thing, name), scenes.points(strands)
+            setattr(thing, name, value)
+            bpy.context.view_layer.update()
+            if beside:
+                while background.look() is not None:
+                    pass
+                assert not session.rigs["Rig"].stale
+                got.append(scenes.points(strands))
+            else:
+                bpy.ops.render.render()
+            assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+            assert apart(before, scenes.points(strands)) > 0.003, (name, apart(before, scenes.points(strands)))
+            assert apart(got.pop(), scenes.points(strands)) < 1e-6, name
+            setattr(thing, name, was)
+            assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+        sampled = session.rigs["Rig"]
+        for frame in (3, 14, 22):
+            scene.frame_set(frame)
+            bpy.context.view_layer.update()
             while background.look() is not None:
                 pass
-            assert not session.rigs["Rig"].stale
-            got.append(scenes.points(strands))
-        else:
-            bpy.ops.render.render()
-        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-        assert apart(before, scenes.points(strands)) > 0.003, (name, apart(before, scenes.points(strands)))
-        assert apart(got.pop(), scenes.points(strands)) < 1e-6, name
-        setattr(thing, name, was)
-        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+            assert session.rigs["Rig"] is sampled, "another frame is no edit"
 
-    sampled = session.rigs["Rig"]
-    for frame in (3, 14, 22):
-        scene.frame_set(frame)
-        bpy.context.view_layer.update()
-        while background.look() is not None:
-            pass
-        assert session.rigs["Rig"] is sampled, "another frame is no edit"
-
-    other, drawn = bpy.data.scenes.new("Other"), scenes.points(strands)
-    other.frame_set(22)
-    session.clear()
-    bpy.context.window.scene = other
-    bpy.ops.render.render(scene=scene.name)
-    assert apart(got.pop(), drawn) < 1e-6, "a render of a scene that is not in view"
-    bpy.utils.unregister_class(Witness)
+        other, drawn = bpy.data.scenes.new("Other"), scenes.points(strands)
+        other.frame_set(22)
+        session.clear()
+        bpy.context.window.scene = other
+        bpy.ops.render.render(scene=scene.name)
+        assert apart(got.pop(), drawn) < 1e-6, "a render of a scene that is not in view"
     assert not messages(), messages()
 
 
@@ -111,39 +107,34 @@ def unmuted_after_a_render(_folder: Path) -> None:
     data.action = None
     strands, drawn = scenes.hair(rig, 20), []
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        drawn.append(scenes.points(strands, graph))
 
-        def render(self, graph):
-            drawn.append(scenes.points(strands, graph))
-
-    bpy.utils.register_class(Witness)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
-    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "WITNESS", 8, 8
+    film(scene)
 
     def shown() -> list:
         return [np.concatenate([points_at(strands, frame), _vertices(skin)]) for frame in (3, 14, 22)]
 
     make_live(rig, strands)
     playing = shown()
-    for at_once in (False, True):
-        scene.frame_set(1)
-        track.mute = True
-        scene.frame_set(22)
-        bpy.ops.render.render()
-        assert apart(drawn[-1], playing[-1][: len(drawn[-1])]) > 0.1
-        track.mute = False
-        if at_once:
+    with witness(look):
+        scene.render.engine = ENGINE
+        for at_once in (False, True):
+            scene.frame_set(1)
+            track.mute = True
+            scene.frame_set(22)
             bpy.ops.render.render()
-            assert apart(drawn[-1], playing[-1][: len(drawn[-1])]) < 1e-6
-        bpy.context.view_layer.update()
-        while background.look() is not None:
-            pass
-        assert not session.rigs["Rig"].stale
-        gap = max(apart(*pair) for pair in zip(shown(), playing, strict=True))
-        assert gap < 1e-6, (at_once, gap)
-    bpy.utils.unregister_class(Witness)
+            assert apart(drawn[-1], playing[-1][: len(drawn[-1])]) > 0.1
+            track.mute = False
+            if at_once:
+                bpy.ops.render.render()
+                assert apart(drawn[-1], playing[-1][: len(drawn[-1])]) < 1e-6
+            bpy.context.view_layer.update()
+            while background.look() is not None:
+                pass
+            assert not session.rigs["Rig"].stale
+            gap = max(apart(*pair) for pair in zip(shown(), playing, strict=True))
+            assert gap < 1e-6, (at_once, gap)
     assert not messages(), messages()
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import refused
+from tests.blender.checks import give_bone_model, refused
 
 
 def headers_of_two(folder: Path) -> None:
@@ -33,9 +33,7 @@ def told_of_the_export(folder: Path) -> None:
 
     rig, said = scenes.armature(bones=scenes.BONES + scenes.TAIL), []
     scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
     rig.neuralocks_character.loop = True
     told = SimpleNamespace(filepath=str(folder / "rig.usdc"), report=lambda kind, text: said.append((*kind, text)))
     for _ in NEURALOCKS_OT_export_skel.steps(told, bpy.context):
@@ -52,9 +50,7 @@ def export_cancelled(folder: Path) -> None:
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
     out = folder / "new" / "rig.usdc"
     steps = NEURALOCKS_OT_export_skel.steps(SimpleNamespace(filepath=str(out)), bpy.context)
     assert any("Baking" in message for _, _, message in steps) and out.parent.exists()

@@ -4,10 +4,9 @@
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, choose, messages, refused
+from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model, messages, refused
 
 
 def turned_otherwise(folder: Path) -> None:
@@ -18,17 +17,11 @@ def turned_otherwise(folder: Path) -> None:
     scenes.body(rig)
     scenes.dance(rig)
     scene, bone = bpy.context.scene, rig.pose.bones["hair.01"]
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-
-    def turns(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(each.matrix) for each in rig.pose.bones])
+    give_bone_model(rig, folder)
 
     limit = bone.constraints.new("LIMIT_ROTATION")
     rig.neuralocks_character.rig_live = True
-    turns(5)
+    scene.frame_set(5)
     assert "'Limit Rotation'" in messages()["Rig"]
     refused(bpy.ops.neuralocks.bake_keys, "hair.01", "mute the constraint")
     limit.mute, bone.bone.use_inherit_rotation = True, False
@@ -48,11 +41,11 @@ def turned_otherwise(folder: Path) -> None:
         scene.render.frame_map_old, scene.render.frame_map_new = old, new
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
         rig.neuralocks_character.rig_live = True
-        live = {frame: turns(frame) for frame in (1, 4, 11)}
+        live = {frame: bones_at(rig, frame) for frame in (1, 4, 11)}
         assert not messages(), messages()
         assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
         for frame, expected in live.items():
-            assert apart(turns(frame), expected) < SAME, (new, frame)
+            assert apart(bones_at(rig, frame), expected) < SAME, (new, frame)
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
 
 
@@ -72,9 +65,7 @@ def keys_that_do_not_play(folder: Path) -> None:
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
     channels = ("rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     for channel in channels:
         rig.pose.bones["hair.01"].keyframe_insert(channel, frame=1, group=channel)
@@ -110,17 +101,11 @@ def baked_by_blender(folder: Path) -> None:
     rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
     scenes.body(rig)
     scenes.dance(rig)
-    scene.neuralocks.armature, own, tail = rig, rig.neuralocks_character, rig.pose.bones["hair.02"]
+    own, tail = rig.neuralocks_character, rig.pose.bones["hair.02"]
     tail.rotation_mode = "QUATERNION"
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-
-    def turns(frame):
-        scene.frame_set(frame)
-        return np.array([np.array(bone.matrix) for bone in rig.pose.bones])
-
+    give_bone_model(rig, folder)
     own.rig_live = True
-    live = {frame: turns(frame) for frame in (3, 12, 20)}
+    live = {frame: bones_at(rig, frame) for frame in (3, 12, 20)}
     choose(rig)
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.nla.bake(
@@ -135,7 +120,7 @@ def baked_by_blender(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     for shown in (True, False):
         for frame, expected in live.items():
-            assert apart(turns(frame), expected) < SAME, (shown, frame)
+            assert apart(bones_at(rig, frame), expected) < SAME, (shown, frame)
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"), copy=True)
         own.rig_live = False
     assert rig.pose.bones["hair.01"].rotation_mode == "QUATERNION" and not own.rig_kept and not messages(), messages()
@@ -146,7 +131,7 @@ def baked_by_blender(folder: Path) -> None:
     tail.rotation_mode = "XYZ"
     tail.keyframe_insert("rotation_euler", frame=1)
     own.rig_live = True
-    turns(5)
+    scene.frame_set(5)
     assert tail.rotation_mode == "AXIS_ANGLE" and not messages(), messages()
     tail.keyframe_insert("rotation_axis_angle", frame=5)
     own.rig_live = False

@@ -5,10 +5,9 @@ import math
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, messages
+from tests.blender.checks import SAME, apart, bones_at, give_bone_model, messages
 
 FRAMES = (3, 11, 20)
 
@@ -22,16 +21,10 @@ def keyed_on_a_ride(folder: Path) -> None:
     for frame in range(1, 25, 3):
         cart.location.y = 0.3 * math.sin(frame)
         cart.keyframe_insert("location", frame=frame)
-    scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
 
     def turns() -> list:
-        found = []
-        for frame in FRAMES:
-            scene.frame_set(frame)
-            found.append(np.array(rig.pose.bones["hair.02"].matrix))
-        return found
+        return [bones_at(rig, frame, ["hair.02"]) for frame in FRAMES]
 
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
     keyed = turns()

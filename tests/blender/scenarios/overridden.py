@@ -8,7 +8,18 @@ import numpy as np
 
 from dcc_addon.scene.attach import has_cache
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
+from tests.blender.checks import (
+    SAME,
+    apart,
+    baked_points,
+    bones_at,
+    give_bone_model,
+    make_live,
+    messages,
+    needs_usd,
+    points_at,
+    refused,
+)
 
 TRACKS = ["Neuralocks Before Hair", "Neuralocks Hair"]
 FRAMES = 1001, 1010, 1020
@@ -124,9 +135,7 @@ def _keyed_library(folder: Path):
     """A file with a character whose hair keys are baked at frames 1 to 24."""
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
-    bpy.context.scene.neuralocks.armature = rig
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    give_bone_model(rig, folder)
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
     scenes.collect("Character")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
@@ -160,8 +169,4 @@ def _own(kind: str):
 
 def _turns(rig) -> np.ndarray:
     """Matrices (T, 2, 4, 4) of the hair bones at FRAMES, as they are shown."""
-    found = []
-    for frame in FRAMES:
-        bpy.context.scene.frame_set(frame)
-        found.append([np.array(rig.pose.bones[bone].matrix) for bone in ("hair.01", "hair.02")])
-    return np.array(found)
+    return np.array([bones_at(rig, frame, ("hair.01", "hair.02")) for frame in FRAMES])

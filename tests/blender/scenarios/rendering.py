@@ -10,6 +10,7 @@ import numpy as np
 
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, messages, points_at, refused
+from tests.blender.witness import ENGINE, film, witness
 
 
 def rendered(folder: Path) -> None:
@@ -45,23 +46,18 @@ def rendered(folder: Path) -> None:
 
     got = {}
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        got[graph.scene.frame_current] = seen(graph)
 
-        def render(self, graph):
-            got[graph.scene.frame_current] = seen(graph)
-
-    bpy.utils.register_class(Witness)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
-    scene.render.engine, scene.render.filepath = "WITNESS", str(folder / "r_")
-    scene.render.resolution_x = scene.render.resolution_y = 8
+    film(scene)
+    scene.render.filepath = str(folder / "r_")
     scene.neuralocks.frame_start, scene.neuralocks.frame_end = 1, 24
     scene.neuralocks.use_scene_range = False  # the frames before the render are remembered
     scene.frame_set(15)
     scene.frame_start, scene.frame_end = 5, 7
-    bpy.ops.render.render(animation=True)
-    bpy.utils.unregister_class(Witness)
+    with witness(look):
+        scene.render.engine = ENGINE
+        bpy.ops.render.render(animation=True)
     assert sorted(got) == sorted(view)
     for frame, (bones, points) in view.items():
         assert apart(got[frame][0], bones) < 1e-6, frame
@@ -114,31 +110,25 @@ def view_layers(folder: Path) -> None:
         drawn = scenes.points(strands, graph_of(scene, scene.view_layers["Char"]))
         assert apart(drawn, shown[8]) < 1e-6 and not messages(), (name, messages())
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        if graph.view_layer.name == "Char":
+            got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
 
-        def render(self, graph):
-            if graph.view_layer.name == "Char":
-                got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
-
-    bpy.utils.register_class(Witness)
     main = bpy.data.scenes.new("Main")
-    for each in (scene, main):
-        each.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-        each.collection.objects.link(each.camera)
-        each.render.engine, each.render.filepath = "WITNESS", str(folder / "r_")
-        each.render.resolution_x = each.render.resolution_y = 8
     scene.neuralocks.use_scene_range, scene.neuralocks.frame_end = False, 24
     scene.frame_start, scene.frame_end = 7, 9
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "env.blend"))
-    for in_view in ("Scene", "Main"):
-        bpy.ops.wm.open_mainfile(filepath=str(folder / "env.blend"))
-        bpy.context.window.scene = bpy.data.scenes[in_view]
-        bpy.ops.render.render(animation=True, scene="Scene")
-        assert sorted(got) == sorted(shown) and not messages(), (in_view, messages())
-        assert all(apart(got[frame], shown[frame]) < 1e-6 for frame in shown), in_view
-        got.clear()
-    bpy.utils.unregister_class(Witness)
+    with witness(look):
+        for each in (scene, main):
+            film(each)
+            each.render.engine, each.render.filepath = ENGINE, str(folder / "r_")
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "env.blend"))
+        for in_view in ("Scene", "Main"):
+            bpy.ops.wm.open_mainfile(filepath=str(folder / "env.blend"))
+            bpy.context.window.scene = bpy.data.scenes[in_view]
+            bpy.ops.render.render(animation=True, scene="Scene")
+            assert sorted(got) == sorted(shown) and not messages(), (in_view, messages())
+            assert all(apart(got[frame], shown[frame]) < 1e-6 for frame in shown), in_view
+            got.clear()
 
 
 def motion_blur(folder: Path) -> None:
@@ -153,23 +143,18 @@ def motion_blur(folder: Path) -> None:
     shown = {frame: points_at(strands, int(frame), frame % 1) for frame in (3.75, 4.0, 4.25)}
     got, deformed = {}, []
 
-    class Shutter(bpy.types.RenderEngine):
-        bl_idname, bl_label = "SHUTTER", "Shutter"
+    def look(engine, graph):
+        deformed.extend(hair.evaluated_get(graph).is_deform_modified(scene, "RENDER") for hair in (strands, plain))
+        for frame in shown:
+            engine.frame_set(int(frame), subframe=frame % 1)
+            got[frame] = scenes.points(strands, graph)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "meanwhile.blend"), copy=True)
 
-        def render(self, graph):
-            deformed.extend(hair.evaluated_get(graph).is_deform_modified(scene, "RENDER") for hair in (strands, plain))
-            for frame in shown:
-                self.frame_set(int(frame), subframe=frame % 1)
-                got[frame] = scenes.points(strands, graph)
-            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "meanwhile.blend"), copy=True)
-
-    bpy.utils.register_class(Shutter)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
-    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "SHUTTER", 8, 8
+    film(scene)
     scene.frame_set(4)
-    bpy.ops.render.render()
-    bpy.utils.unregister_class(Shutter)
+    with witness(look):
+        scene.render.engine = ENGINE
+        bpy.ops.render.render()
     assert deformed == [True, False]
     for frame, points in shown.items():
         assert apart(got[frame], points) < 1e-6, frame
@@ -189,39 +174,33 @@ def by_parts(folder: Path) -> None:
     shown = {frame: points_at(strands, frame) for frame in (20, 21)}
     main = bpy.data.scenes.new("Main")
     for each in (scene, main):
-        each.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-        each.collection.objects.link(each.camera)
-        each.render.resolution_x = each.render.resolution_y = 8
+        film(each)
     _compose(main, scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     got = {}
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        if graph.scene.name == scene_name:
+            got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
 
-        def render(self, graph):
-            if graph.scene.name == scene_name:
-                got[graph.scene.frame_current] = scenes.points(bpy.data.objects["Hair"], graph)
-
-    bpy.utils.register_class(Witness)
     scene_name = scene.name
-    for name, model in ((scene_name, MODEL), ("Main", MODEL), (scene_name, "missing.neuralocks")):
-        bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-        bpy.data.objects["Hair"].neuralocks_hair.model = model
-        for each in bpy.data.scenes:
-            each.render.engine = "WITNESS"
-        rendered = bpy.data.scenes[name]
-        rendered.frame_start, rendered.frame_end, rendered.render.filepath = 20, 21, str(folder / "r_")
-        said = io.StringIO()
-        with redirect_stdout(said):
-            bpy.ops.render.render(animation=True, scene=name)
-        assert sorted(got) == sorted(shown), name
-        if model == MODEL:
-            assert not messages() and "Neuralocks" not in said.getvalue(), said.getvalue()
-            assert all(apart(got.pop(frame), points) < 1e-6 for frame, points in shown.items()), name
-        else:
-            assert "Neuralocks: " in said.getvalue() and "missing.neuralocks" in said.getvalue(), said.getvalue()
-    bpy.utils.unregister_class(Witness)
+    with witness(look):
+        for name, model in ((scene_name, MODEL), ("Main", MODEL), (scene_name, "missing.neuralocks")):
+            bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+            bpy.data.objects["Hair"].neuralocks_hair.model = model
+            for each in bpy.data.scenes:
+                each.render.engine = ENGINE
+            rendered = bpy.data.scenes[name]
+            rendered.frame_start, rendered.frame_end, rendered.render.filepath = 20, 21, str(folder / "r_")
+            said = io.StringIO()
+            with redirect_stdout(said):
+                bpy.ops.render.render(animation=True, scene=name)
+            assert sorted(got) == sorted(shown), name
+            if model == MODEL:
+                assert not messages() and "Neuralocks" not in said.getvalue(), said.getvalue()
+                assert all(apart(got.pop(frame), points) < 1e-6 for frame, points in shown.items()), name
+            else:
+                assert "Neuralocks: " in said.getvalue() and "missing.neuralocks" in said.getvalue(), said.getvalue()
 
 
 def through_strip(folder: Path) -> None:
@@ -235,27 +214,21 @@ def through_strip(folder: Path) -> None:
     shown = {frame: points_at(strands, frame) for frame in (5, 6, 7)}
     got = {}
 
-    class Witness(bpy.types.RenderEngine):
-        bl_idname, bl_label = "WITNESS", "Witness"
+    def look(_engine, graph):
+        if graph.scene.name == scene.name:
+            got[graph.scene.frame_current] = scenes.points(strands, graph)
 
-        def render(self, graph):
-            if graph.scene.name == scene.name:
-                got[graph.scene.frame_current] = scenes.points(strands, graph)
-
-    bpy.utils.register_class(Witness)
     cut = bpy.data.scenes.new("Cut")
     editor = cut.sequence_editor_create()
     (editor.strips if hasattr(editor, "strips") else editor.sequences).new_scene("Shot", scene, 1, 1)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
+    film(scene)
     scene.neuralocks.use_scene_range, scene.neuralocks.frame_end = False, 24
-    scene.render.engine = "WITNESS"
-    for each in (scene, cut):
-        each.render.resolution_x = each.render.resolution_y = 8
+    cut.render.resolution_x = cut.render.resolution_y = 8
     cut.frame_start, cut.frame_end, cut.render.filepath = 5, 7, str(folder / "r_")
     bpy.context.window.scene = cut
-    bpy.ops.render.render(animation=True)
-    bpy.utils.unregister_class(Witness)
+    with witness(look):
+        scene.render.engine = ENGINE
+        bpy.ops.render.render(animation=True)
     assert sorted(got) == sorted(shown) and not strands.modifiers and not messages(), (sorted(got), messages())
     for frame, points in shown.items():
         assert apart(got[frame], points) < 1e-6, frame
