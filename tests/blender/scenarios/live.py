@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The live view: posed by hand, rendered, saved, two characters at a time."""
+"""The live view: the groomed hair is kept, what is rendered is as it is shown, two characters at a time."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at
+from tests.blender.checks import SAME, apart, make_live, messages, points_at
 
 
 def rest_is_safe(folder: Path) -> None:
@@ -65,177 +65,6 @@ def saved_from_elsewhere(folder: Path) -> None:
     bpy.context.window.scene = bpy.data.scenes.new("Other")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "two.blend"))
     assert apart(own(), moved) == 0.0 and not messages(), messages()
-
-
-def posing(folder: Path) -> None:
-    """The hair follows a pose made by hand without a frame change; edited animation is noticed and sampled again."""
-    from dcc_addon.session import session
-
-    rig = scenes.armature()
-    skin = scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 50)
-    make_live(rig, strands)
-    before = points_at(strands, 9)
-    rig.pose.bones["head"].rotation_euler[1] += 0.5
-    bpy.context.view_layer.update()
-    bpy.context.view_layer.update()
-    posed = scenes.points(strands)
-    assert apart(posed, before) > 0.02
-    assert apart(points_at(strands, 9), before) < 1e-6, (
-        "the pose was not keyed, so the frame brings the animated one back"
-    )
-    assert not session.rigs["Rig"].stale
-
-    for vertex in skin.data.vertices:
-        vertex.co.x *= 1.01
-    skin.data.update()
-    bpy.context.view_layer.update()
-    assert session.rigs["Rig"].stale, "the body that hair is kept out of is another one"
-    bpy.ops.neuralocks.sample_motion()
-    before = points_at(strands, 9)
-    assert not session.rigs["Rig"].stale
-    rig.pose.bones["head"].rotation_euler[1] += 0.5
-    rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=9)
-    points_at(strands, 8)
-    assert session.rigs["Rig"].stale
-    rig.pose.bones["spine"].rotation_euler[0] += 0.3  # not keyed yet
-    rig.location.x += 0.1
-    rig["switch"] = 1.0
-    rig.keyframe_insert('["switch"]', frame=8)
-    rig["switch"] = 0.0
-    bpy.context.view_layer.update()
-    bpy.context.view_layer.update()
-    unkeyed, turn, place = scenes.points(strands), rig.pose.bones["spine"].rotation_euler[0], rig.location.x
-    bpy.ops.neuralocks.sample_motion()
-    assert (rig.pose.bones["spine"].rotation_euler[0], rig.location.x, rig["switch"]) == (turn, place, 0.0)
-    assert apart(scenes.points(strands), unkeyed) < 0.02, "sampling took a pose away that was not keyed"
-    assert not session.rigs["Rig"].stale
-    after = points_at(strands, 9)
-    assert apart(after, before) > 0.02
-    assert bpy.ops.neuralocks.bake(filepath=str(folder / "b.usdc")) == {"FINISHED"}
-    assert apart(baked_points(folder / "b.usdc", "/Character/Hair_Hair", 9), after) < SAME
-
-
-def skin_posed(folder: Path) -> None:
-    """Hair is kept out of skin as it is posed by hand, on whatever bone it hangs, at once and in all frames once Blender was
-    idle; but hair bones that are live move no other hair.
-    """
-    from dcc_addon import background
-    from dcc_addon.session import session
-
-    pad = ("pad.L", "chest", (0.05, 0.02, 1.45), (0.05, 0.25, 1.5))
-    rig = scenes.armature(bones=[*scenes.BONES, *scenes.TAIL, pad])
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands, own = scenes.hair(rig, 60, length=0.4), rig.neuralocks_character
-    make_live(rig, strands, resolve=True)
-    before = points_at(strands, 9)
-    own.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
-    own.rig_live = True
-    assert apart(points_at(strands, 8), points_at(strands, 9)) > 1e-3 and apart(scenes.points(strands), before) == 0.0
-    assert rig.pose.bones["hair.01"].rotation_mode == "QUATERNION" and not session.rigs["Rig"].stale
-
-    rig.pose.bones["pad.L"].rotation_euler = (0.9, 0.3, 0)
-    bpy.context.view_layer.update()
-    posed = scenes.points(strands)
-    assert apart(posed, before) > 0.01
-    strands.neuralocks_hair.resolve = False
-    free = scenes.points(strands)
-    strands.neuralocks_hair.resolve = True
-    assert apart(free, posed) > 0.01
-    known = [session.rigs["Rig"]]
-    for _ in range(2):
-        background.doubt()
-        while background.look() is not None:
-            pass
-        known.append(session.rigs["Rig"])
-    assert known[0] is not known[1] and known[1] is known[2] and not known[2].stale
-    shown = points_at(strands, 9)
-    assert apart(shown, posed) < SAME
-    assert bpy.ops.neuralocks.bake(filepath=str(folder / "posed.usdc")) == {"FINISHED"}
-    assert apart(baked_points(folder / "posed.usdc", "/Character/Hair_Hair", 9), shown) < SAME
-    assert not messages(), messages()
-
-
-def not_keyed(_folder: Path) -> None:
-    """A value that keys write, and that was changed and is not keyed yet, stays when the motion is sampled, whatever it is a
-    value of.
-    """
-    rig, lists = scenes.armature(), bpy.data
-    skin, strands = scenes.body(rig), scenes.hair(rig, 5)
-    bpy.context.scene.neuralocks.armature = rig
-    owners = [rig, rig.data, skin.data, strands.data, lists.textures.new("T", "CLOUDS")]
-    kinds = ("cameras", "lattices", "linestyles", "masks", "materials", "metaballs", "particles", "speakers", "volumes")
-    owners += [getattr(lists, kind).new("Own") for kind in kinds]
-    for owner in owners:
-        owner["value"] = 1.0
-        assert owner.keyframe_insert('["value"]', frame=1)
-        owner["value"] = 2.0
-    camera, warp = lists.cameras["Own"], skin.modifiers.new("Warp", "UV_WARP")
-    called_so = [(camera.background_images.new(), "scale"), (warp, "scale"), (rig.pose.bones["head"], "scale")]
-    for owner, name in called_so:
-        assert owner.keyframe_insert(name, frame=1)
-        setattr(owner, name, 3.0 if owner not in (warp, rig.pose.bones["head"]) else (3.0,) * len(getattr(owner, name)))
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    assert all(np.all(np.array(getattr(owner, name)) == 3.0) for owner, name in called_so)
-    assert not (lost := [owner for owner in owners if owner["value"] != 2.0]), lost
-
-
-def moved_hair(folder: Path) -> None:
-    """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
-    objects that share their curves are refused, and neither is moved.
-    """
-    from dcc_addon.session import session
-
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands, scene = scenes.hair(rig, 30), bpy.context.scene
-    make_live(rig, strands)
-    points_at(strands, 9)
-    strands.location.x += 0.1
-    assert not session.rigs["Rig"].stale
-    points_at(strands, 10)
-    assert session.rigs["Rig"].stale
-    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    shown = {f: points_at(strands, f) for f in (4, 19)}
-    assert bpy.ops.neuralocks.bake(filepath=str(folder / "moved.usdc")) == {"FINISHED"}
-    for f, points in shown.items():
-        assert apart(baked_points(folder / "moved.usdc", "/Character/Hair_Hair", f), points) < SAME
-
-    twin = bpy.data.objects.new("Twin", strands.data)
-    scene.collection.objects.link(twin)
-    points_at(strands, 5)
-    assert "share" in messages()["Hair"], messages()
-    assert "neuralocks_rest" not in strands.data.attributes
-    twin.data = twin.data.copy()
-    points_at(strands, 5)
-    assert not messages(), messages()
-
-
-def far_from_the_origin(_folder: Path) -> None:
-    """Single precision, in which poses are kept, is coarse there, in a scene of centimetres 20 m away: what nobody edited is
-    up to date, and an edit is noticed.
-    """
-    from dcc_addon.scene.up_to_date import ensure
-    from dcc_addon.session import session
-
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    place = bpy.data.objects.new("Place", None)
-    scene.collection.objects.link(place)
-    place.location, rig.parent = (3000, 2100, 0), place
-    strands = scenes.hair(rig, 10)
-    make_live(rig, strands)
-    sampled = session.rigs["Rig"]
-    for frame in range(1, 25):
-        scene.frame_set(frame)
-        assert not sampled.stale, frame
-    assert ensure(bpy.context, rig, looking=True) is sampled, "no frame is as it was"
-    place.location.x += 0.01
-    scene.frame_set(9)
-    assert sampled.stale
 
 
 def rendering(folder: Path) -> None:

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked keys of hair bones beside what else turns them, and beside strands: keys of the artist's own, other bakes, Live."""
+
+from pathlib import Path
+from unittest.mock import patch
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import (
+    SAME,
+    apart,
+    baked_points,
+    bones_at,
+    give_bone_model,
+    make_live,
+    messages,
+    needs_usd,
+    points_at,
+    refused,
+)
+
+
+def keyed_bones(folder: Path) -> None:
+    """Hair bones that the artist has keyed, as a key on the whole character does: the baked keys show all the same, and
+    muted give the artist's back, as they do for bones without keys.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    first, second = (rig.pose.bones[name] for name in ("hair.01", "hair.02"))
+    give_bone_model(rig, folder)
+    track = "Neuralocks Hair"
+
+    for keyed in (False, True):
+        first.rotation_mode, first.rotation_quaternion = "QUATERNION", (0.9, 0.3, 0.1, -0.3)
+        second.rotation_euler = (0.1, 0.2, -0.1)
+        for frame in (1, 24) if keyed else ():
+            first.rotation_quaternion[1] = second.rotation_euler[0] = 0.02 * frame
+            first.keyframe_insert("rotation_quaternion", frame=frame)
+            second.keyframe_insert("rotation_euler", frame=frame)
+        still = {frame: bones_at(rig, frame) for frame in (3, 17)}
+        rig.neuralocks_character.rig_live = True
+        live = {frame: bones_at(rig, frame) for frame in still}
+        assert apart(live[3], still[3]) > 0.01 and not messages(), messages()
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        for muted, expected in ((False, live), (True, still), (False, live)):
+            rig.animation_data.nla_tracks[track].mute = muted
+            for frame, matrices in expected.items():
+                assert apart(bones_at(rig, frame), matrices) < SAME, (keyed, muted, frame)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert first.rotation_mode == "QUATERNION" and second.rotation_mode == "XYZ"
+        assert not rig.animation_data.nla_tracks and not [a for a in bpy.data.actions if "Hair" in a.name]
+        for frame, matrices in still.items():
+            assert apart(bones_at(rig, frame), matrices) < 1e-6
+
+
+@patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
+def keyed_anew(folder: Path) -> None:
+    """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
+    not takes its place, and finds the bones as they were before the first.
+    """
+    from types import SimpleNamespace
+
+    from dcc_addon.operators.rig import NEURALOCKS_OT_bake_keys
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    own, bone = rig.neuralocks_character, rig.pose.bones["hair.01"]
+    bone.rotation_euler = (0.1, 0.2, -0.1)
+    give_bone_model(rig, folder)
+    model = own.rig_model
+
+    still = bones_at(rig, 5)
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    keyed = bones_at(rig, 5)
+    assert apart(still, keyed) > 0.01
+
+    def same() -> bool:
+        tracks = rig.animation_data.nla_tracks
+        names = [track.name for track in tracks if not track.mute]
+        return names == ["Neuralocks Before Hair", "Neuralocks Hair"] and apart(bones_at(rig, 5), keyed) < SAME
+
+    own.rig_model = "/nowhere.neuralocks"
+    refused(bpy.ops.neuralocks.bake_keys, "no such model")
+    assert same()
+    own.rig_model = model
+    own.rig_live = True
+    steps = NEURALOCKS_OT_bake_keys.steps(SimpleNamespace(), bpy.context)
+    next(steps)
+    assert not same()
+    bpy.context.view_layer.update()
+    next(steps)
+    steps.close()
+    assert same() and own.rig_live and not messages(), messages()
+    own.rig_live = False
+    assert same()
+    rig.animation_data.nla_tracks["Neuralocks Hair"].is_solo = own.rig_live = True
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and same() and not own.rig_live
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    assert bone.rotation_mode == "XYZ" and apart(bones_at(rig, 5), still) < 1e-6
+
+
+def keys_under_live(folder: Path) -> None:
+    """Live switched on over baked keys, and the keys removed meanwhile: Live goes on, and in the end the hair bones are
+    turned as the artist had turned them.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    scene, own, bone = bpy.context.scene, rig.neuralocks_character, rig.pose.bones["hair.01"]
+    bone.rotation_euler = turned = (0.3, 0.1, 0.2)
+    give_bone_model(rig, folder)
+
+    def as_before():
+        assert bone.rotation_mode == "XYZ" and apart(np.array(bone.rotation_euler), np.array(turned)) < 1e-6
+
+    own.rig_live = True
+    live = bones_at(rig, 11)
+    own.rig_live = False
+    as_before()
+    for muted in (False, True):
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        rig.animation_data.nla_tracks["Neuralocks Hair"].mute = muted
+        scene.frame_set(9)
+        own.rig_live = True
+        scene.frame_set(11)
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert apart(bones_at(rig, 11), live) < SAME and not messages(), messages()
+        own.rig_live = False
+        as_before()
+        bpy.context.view_layer.update()
+        refused(bpy.ops.neuralocks.remove_keys, "no baked hair keys")
+    assert not own.rig_kept
+
+
+def strands_beside_keyed_bones(folder: Path) -> None:
+    """Strands of a character whose hair bones are baked are those that it has without, or with live ones, shown and baked,
+    whether the track is muted or not; a track with the star plays alone, also for them.
+    """
+    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.session import session
+
+    needs_usd()
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands, out = scenes.hair(rig, 40, length=0.4), folder / "out.usdc"
+    make_live(rig, strands, resolve=True)
+    expected = {frame: points_at(strands, frame) for frame in (3, 11, 20)}
+
+    def as_baked() -> None:
+        assert bpy.ops.neuralocks.bake(filepath=str(out)) == {"FINISHED"}
+        for frame, points in expected.items():
+            assert apart(baked_points(out, "/Character/Hair_Hair", frame), points) < SAME
+
+    def same() -> None:
+        for frame, points in expected.items():
+            assert apart(points_at(strands, frame), points) == 0.0
+        as_baked()
+        for frame, points in expected.items():
+            assert apart(points_at(strands, frame), points) == 0.0
+        notice(rig, scene)
+        assert not session.rigs["Rig"].stale and not messages(), messages()
+
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    rig.neuralocks_character.rig_live = True
+    same()
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    same()
+    track = rig.animation_data.nla_tracks["Neuralocks Hair"]
+    for muted in (True, False):
+        track.mute = muted
+        same()
+    track.is_solo = True
+    notice(rig, scene)
+    assert session.rigs["Rig"].stale
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    expected = {frame: points_at(strands, frame) for frame in expected}
+    assert not session.rigs["Rig"].stale and track.is_solo
+    as_baked()
+    track.is_solo = False
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
