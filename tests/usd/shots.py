@@ -20,6 +20,7 @@ POSITIONS = np.array(
 HEAD = 3
 CENTRE = np.array([0.0, 1.68, 0.02])
 RADIUS = 0.1
+HAIR, RIG, MOTION, SKIN = "/Hero/Hair", "/Hero/Rig", "/Hero/Rig/Motion", "/Hero/Skin"
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,15 @@ def write_shot(folder: Path, recipe: Recipe = Recipe(), name: str = "shot") -> P
     if recipe.bound != "none":
         _skin(stage, root, to_stage, skeleton)
     _groom(stage, root, to_stage, skeleton, recipe)
+    stage.GetRootLayer().Save()
+    return path
+
+
+def edited(folder: Path, edit, recipe: Recipe = Recipe()) -> Path:
+    """A shot whose stage a function has changed."""
+    path = write_shot(folder, recipe)
+    stage = Usd.Stage.Open(str(path))
+    edit(stage)
     stage.GetRootLayer().Save()
     return path
 

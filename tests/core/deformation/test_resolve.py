@@ -1,28 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair leaves the body whether what it meets stands still (a grid) or moves (samples), strand by strand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody
-from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.deformation.laying import MARGIN, clearance, resolved, rest_distance
-from neuralocks_core.deformation.resolve import Resolver
-from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.groom import Groom
-from neuralocks_core.motion import Clip
-from neuralocks_core.rotation import from_vector
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.strands.strand_set import strand_set
-from tests.core import rigs
+from tests.core.deformation.ball_hair import HEAD, strands
 
-HEAD = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
 EXACT = Collider(HEAD.vertices, HEAD.faces)
+
+
 LOW, HIGH = np.full(3, -0.4), np.full(3, 0.4)
+
+
 FREE = clearance(np.full((60, 24), 0.01))
 
 
@@ -35,19 +29,6 @@ def near_body(still, mesh=HEAD):
 @pytest.fixture(scope="module", params=[True, False], ids=["still", "moving"])
 def body(request):
     return near_body(request.param).posed(np.eye(4)[None], None, LOW, HIGH)
-
-
-def strands(count=60, turn=1.5, seed=0):
-    """Strands that leave a sphere and turn back into it; `turn` is their last direction's angle to the first in pi."""
-    rng = np.random.default_rng(seed)
-    out = rng.normal(size=(count, 3))
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    side = np.cross(out, rng.normal(size=(count, 3)))
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    angle = np.linspace(0, turn * np.pi, 23)[None, :, None]
-    edges = 0.012 * (np.cos(angle) * out[:, None] + np.sin(angle) * side[:, None])
-    root = 0.1005 * out
-    return np.concatenate([root[:, None], root[:, None] + np.cumsum(edges, axis=1)], axis=1).astype(np.float32)
 
 
 def test_distances_near_the_skin_are_those_of_the_sphere(body):
@@ -206,113 +187,3 @@ def test_hair_slides_over_the_skin_without_jumps(body):
     moved = np.stack([resolved(step, body, FREE[:40]) for step in steps])
     jump = np.linalg.norm(np.diff(moved, axis=0), axis=-1)
     assert np.quantile(jump, 0.99) < 1e-3 and jump.max() < 8e-3
-
-
-def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
-    """Another clip of an edited animation, with the results of a resolver of its own, bit for bit."""
-    mesh, person = trimesh.creation.icosphere(subdivisions=2, radius=0.1), rigs.person()
-    ball, count = person.skeleton.bind[person.head, :3, 3] + mesh.vertices, len(mesh.vertices)
-    body = Body(
-        np.concatenate([ball, ball - [0, 0.15, 0]]),
-        np.concatenate([mesh.faces, mesh.faces + count]),
-        np.repeat([[person.head], [0]], count, axis=0),
-        np.ones((2 * count, 1)),
-        {"wide": np.full((2 * count, 3), 0.01)},
-    )
-    character = Character(person.skeleton, body)
-    points = strands() + person.skeleton.bind[person.head, :3, 3]
-    groom = Groom("Hair", points.reshape(-1, 3), np.full(60, 24))
-    hair = strand_set(groom, groom.points[0], character.head_centre, character.facing)
-    times = np.arange(5) / 24
-
-    def clip(shape=0.0, **motion):
-        made = rigs.moved(times, **motion)
-        return Clip(times, made.joints, np.full((5, 1), shape))
-
-    def turn(t):
-        return from_vector(np.stack([0 * t, 3 * t, 0 * t], axis=-1))
-
-    walk, run = clip(offset=lambda t: t[:, None] * [1, 0, 0]), clip(offset=lambda t: t[:, None] * [0, 0, 3])
-    resolver = Resolver(character, hair, walk)
-    assert resolver.serves(run) and not resolver.serves(clip(head_turn=turn)) and not resolver.serves(clip(shape=0.5))
-    results = []
-    for one in (resolver, Resolver(character, hair, run)):
-        moved = np.zeros((60, 24, 3), np.float32)
-        moved[:, 2:] += np.float32(0.01)
-        one.apply(moved, run.joints[3], run.shape[3])
-        results.append(moved)
-    assert np.array_equal(*results) and np.abs(results[0] - 0.01).max() > 0.02, "nothing was pushed"
-
-
-def test_the_grooms_of_a_head_share_its_grid():
-    """Locks of other places and lengths; another head has its own."""
-    person, hair = rigs.person(), rigs.straight_hair()
-    joint, weight = np.full((len(HEAD.vertices), 1), person.head), np.ones((len(HEAD.vertices), 1))
-    clip = Clip(np.array([0.0, 1.0]), np.tile(person.skeleton.bind, (2, 1, 1, 1)))
-
-    def grid(size, strands):
-        body = Body(person.skeleton.bind[person.head, :3, 3] + size * HEAD.vertices, HEAD.faces, joint, weight)
-        return Resolver(Character(person.skeleton, body), hair.subset(strands), clip)._near.head
-
-    assert grid(1.0, [0, 1]) is grid(1.0, [5, 7]) is not grid(1.1, [5, 7])
-
-
-def test_poses_and_displacements_of_others_are_refused():
-    character, hair = rigs.person(), rigs.straight_hair(5)
-    count = len(HEAD.vertices)
-    skin = np.full((count, 1), rigs.HEAD), np.ones((count, 1))
-    body = Body(HEAD.vertices + rigs.bind()[rigs.HEAD, :3, 3], HEAD.faces, *skin)
-    resolver = Resolver(Character(character.skeleton, body), hair, rigs.moved([0.0, 1.0]))
-    for strands, joints, name in ((4, rigs.bind(), "displacement"), (5, rigs.bind()[:2], "joints")):
-        with pytest.raises(NeuralocksError, match=f"^{name}: is of shape"):
-            resolver.apply(np.zeros((strands, 24, 3), np.float32), joints)
-
-
-def pushed(size, nods):
-    """Of a person so many times larger than one: what 1 cm sideways is changed to (60, 24, 3) [m], and the resolver."""
-    mesh, times = trimesh.creation.icosphere(subdivisions=2, radius=0.1), np.arange(3) / 24
-    place = np.diag([size, size, size, 1.0])
-    bind = place @ rigs.bind() @ np.linalg.inv(place)
-    ball, count = bind[rigs.HEAD, :3, 3] + size * mesh.vertices, len(mesh.vertices)
-    below, faces = ball - [0, 0.15 * size, 0], np.concatenate([mesh.faces, mesh.faces + count])
-    joint, weight = np.repeat([[rigs.HEAD], [0]], count, axis=0), np.ones((2 * count, 1))
-    body = Body(np.concatenate([ball, below]), faces, joint, weight)
-    joints = np.tile(bind, (3, 1, 1, 1))
-    joints[:, rigs.HEAD, :3, :3] = from_vector(np.outer(times, [4.0 * nods, 0, 0]))
-    points = strands().reshape(-1, 3) + rigs.bind()[rigs.HEAD, :3, 3]
-    hair = strand_set(Groom("Hair", points, np.full(60, 24)), rigs.bind()[rigs.HEAD, :3, 3], np.zeros(3))
-    hair = replace(hair, rest=hair.rest * np.float32(size), length=hair.length * np.float32(size))
-    resolver = Resolver(Character(Skeleton(rigs.NAMES, rigs.PARENTS, bind), body), hair, Clip(times, joints))
-    moved = np.full((60, 24, 3), 0.01 * size, np.float32)
-    resolver.apply(moved, joints[2])
-    return moved, resolver
-
-
-@pytest.mark.parametrize("nods", [False, True])
-def test_a_giant_takes_no_more_work_than_a_person(nods):
-    """As large as a character in the wrong unit; its hair is pushed as a person's."""
-
-    def nodes(resolver):
-        return np.array([resolver._near.head._values.size, resolver._near.box.count])
-
-    (moved, person), (far, giant) = pushed(1, nods), pushed(64, nods)
-    assert (len(person._near.head.moving) > 0) == nods and np.abs(moved - 0.01).max() > 0.005
-    np.testing.assert_array_equal(far, 64 * moved)
-    np.testing.assert_array_equal(nodes(giant), nodes(person))
-    for size in (10, 100, 1000):
-        assert (nodes(pushed(size, nods)[1]) < 1.5 * nodes(person)).all()
-
-
-def test_a_giant_is_measured_at_its_size():
-    """What is asked of the skin of one that is resolved as a person: rough distances, like the exact ones, are in metres."""
-    resolver = pushed(64, False)[1]
-    points = np.float32([[0, 64 * 0.103, 0], [64 * 0.098, 0, 0]])
-    rough = resolver.rough_distance(points, resolver.character.skeleton.bind, np.zeros(0))
-    np.testing.assert_allclose(rough, resolver.at_rest.distance(points)[0], atol=64e-3)
-
-
-@pytest.mark.parametrize("size", [1, 10, 64])
-def test_what_hardly_moves_on_a_person_stands_still_on_a_giant(size):
-    """Half a millimetre of a person."""
-    resolver = pushed(size, 0.005)[1]
-    assert not len(resolver._near.head.moving)

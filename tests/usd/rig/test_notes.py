@@ -5,30 +5,16 @@ import re
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
 from usd.assets.groom import import_groom
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.stage import chain_notes, check_patterns, read_rigged_hair, rigged_notes
+from usd.rig.stage import check_patterns, read_rigged_hair, rigged_notes
 
 from ..rig_shots import model_for, small_shot
-
-
-@pytest.fixture
-def edited(tmp_path):
-    """Makes a small shot in which a function changed the stage."""
-
-    def make(change, **options):
-        path = small_shot(tmp_path / "shot.usda", **options)
-        stage = Usd.Stage.Open(str(path))
-        change(stage)
-        stage.GetRootLayer().Save()
-        return path
-
-    return make
 
 
 def _retyped(name: str, kind, value):
@@ -210,130 +196,3 @@ def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp
     assert re.search(said, "\n".join(inspect(path)["stops"]))
     path = edited(lambda stage: hide(stage, 4))
     assert bake_rig(path, tmp_path / "out.usda", model).samples and not inspect(path)["stops"]
-
-
-def _named(*joints):
-    """A change that gives the six joints other paths; those with skin are the third to the fifth."""
-
-    def change(stage):
-        for path in ("/Who/Rig", "/Who/Motion"):
-            stage.GetPrimAtPath(path).GetAttribute("joints").Set(joints)
-
-    return change
-
-
-@pytest.mark.parametrize(
-    ("above", "lock", "told"),
-    [
-        (
-            "hips/neck",
-            "pony",
-            "'pony' hangs from 'neck' and is not moved; to move all, train and bake with --head neck",
-        ),
-        ("hips", "hair_back", "'hair_back' hangs from 'hips' and is not moved; hang it from the head in the rig"),
-        ("hips", "tail_0", None),
-        ("hips/neck", "scarf_fringe", None),
-    ],
-)
-def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, told):
-    """Hair on the head makes a bake go well, of which the rest is no part."""
-    head = "hips/neck/head"
-    shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{above}/{lock}", f"{head}/hair_0/end"))
-    hair = read_rigged_hair(shot)
-    baked = bake_rig(shot, tmp_path / "out.usda", model_for(hair)).notes
-    for notes in (baked, rigged_notes(hair.source), inspect(shot)["spoils"]):
-        assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
-
-
-def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
-    head = "hips/neck/head"
-    shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{head}/hair_0/end", "hips/neck/pony"))
-    assert not any(" not moved; " in note for note in rigged_notes(read_rigged_hair(shot).source))
-
-
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        ("cable", "'cable_0' is not moved; if it is hair, name all that is to move with --chains"),
-        ("ear", None),
-    ],
-)
-def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
-    """In a mesh that the body drives, too, only names tell hair; joints in rows of three may be some."""
-    head = "hips/head"
-
-    def change(stage):
-        rig = stage.GetPrimAtPath("/Who/Rig")
-        more = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
-        rig.GetAttribute("joints").Set([*rig.GetAttribute("joints").Get(), *more])
-        for attribute in (rig.GetAttribute("bindTransforms"), rig.GetAttribute("restTransforms")):
-            attribute.Set(Vt.Matrix4dArray([*attribute.Get(), *list(attribute.Get())[2:5]]))
-        indices = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar()
-        indices.Set([0, 2, 3, 4, 6, 7, 8, 7, 8])
-
-    shot = edited(change)
-    hair = read_rigged_hair(shot)
-    expected = [f"/Who/Rig: {told}"] if told else []
-    assert chain_notes(hair, None) == expected and chain_notes(hair, ["hair_0"]) == []
-    assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == expected
-
-
-@pytest.mark.parametrize(
-    ("name", "drives", "told"),
-    [
-        ("cable", [0, 2, 3, 4, 2, 3, 4, 0, 0], "the body drives that mesh, too; if it is hair"),
-        ("cable", [2, 2, 2, 1, 1, 1, 1, 1, 1], None),  # of a mesh of its own it is found
-        ("ear", [0, 2, 3, 4, 2, 3, 4, 0, 0], None),
-    ],
-)
-def test_chains_of_other_names_are_told_where_none_is_found(edited, name, drives, told):
-    """With the names to choose them by, and as far as they are like hair where the stage has some of another kind."""
-    head = "hips/head"
-    tail = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
-
-    def change(stage):
-        _named("hips", head, *tail, f"{tail[-1]}/end")(stage)
-        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set(drives)
-
-    shot = edited(change)
-
-    def notes():
-        return [note for note in inspect(shot)["spoils"] if "below the head, but" in note]
-
-    assert len(notes()) == bool(told)
-    if not told:
-        return
-    (note,) = notes()
-    assert note.startswith(f"/Who/Rig: '{name}_0' drives skin below the head, but no name says hair and {told}")
-    assert len(read_rigged_hair(shot, chains=[note.rpartition("--chains ")[2]]).rig.chains) == 3
-    stage = Usd.Stage.Open(str(shot))
-    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
-    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
-    curves.CreateCurveVertexCountsAttr([2])
-    stage.Save()
-    assert notes() == [note]
-    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([0, 1, 2, 3, 2, 3, 0, 0, 0])
-    stage.Save()
-    assert notes() == []
-
-
-def test_a_single_joint_that_drives_a_mesh_of_its_own_is_told(edited):
-    def change(stage):
-        head = "hips/head"
-        _named("hips", head, f"{head}/lobe", f"{head}/b1", f"{head}/b2", f"{head}/b3")(stage)
-
-    (note,) = [note for note in inspect(edited(change))["spoils"] if "below the head, but" in note]
-    assert note.startswith(
-        "/Who/Rig: 'lobe' and 2 more drive skin below the head, but no name says hair and it is a single"
-    )
-
-
-@pytest.mark.parametrize("locks", [["pony"], ["hair_0", "pony"]])
-def test_a_model_of_hair_on_the_neck_needs_the_head_that_it_was_trained_with(edited, tmp_path, locks):
-    shot = edited(_named("neck", "neck/head", "neck/head/hair_0", "neck/head/hair_0/end", "neck/pony", "neck/pony/end"))
-    hair = read_rigged_hair(shot, head="neck", chains=locks)
-    assert len(hair.rig.chains) == len(locks)
-    with pytest.raises(
-        NeuralocksError, match="'pony' does not hang .*, but from 'neck': name that with --head neck, as"
-    ):
-        bake_rig(shot, tmp_path / "out.usda", model_for(hair))

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion that the add-on samples, without Blender: what is stored of it, found by frame, and read of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dcc_addon.services import following, rig
+from dcc_addon.services.history import SampledBoundary
+from dcc_addon.services.leaps import leaps_told
+from dcc_addon.services.motion import Motion, frame_numbers, similar
+from neuralocks_core.animation.cuts import find_cuts
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import from_vector
+from tests.addon.few_bones import BONES, PARENTS, PLACES, rest
+from tests.core.rigs import moved, person
+
+
+def _motion(rng, scale=1.0, stretch=0.0):
+    """World transforms (T, J, 4, 4) of a chain that turns at random, and the bind pose."""
+    bind = scale * rest()
+    bind[:, 3, 3] = 1
+    turns = from_vector(rng.normal(size=(9, 6, 3)) * 0.4)
+    world = np.zeros((9, 6, 4, 4))
+    for joint, parent in enumerate(PARENTS):
+        local = np.tile(np.eye(4), (9, 1, 1))
+        local[:, :3, :3] = turns[:, joint] * (scale if parent < 0 else 1.0)
+        local[:, :3, 3] = scale * PLACES[0] if parent < 0 else PLACES[joint] - PLACES[parent]
+        world[:, joint] = local if parent < 0 else world[:, parent] @ local
+    world[..., 1, :3] *= 1 + stretch
+    return bind, world
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01, 37.0])
+def test_stored_channels_give_the_sampled_poses_back(scale):
+    """Also for an armature object of any scale, although scales of a SkelAnimation have half precision."""
+    bind, world = _motion(np.random.default_rng(0), scale)
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {"": None})
+    apart = motion.world() - world @ np.diag([1 / scale, 1 / scale, 1 / scale, 1])
+    assert np.abs(apart[..., :3, :3]).max() < 1e-6
+    assert np.abs(apart[..., :3, 3]).max() < 1e-6 * scale
+    assert set(np.unique(motion.scale)) == {1.0}
+
+
+def test_stretched_bones_keep_place_and_rotation():
+    """A stretched bone has no single scale; what hair reads of it stays."""
+    bind, world = _motion(np.random.default_rng(1))
+    stretched = world @ np.diag([1.0, 1.7, 1.0, 1.0])
+    result = similar(stretched)
+    np.testing.assert_allclose(result[..., :3, 3], world[..., :3, 3])
+    np.testing.assert_allclose(result[..., :3, :3] / 1.7 ** (1 / 3), world[..., :3, :3], atol=1e-9)
+
+
+def _stretched(rng, apart=()):
+    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those of `apart` inherit no
+    scale.
+    """
+    turns, world = from_vector(rng.normal(size=(9, 6, 3)) * 0.4), np.zeros((9, 6, 4, 4))
+    for joint, parent in enumerate(PARENTS):
+        local = np.tile(np.eye(4), (9, 1, 1))
+        local[:, :3, :3] = turns[:, joint] * rng.uniform(0.7, 1.4, (9, 1, 3))
+        local[:, :3, 3] = PLACES[0] if parent < 0 else PLACES[joint] - PLACES[parent]
+        world[:, joint] = local if parent < 0 else world[:, parent] @ local
+        if joint in apart:
+            world[:, joint, :3, :3] = turns[:, joint] @ from_vector([0.5, 0.2, 0.1])
+    return world
+
+
+def test_channels_carry_what_is_stretched_along_a_chain():
+    world = _stretched(np.random.default_rng(5))
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), {}, head=3)
+    assert np.abs(motion.world() - world).max() < 2e-3
+    parts = [
+        Motion.from_world(np.arange(9)[r], 24, 1.0, PARENTS, rest(), world[r], np.zeros((9, 0))[r], {}, head=3)
+        for r in (slice(2), slice(2, 9))
+    ]
+    assert np.array_equal(Motion.joined(parts, {}).world(), motion.world())
+
+
+def test_a_head_that_inherits_no_stretch_is_exact():
+    """Below it joints have one scale, for a chain cannot carry both; all stay in place."""
+    world = _stretched(np.random.default_rng(6), apart=(3,))
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), {}, head=3)
+    made = motion.world()
+    assert np.abs(made[:, 3] - world[:, 3]).max() < 1e-3
+    assert np.abs(made[..., :3, 3] - world[..., :3, 3]).max() < 1e-3
+    assert np.ptp(np.linalg.norm(made[:, :3, :3, :3], axis=-2), axis=-1).max() < 1e-3
+
+
+def test_an_unevenly_scaled_object_is_part_of_its_bind_pose():
+    """At rest its joints are where they were bound, without scale."""
+    place = np.diag([1.1, 1.0, 0.9, 1.0])
+    motion = Motion.from_world([0], 24, 1.0, PARENTS, place @ rest(), (place @ rest())[None], np.zeros((1, 0)), {})
+    arrays = rig.RigArrays("Rig", BONES, PARENTS, rest())
+    assert np.abs(motion.world()[0] - rig.bind_world(arrays, place)).max() < 1e-6
+
+
+def test_mirrored_armature_is_refused_in_plain_words():
+    with pytest.raises(NeuralocksError, match="Rig: it is mirrored .*apply its scale"):
+        similar(np.diag([-1.0, 1, 1, 1])[None], "Rig")
+
+
+def test_samples_are_found_by_frame():
+    bind, world = _motion(np.random.default_rng(2))
+    motion = Motion.from_world(np.arange(9) / 2 + 3, 25, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    assert [motion.row(f) for f in (3, 3.5, 7, 2, 3.3, 7.5)] == [0, 1, 8, None, None, None]
+    assert motion.times[-1] == 7 / 25
+
+
+def test_a_clips_own_samples_are_what_the_sampler_gives():
+    """Kept or not, in blocks or alone: the same bits, also after a change of look, between samples, for another pose."""
+    rng, times = np.random.default_rng(3), np.arange(21) / 24
+    clip = moved(times, lambda t: np.stack([np.sin(5 * t), 0 * t, t], -1))
+    sampler = BoundarySampler(BoundarySpec(), person(), clip)
+    kept = SampledBoundary(sampler)
+    for material, strength in (((0.0,) * 4, 1.0), ((0.3, 0, 0, 0.1), 0.7)):
+        for row in rng.permutation(21):
+            found = kept.vector(times[row], material, strength, clip.joints[row])
+            assert np.array_equal(found, sampler.vectors([times[row]], material, strength, clip.joints[row][None])[0])
+    other = clip.joints[4].copy()
+    other[:, 0, 3] += 0.1
+    other[:, :3, :3] = from_vector([0, 0.4, 0]) @ other[:, :3, :3]
+    for t, joints in ((times[4], other), (times[4] + 0.01, clip.joints[4]), (2.0, clip.joints[20])):
+        found = kept.vector(t, material, 0.7, joints)
+        assert np.array_equal(found, sampler.vectors([t], material, 0.7, joints[None])[0])
+
+
+@pytest.mark.parametrize("size", [1.0, 0.6, 1.7])
+def test_a_character_is_measured_at_the_size_shown(size):
+    """Bones that scale the head: it stands as it is drawn, and the bind pose is as large as its hair is."""
+    bind, world = _motion(np.random.default_rng(4))
+    world[:, 3, :3, :3] *= size
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    shown = rig.size_shown(rig.RigArrays("Rig", BONES, PARENTS, rest()), np.eye(4), motion.world()[:, 3])
+    assert shown == pytest.approx(size, rel=1e-3)
+
+
+def test_what_goes_with_the_head_alone_is_on_it():
+    """A hat a metre in front of the head, which turns; where all stands still, or goes with the whole figure, nothing is known."""
+    still = np.tile(np.eye(4), (5, 1, 1))
+    turning = still.copy()
+    turning[:, :3, :3] = from_vector(np.outer(np.linspace(0, 1, 5), [0, 0, 1]))
+    hat, bind = np.eye(4), np.eye(4)
+    hat[:3, 3], bind[:3, 3] = (0, -1, 0), (0, 0, 1.6)
+    np.testing.assert_allclose(following.on_joint(turning @ hat, still, turning, bind), bind @ hat, atol=1e-12)
+    assert following.on_joint(still @ hat, still, still, bind) is None
+    assert following.on_joint(turning @ hat, turning, turning, bind) is None
+    assert following.on_joint(still @ hat, still, turning, bind) is None
+
+
+def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along():
+    """The first joint below the head that it does not move against; what a scale of zero hides carries nothing."""
+    heads = np.tile(np.eye(4), (5, 1, 1))
+    heads[:, :3, :3] = from_vector(np.outer(np.linspace(0, 1, 5), [0, 0, 1]))
+    jaw, beard = heads.copy(), np.eye(4)
+    jaw[:, :3, :3] = heads[:, :3, :3] @ from_vector(np.outer(np.linspace(0, 0.5, 5), [1, 0, 0]))
+    beard[:3, 3] = (0, -0.1, 0)
+    hidden = jaw.copy()
+    hidden[2, :3, :3] = 0
+    joints = {3: heads @ beard, 4: hidden, 5: jaw, 6: jaw @ beard}
+    assert following.carrier_below(jaw @ beard, heads, [3, 4, 5, 6], joints.__getitem__) == 5
+    assert following.carrier_below(heads @ beard, heads, [3, 4, 5, 6], joints.__getitem__) is None
+    assert following.carrier_below(np.tile(beard, (5, 1, 1)), heads, [3, 4, 5, 6], joints.__getitem__) is None
+
+
+def test_a_motion_in_parts_is_the_whole():
+    bind, world = _motion(np.random.default_rng(4))
+    frames, shape, places = np.arange(9), np.arange(18.0).reshape(9, 2), {"": world[:, 0]}
+
+    def of(rows):
+        return Motion.from_world(frames[rows], 24, 1.0, PARENTS, bind, world[rows], shape[rows], {})
+
+    whole, joined = of(slice(9)), Motion.joined([of(slice(4)), of(slice(4, 9))], places)
+    for name in ("frames", "translation", "rotation", "scale", "shape"):
+        assert np.array_equal(getattr(whole, name), getattr(joined, name)), name
+    assert joined.places == places
+
+
+def test_frame_numbers():
+    np.testing.assert_allclose(frame_numbers(1, 3, 2), [1, 1.5, 2, 2.5, 3])
+    assert list(frame_numbers(4, 4, 3)) == [4]
+    with pytest.raises(NeuralocksError, match="ends at 1"):
+        frame_numbers(2, 1, 1)
+
+
+def test_leaps_are_told_by_their_frames():
+    """A cut, and two leaps in succession that are none."""
+    frames = np.arange(10, 74)
+    joints = np.tile(np.eye(4), (64, 1, 1, 1))
+    joints[:, 0, 1, 3] = 0.01 * np.sin(np.arange(64))
+    for first in (20, 50, 54):
+        joints[first:, 0, 0, 3] += 1.0
+    clip = Clip(frames / 24, joints)
+    clip = replace(clip, cuts=find_cuts(clip, 0))
+    cut, flash = leaps_told(clip, 0, frames)
+    assert cut == "The head is put elsewhere at frame 30: hair starts anew there"
+    assert flash.startswith("The head leaps at frame 60, 64, less than 0.2 s from one leap to the next")
+    still = Clip(frames / 24, np.tile(np.eye(4), (64, 1, 1, 1)))
+    for many, named in ((6, "10, 18, 26, 34, 42, 50:"), (7, "10, 18, 26, 34, 42, 50, ...:")):
+        (cut,) = leaps_told(replace(still, cuts=still.times[: 8 * many : 8]), 0, frames)
+        assert named in cut
+    assert leaps_told(still, 0, frames) == ()

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shots of mesh hair that tests change."""
+
+import pytest
+from pxr import Usd
+
+from ..rig_shots import small_shot
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """Makes a small shot in which a function changed the stage."""
+
+    def make(change, **options):
+        path = small_shot(tmp_path / "shot.usda", **options)
+        stage = Usd.Stage.Open(str(path))
+        change(stage)
+        stage.GetRootLayer().Save()
+        return path
+
+    return make
