@@ -122,6 +122,13 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             done = session.preparing[hair.name_full][0].done
             progress(layout, done, f"Preparing {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
+        prepared = session.hairs.get(hair.name_full)
+        if prepared is not None and (fact := prepared.hair.another_body):
+            words(
+                layout,
+                f"The model was trained on another body: {fact}; train one for this character if it shows",
+                "INFO",
+            )
         if off := off_meanwhile(hair):
             words(layout, f"Off meanwhile, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)

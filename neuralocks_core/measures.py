@@ -33,6 +33,10 @@ within -0.6 and 0.6), and at all corners of these, rounded outward. Its shapes m
 what is the same in all of training has no weight in a network.
 """
 
+ELSEWHERE = np.where(np.isfinite(HIGHEST - LOWEST), 0.5 * (HIGHEST - LOWEST), 0.03)
+"""A measure [m] that lies farther outside what a model learned is another body's: on it hair moves as it would on the one that it
+learned."""
+
 
 def body_measures(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
     """The ten MEASURES (10,) [m] of the bind pose with blend shape weights `shape` (B,), of which those of a face do not count."""
@@ -64,3 +68,22 @@ def body_measures(character: Character, shape: np.ndarray | None = None) -> np.n
 def measures_read(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
     """The measures (10,) [m] as a network reads them: those of `body_measures`, within what was trained."""
     return np.clip(body_measures(character, shape), LOWEST, HIGHEST)
+
+
+def another_body(character: Character, shape: np.ndarray, learned) -> str:
+    """By which measure a body differs most from those that a model has learned; "" where it is like one of them.
+
+    Args:
+        character, shape: as for `body_measures`.
+        learned: lowest and highest measures, as in a model's card: that comes out of a file, and may hold anything.
+    """
+    try:
+        lowest, highest = (np.asarray(learned[name], float).reshape(len(MEASURES)) for name in ("lowest", "highest"))
+    except (TypeError, KeyError, ValueError, OverflowError):
+        return ""
+    measures = body_measures(character, shape)
+    outside = np.maximum(lowest - measures, measures - highest) / ELSEWHERE
+    i = int(outside.argmax())
+    if not outside[i] > 1:
+        return ""
+    return f"{MEASURES[i]} {measures[i]:.3g} m (trained: {lowest[i]:.3g} to {highest[i]:.3g})"

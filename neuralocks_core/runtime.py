@@ -17,6 +17,7 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
+from neuralocks_core.measures import another_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND
 
@@ -78,6 +79,12 @@ class StrandModel:
     def sampler(self, character: Character, clip: Clip) -> BoundarySampler:
         """Boundary vectors as this model reads them."""
         return BoundarySampler(self.spec, character, clip)
+
+    def another_body(self, character: Character, clip: Clip) -> str:
+        """By which measure a body in a clip differs most from those that this model has learned; "" where it is like one of
+        them, or the card does not tell.
+        """
+        return another_body(character, clip.shape[0], self.meta["training"].get("measures"))
 
     def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
         """One output of one graph, float32, of arrays by the names of its inputs: graphs, names and shapes are those of

@@ -25,10 +25,14 @@ class LiveHair:
         character: whose head carries them.
         model: the network.
         say: told the share that is done; what it raises ends the work.
+
+    Attributes:
+        another_body: by which measure the character differs from those that the model has learned, "" where it does not.
     """
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model
+        self.another_body = ""
         self._strands = strands_on(character, groom)
         say(0.4)
         self._carrier = Carrier(groom, self._strands)
@@ -51,6 +55,7 @@ class LiveHair:
         if clip is not self._clip:
             if self._clip is None or not np.array_equal(clip.shape, self._clip.shape):
                 self._skin = RootSkin(self.character, [self._strands], clip)
+                self.another_body = self.model.another_body(self.character, clip)
             self._clip, self._sampler = clip, self.model.sampler(self.character, clip)
             self._boundary = SampledBoundary(self._sampler)
             self._held, self._shown = b"", b""

@@ -80,6 +80,23 @@ def panel(folder: Path) -> None:
         assert drawn(icon).count("Hair: said") == 2
 
 
+def model_of_another_body(folder: Path) -> None:
+    """The panel tells of live hair whose model was trained on a body of other measures, and by what."""
+    from neuralocks_core import model
+
+    shipped, rig = model.read(model.shipped("strands")), scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    for measures, told in ((None, False), ({"lowest": [0.5] * 10, "highest": [0.6] * 10}, True)):
+        card = {**shipped.meta["training"], "measures": measures}
+        name = folder / f"{told}.neuralocks"
+        model.write(name, {**shipped.meta, "training": card}, shipped.graphs)
+        make_live(rig, strands, model=str(name))
+        said = " ".join(drawn())
+        assert ("was trained on another body: " in said and "(trained: 0.5 to 0.6)" in said) == told, said
+
+
 def told_of_what_is_there(_folder: Path) -> None:
     """What is told of an object goes with it: after it is renamed or deleted, another one that gets its name is not told of
     by it, and the same hair is under its new name.
