@@ -5,13 +5,13 @@ deleted is put back.
 """
 
 import zlib
-from typing import NamedTuple
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, transformed
 
+from .kept import Followed, Written
 from .scene import curves
 from .scene.armature import matrix
 from .scene.lookup import identity
@@ -21,44 +21,6 @@ ROUNDING = 1e-5
 """Points that differ by less, relative to the largest coordinate, are the same."""
 KEPT = 7
 """Earlier changes that are known again."""
-
-
-class Written(NamedTuple):
-    """What the live view wrote last.
-
-    Attributes:
-        of: the hair object and the curves that it was written to.
-        points: (P, 3) float32 in the object's space.
-        places: the object's transforms (4, 4) then, its own and in the world.
-        modifiers: names of its modifiers.
-        rest: the rest shape, (P, 3) float32.
-        spare: (P, 3) float32, memory to read the points into that are there now. It is kept, as that of `points` is, from
-            frame to frame: large memory that is asked for anew costs more than what is done in it.
-    """
-
-    of: tuple
-    points: np.ndarray
-    places: tuple[np.ndarray, np.ndarray]
-    modifiers: tuple[str, ...]
-    rest: np.ndarray
-    spare: np.ndarray
-
-
-class Followed(NamedTuple):
-    """What was done to points once. An undo goes back to before it was done to their rest shape, because Blender remembers
-    each step before it tells of it; it is then known again by this.
-
-    Attributes:
-        of: the curves.
-        rest: checksum of the rest shape before.
-        points: (P, 3) float32 after.
-        change: the transform (4, 4); or, in words, what cannot be done to the rest shape.
-    """
-
-    of: object
-    rest: int
-    points: np.ndarray
-    change: np.ndarray | str
 
 
 def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None:

@@ -4,7 +4,6 @@ space; the rest shape, an attribute like any other, stays in the space of the ha
 """
 
 import zlib
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -12,26 +11,11 @@ import numpy as np
 from neuralocks_core.rotation import inverse, transformed
 
 from .edited import ROUNDING
+from .kept import Stood
 from .scene import curves
 from .scene.armature import matrix
 from .scene.lookup import identity
 from .session import session
-
-
-class Stood(NamedTuple):
-    """How a live hair object was when it was last written.
-
-    Attributes:
-        points: as shown, (P, 3) float32 in its own space.
-        world: where it stood (4, 4).
-        root: the first point of its rest shape.
-        rest: checksum of all of them.
-    """
-
-    points: np.ndarray
-    world: np.ndarray
-    root: np.ndarray
-    rest: int
 
 
 def remember(hair, rest: int) -> None:

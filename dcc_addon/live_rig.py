@@ -1,31 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair bones: the rotations of the frame that is shown. Bones outside the hair are never touched."""
 
-from typing import NamedTuple
-
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
 from .scene import rotations
 from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
-
-
-class Bound(NamedTuple):
-    """A rig model bound to an armature.
-
-    Attributes:
-        bones: the hair bones.
-        modes: by bone, the rotation mode in which it is turned.
-        file: the model file, and a stamp that changes when it is replaced.
-    """
-
-    bones: LiveBones
-    modes: dict[str, str]
-    file: tuple
 
 
 def live_armatures(scene) -> list:

@@ -3,7 +3,6 @@
 
 import zlib
 from functools import lru_cache
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -13,6 +12,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
 from . import edited, joined, preparing
+from .kept import Prepared
 from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
@@ -31,23 +31,6 @@ from .services.sliders import MATERIAL, MOTION
 from .session import session
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
-
-
-class Prepared(NamedTuple):
-    """A hair object bound to its model.
-
-    Attributes:
-        hair: what gives its points.
-        made_of: tells that it must be made again; first the checksum of `rest`.
-        rest: points (P, 3) of the groom in the object's space.
-        of, file: tell quickly that the object has other curves (`_which`), or that the model file was replaced.
-    """
-
-    hair: LiveHair
-    made_of: tuple
-    rest: np.ndarray
-    of: tuple
-    file: tuple
 
 
 def live_hairs(scene) -> list:

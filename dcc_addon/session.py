@@ -24,10 +24,7 @@ from .services.rig import RigArrays
 if TYPE_CHECKING:
     from neuralocks_core.runtime import StrandModel
 
-    from .edited import Followed, Written
-    from .joined import Stood
-    from .live_rig import Bound
-    from .live_strands import Prepared
+    from .kept import Bound, Followed, Prepared, Stood, Written
     from .scene.armature import PoseReader
     from .scene.save_as import Remade
     from .services.threaded import Threaded

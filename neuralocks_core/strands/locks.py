@@ -1,14 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Locks: clusters of neighbouring roots, what their strands share, and neighbours of single vertices."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from neuralocks_core.strands.strand_set import StrandSet
 
 STRANDS_A_LOCK = 6
 """Locks hold so many strands in the mean at least, or their mean codes say nothing."""
@@ -144,20 +137,6 @@ def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
         mates = np.where(close, np.take_along_axis(members[near], first, 1), -1)
         found[members, : mates.shape[1]] = mates
     return found
-
-
-def whole_locks(strands: StrandSet, count: int, seed: int = 0) -> np.ndarray:
-    """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
-    the same each time. With one seed, those of a smaller count are among those of a larger one.
-    """
-    usable = np.flatnonzero(strands.valid)
-    if len(usable) <= count:
-        return usable
-    order = np.random.default_rng(seed).permutation(int(strands.lock.max()) + 1)
-    rank = np.empty(len(order), int)
-    rank[order] = np.arange(len(order))
-    by_lock = usable[np.argsort(rank[strands.lock[usable]], kind="stable")]
-    return np.sort(by_lock[:count])
 
 
 def tied_together(mates: np.ndarray) -> np.ndarray:

@@ -69,6 +69,19 @@ class StrandSet:
             facing=self.facing,
         )
 
+    def whole_locks(self, count: int, seed: int = 0) -> np.ndarray:
+        """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
+        the same each time. With one seed, those of a smaller count are among those of a larger one.
+        """
+        usable = np.flatnonzero(self.valid)
+        if len(usable) <= count:
+            return usable
+        order = np.random.default_rng(seed).permutation(int(self.lock.max()) + 1)
+        rank = np.empty(len(order), int)
+        rank[order] = np.arange(len(order))
+        by_lock = usable[np.argsort(rank[self.lock[usable]], kind="stable")]
+        return np.sort(by_lock[:count])
+
     def carried(self, offset: np.ndarray) -> StrandSet:
         """The same strands, each moved as a whole by `offset` (S, 1, 3) [m], canonical; what a network reads of them stays."""
         return replace(self, rest=self.rest + offset)

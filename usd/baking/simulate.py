@@ -16,7 +16,6 @@ from neuralocks_core.evaluation.comparison import RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import cores
-from neuralocks_core.strands.locks import whole_locks
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
@@ -101,7 +100,7 @@ class _SimulatedPoser:
     ):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
-        chosen = whole_locks(every, count)
+        chosen = every.whole_locks(count)
         if not len(chosen):
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
         codes, clip = Stencils(item, codes, first).codes, replace(self._rig.clip, loop=loop)

@@ -12,7 +12,6 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent
-from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 from neuralocks_core.training.rollouts import TrainingScene
 
@@ -128,7 +127,7 @@ def _strands(groom: Groom, character: Character) -> StrandSet:
     strands = strands_on(character, groom)
     if len(strands.rest) <= MOST_STRANDS:
         return strands
-    return strands.subset(whole_locks(strands, MOST_STRANDS))  # neighbours stay neighbours
+    return strands.subset(strands.whole_locks(MOST_STRANDS))  # neighbours stay neighbours
 
 
 @names_damage

@@ -23,7 +23,6 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.runtime import StrandModel, cores
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.centreline import passes, smoothed
-from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
 
 from ..border.damage import names_damage
@@ -108,7 +107,7 @@ class _Subject:
         skin, shapes = RootSkin(self.character, [every], clip), clip.shape_at(baked.times)
         begun = skin.begun(every)
         # The strands that a solver moved are the first choice of seed 0: those that follow them must be met, too.
-        self.chosen = whole_locks(every, STRANDS, seed=int("solver" in recorded(item.prim)))
+        self.chosen = every.whole_locks(STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self._begun = begun.subset(self.chosen)
         self.valid = int(every.valid.sum())
@@ -251,7 +250,7 @@ class _Subject:
     def compared(self, material: Material, model) -> tuple[dict, dict]:
         """Rows and tip curves beside the reference."""
         strands, times = self.strands, self.baked.times
-        few = whole_locks(strands, REFERENCE_STRANDS)
+        few = strands.whole_locks(REFERENCE_STRANDS)
         some = self._begun.subset(few)
         clip = self._clip
         # The network knows what came before the first frame baked, so the reference must, too.

@@ -6,7 +6,6 @@ import pytest
 
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.strands.locks import whole_locks
 from neuralocks_core.strands.strand_set import strands_on
 from usd.baking.simulate import simulate
 from usd.review.baked import read_baked
@@ -41,7 +40,7 @@ def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypat
         cards.append(evaluate(out).grooms["/Hero/Hair"])
     item = read_baked(out).shot.grooms[0]
     every = strands_on(item.attachment.character, item.groom)
-    chosen = whole_locks(every, 20)
+    chosen = every.whole_locks(20)
     assert (points[0][chosen] == points[1][chosen]).all() and (points[0] != points[1]).any()
     free, kept = (card["penetration_3mm_percent"] for card in cards)
     assert kept < 0.1 * free > 0.05

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is kept in memory of each live object, as the session holds it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .services.bones import LiveBones
+from .services.live import LiveHair
+
+
+class Prepared(NamedTuple):
+    """A hair object bound to its model.
+
+    Attributes:
+        hair: what gives its points.
+        made_of: tells that it must be made again; first the checksum of `rest`.
+        rest: points (P, 3) of the groom in the object's space.
+        of, file: tell quickly that the object has other curves (`_which`), or that the model file was replaced.
+    """
+
+    hair: LiveHair
+    made_of: tuple
+    rest: np.ndarray
+    of: tuple
+    file: tuple
+
+
+class Bound(NamedTuple):
+    """A rig model bound to an armature.
+
+    Attributes:
+        bones: the hair bones.
+        modes: by bone, the rotation mode in which it is turned.
+        file: the model file, and a stamp that changes when it is replaced.
+    """
+
+    bones: LiveBones
+    modes: dict[str, str]
+    file: tuple
+
+
+class Written(NamedTuple):
+    """What the live view wrote last.
+
+    Attributes:
+        of: the hair object and the curves that it was written to.
+        points: (P, 3) float32 in the object's space.
+        places: the object's transforms (4, 4) then, its own and in the world.
+        modifiers: names of its modifiers.
+        rest: the rest shape, (P, 3) float32.
+        spare: (P, 3) float32, memory to read the points into that are there now. It is kept, as that of `points` is, from
+            frame to frame: large memory that is asked for anew costs more than what is done in it.
+    """
+
+    of: tuple
+    points: np.ndarray
+    places: tuple[np.ndarray, np.ndarray]
+    modifiers: tuple[str, ...]
+    rest: np.ndarray
+    spare: np.ndarray
+
+
+class Followed(NamedTuple):
+    """What was done to points once. An undo goes back to before it was done to their rest shape, because Blender remembers
+    each step before it tells of it; it is then known again by this.
+
+    Attributes:
+        of: the curves.
+        rest: checksum of the rest shape before.
+        points: (P, 3) float32 after.
+        change: the transform (4, 4); or, in words, what cannot be done to the rest shape.
+    """
+
+    of: object
+    rest: int
+    points: np.ndarray
+    change: np.ndarray | str
+
+
+class Stood(NamedTuple):
+    """How a live hair object was when it was last written.
+
+    Attributes:
+        points: as shown, (P, 3) float32 in its own space.
+        world: where it stood (4, 4).
+        root: the first point of its rest shape.
+        rest: checksum of all of them.
+    """
+
+    points: np.ndarray
+    world: np.ndarray
+    root: np.ndarray
+    rest: int
