@@ -71,7 +71,8 @@ def measures_read(character: Character, shape: np.ndarray | None = None) -> np.n
 
 
 def another_body(character: Character, shape: np.ndarray, learned) -> str:
-    """By which measure a body differs most from those that a model has learned; "" where it is like one of them.
+    """By which measure a body differs most from those that a model has learned; "" where it is like one of them, or
+    has no skin to be measured.
 
     Args:
         character, shape: as for `body_measures`.
@@ -80,6 +81,8 @@ def another_body(character: Character, shape: np.ndarray, learned) -> str:
     try:
         lowest, highest = (np.asarray(learned[name], float).reshape(len(MEASURES)) for name in ("lowest", "highest"))
     except (TypeError, KeyError, ValueError, OverflowError):
+        return ""
+    if character.head_skin is None:  # an average is told
         return ""
     measures = body_measures(character, shape)
     outside = np.maximum(lowest - measures, measures - highest) / ELSEWHERE

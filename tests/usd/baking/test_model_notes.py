@@ -11,12 +11,17 @@ from neuralocks_core.runtime import StrandModel
 from usd.baking.model_notes import model_notes
 from usd.shot.stage import read_shot
 
-from ..shots import write_shot
+from ..shots import Recipe, write_shot
 
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
     return read_shot(write_shot(tmp_path_factory.mktemp("shot")))
+
+
+def test_a_character_without_a_measurable_body_is_told_elsewhere(model, tmp_path):
+    shot = read_shot(write_shot(tmp_path, Recipe(bound="none")))
+    assert _notes(model, shot, {"measures": {"lowest": [0.5] * 10, "highest": [0.6] * 10}}) == []
 
 
 def _notes(model, shot, card: dict) -> list[str]:
