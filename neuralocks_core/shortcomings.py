@@ -28,11 +28,9 @@ def _of_strands(report: Mapping) -> list[str]:
     unseen = f"its motion error on motion and strands that it never saw is {error:.2f}, where"
     if error > 1:
         return [f"{unseen} hair carried rigidly has 1"]
-    return (
-        []
-        if begun is None or error <= NO_BETTER * begun
-        else [f"{unseen} the model that it began with has {begun:.2f}"]
-    )
+    if begun is not None and error > NO_BETTER * begun:
+        return [f"{unseen} the model that it began with has {begun:.2f}"]
+    return []
 
 
 def _of_a_rig(report: Mapping) -> list[str]:

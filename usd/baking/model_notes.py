@@ -31,8 +31,8 @@ def _unheard(model: StrandModel, material: Material) -> list[str]:
 def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
     """The notes on characters of other measures than those that a model was trained on."""
     found = [item.attachment for item in shot.grooms]
-    # A chest has not a head's measures.
-    told = {each.rig.path: model.another_body(each.character, each.rig.clip) for each in found if not off_head(each)}
+    on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest has not a head's measures
+    told = {path: model.another_body(each.character, each.rig.clip) for path, each in on_heads.items()}
     return [
         f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, take the shipped model, "
         "or train one on this character"
