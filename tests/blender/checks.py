@@ -67,7 +67,8 @@ def points_at(strands, frame, subframe=0.0):
 def bones_at(rig, frame, names=None):
     """Matrices (J, 4, 4) of the bones of these names, else of all, at a frame, as they are drawn, in the rig's space."""
     bpy.context.scene.frame_set(frame)
-    return np.array([np.array(bone.matrix) for bone in rig.pose.bones if names is None or bone.name in names])
+    pose = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose
+    return np.array([np.array(bone.matrix) for bone in pose.bones if names is None or bone.name in names])
 
 
 def baked_points(path, prim, frame):

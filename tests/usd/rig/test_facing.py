@@ -16,7 +16,7 @@ from ..rig_shots import EXAMPLE, model_for
 
 
 @pytest.fixture
-def edited(tmp_path):
+def rebound(tmp_path):
     """Makes a copy of the example's shot in which a function changed names and bind transforms of the joints."""
 
     def make(change):
@@ -60,16 +60,16 @@ def _askew(names, binds):
     ],
     ids=["askew", "swapped", "plain"],
 )
-def test_a_bind_pose_that_faces_otherwise_is_told(edited, change, words):
-    shot = edited(change)
+def test_a_bind_pose_that_faces_otherwise_is_told(rebound, change, words):
+    shot = rebound(change)
     for notes in (rigged_notes(read_rigged_hair(shot).source), inspect(shot)["spoils"]):
         assert sum(bool(re.search(words or "faces", note)) for note in notes) == (words is not None), notes
 
 
-def test_a_trained_model_knows_which_way_its_rig_faces(edited, tmp_path, monkeypatch):
+def test_a_trained_model_knows_which_way_its_rig_faces(rebound, tmp_path, monkeypatch):
     """The header says it; whoever trains is told before."""
     pytest.importorskip("torch")
-    shot, told = edited(_askew), []
+    shot, told = rebound(_askew), []
     hair = read_rigged_hair(shot)
     monkeypatch.setattr("neuralocks_core.training.rig.static.train_static", lambda *_, **__: model_for(hair))
     train_rig(shot, tmp_path / "m.neuralocks", dynamic=False, tell=told.extend)
