@@ -32,10 +32,9 @@ They hold `body_measures` of the body in `examples/shot` at 3,000 random shapes 
 within -0.6 and 0.6), and at all corners of these, rounded outward. Its shapes move no joints, so joints are without bounds:
 what is the same in all of training has no weight in a network.
 """
-
-ELSEWHERE = np.where(np.isfinite(HIGHEST - LOWEST), 0.5 * (HIGHEST - LOWEST), 0.03)
-"""A measure [m] that lies farther outside what a model learned is another body's: on it hair moves as it would on the one that it
-learned."""
+TOLERATED = np.where(np.isfinite(HIGHEST - LOWEST), 0.5 * (HIGHEST - LOWEST), 0.03)
+"""A measure that lies farther outside what was trained [m] is told: rigs put the joint of one and the same head a little higher or
+lower, and in hair that hardly shows."""
 
 
 def body_measures(character: Character, shape: np.ndarray | None = None) -> np.ndarray:
@@ -70,9 +69,15 @@ def measures_read(character: Character, shape: np.ndarray | None = None) -> np.n
     return np.clip(body_measures(character, shape), LOWEST, HIGHEST)
 
 
+def far_off(measures: np.ndarray, lowest: np.ndarray, highest: np.ndarray) -> list[int]:
+    """Which of the measures (10,) lie farther than TOLERATED outside bounds (10,) [m], the farthest first."""
+    outside = np.maximum(lowest - measures, measures - highest)
+    return [int(i) for i in np.argsort(-outside) if outside[i] > TOLERATED[i]]
+
+
 def another_body(character: Character, shape: np.ndarray, learned) -> str:
-    """By which measure a body differs most from those that a model has learned; "" where it is like one of them, or
-    has no skin to be measured.
+    """By which measure a body differs most from those that a model has learned; "" where it differs by no more than TOLERATED,
+    or has no skin to be measured.
 
     Args:
         character, shape: as for `body_measures`.
@@ -85,8 +90,5 @@ def another_body(character: Character, shape: np.ndarray, learned) -> str:
     if character.head_skin is None:  # an average is told
         return ""
     measures = body_measures(character, shape)
-    outside = np.maximum(lowest - measures, measures - highest) / ELSEWHERE
-    i = int(outside.argmax())
-    if not outside[i] > 1:
-        return ""
-    return f"{MEASURES[i]} {measures[i]:.3g} m (trained: {lowest[i]:.3g} to {highest[i]:.3g})"
+    far = far_off(measures, lowest, highest)
+    return "".join(f"{MEASURES[i]} {measures[i]:.3g} m (trained: {lowest[i]:.3g} to {highest[i]:.3g})" for i in far[:1])

@@ -12,7 +12,7 @@ from pxr import Gf, Usd, UsdGeom
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.anatomy.standing import lies
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
+from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures, far_off
 from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
@@ -25,10 +25,6 @@ from .seat import beginnings
 AROUND = 0.25
 """A mesh with some points this near to a head's joint [m] is the head's, or on it."""
 SOME = 20
-FARTHER = 0.5
-"""A measure that lies farther outside what was trained, in spans of that, is told: rigs put the joint of one and the same head a
-little higher or lower, and in hair that hardly shows."""
-
 UNEVEN = 1.02
 """Hair that is stretched so many times more along one axis than along another is told: its strands change their lengths."""
 
@@ -51,8 +47,7 @@ def untrained(rig: StageRig) -> list[str]:
     if unlikely_head(rig):
         return []  # told already
     measures = body_measures(rig.character, rig.clip.shape[0])
-    outside = np.maximum(LOWEST - measures, measures - HIGHEST)
-    far = [i for i in np.argsort(-outside) if outside[i] > FARTHER * (HIGHEST - LOWEST)[i]]
+    far = far_off(measures, LOWEST, HIGHEST)
     if not far:
         return []
     each = [f"its {MEASURES[i]} is {measures[i]:.3g} m (trained: {LOWEST[i]:g} to {HIGHEST[i]:g})" for i in far]

@@ -36,22 +36,26 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     if not samples:
         return np.zeros(1)
     first, last = samples[0], samples[-1]
-    stage = source.prim.GetStage()
-    if stage.HasAuthoredTimeCodeRange():
-        # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
-        start, end, stand = stage.GetStartTimeCode(), stage.GetEndTimeCode(), (STAND - 1e-9) * border.rate
-        start, end = start if first - start >= stand else first, max(end, last)
-        if ((end - start) / frame + len(samples)) * len(source.names) <= LARGEST_CLIP:
-            samples = [start, *samples, end]
-            first, last = start, end
-    spanned, most = (last - first) / frame, LARGEST_CLIP / len(source.names)
-    if np.isfinite(spanned) and spanned + 3 <= most < spanned + len(samples):
+
+    def held(first: float, last: float, count: int) -> bool:
+        """Whether frames and so many samples can be; of times without end they cannot."""
+        return ((last - first) / frame + count) * len(source.names) <= LARGEST_CLIP
+
+    if held(first, last, 2) and not held(first, last, len(samples)):
         source.notes.append(
             f"{source.path}: its animation has {len(samples):,} samples of {len(source.names)} joints, too many to hold; it is read "
             "once a frame"
         )
         samples = [first, last]
-    if not spanned + len(samples) <= most:  # nor is NaN
+    stage = source.prim.GetStage()
+    if stage.HasAuthoredTimeCodeRange():
+        # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
+        start, end, stand = stage.GetStartTimeCode(), stage.GetEndTimeCode(), (STAND - 1e-9) * border.rate
+        start, end = start if first - start >= stand else first, max(end, last)
+        if held(start, end, len(samples)):
+            samples = [start, *samples, end]
+            first, last = start, end
+    if not held(first, last, len(samples)):
         raise NeuralocksError(
             f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
             "remove stray keys, or samples and joints that the shot does not need"
