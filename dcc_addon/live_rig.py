@@ -57,6 +57,9 @@ def bind(armature, sampled) -> Bound:
         bones = LiveBones.of(RigModel.load(path), sampled.rig, sampled.character)
         bound = Bound(bones, rotations.free_modes(armature, bones.bones), file)
         session.chains[armature.name_full] = bound
+        own = armature.neuralocks_character
+        if own.rig_kept and not rotations.kept_in(own.rig_kept):  # damaged: nothing is put aside yet
+            own.rig_kept = ""
     rotations.check_free(armature, bound.bones.bones)
     bound.bones.follow(sampled.character, sampled.clip)
     return bound
@@ -71,5 +74,6 @@ def rest(armature) -> None:
 def show_rest(armature) -> None:
     """The rotations from before, but for bones that were keyed meanwhile; the model stays bound."""
     settings = armature.neuralocks_character
-    if rotations.give_back(armature, settings.rig_kept, keyed=True):
+    if settings.rig_kept:  # to write it is an update, which may call here again
+        rotations.give_back(armature, settings.rig_kept, keyed=True)
         settings.rig_kept = ""

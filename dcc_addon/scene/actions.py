@@ -12,7 +12,6 @@ from . import rotations
 from .animated import animated
 from .lookup import identified, identity
 from .relations import found_anew
-from .remembered import remembered
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
@@ -133,9 +132,9 @@ def beside_others(armature) -> bool:
 
 def as_before(armature) -> dict[str, dict[str, list]]:
     """Channels of the hair bones that are live or baked, by bone and name, as they are without the hair's motion."""
-    kept = remembered(armature.neuralocks_character.rig_kept)
+    kept = rotations.kept_in(armature.neuralocks_character.rig_kept)
     for action in _actions(armature):  # Live over baked keys has put aside what these write
-        kept |= remembered(action.get(KEPT, ""))
+        kept |= rotations.kept_in(action.get(KEPT, ""))
     return {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
 
 
@@ -163,7 +162,7 @@ def without(armature):
     """Meanwhile an earlier bake is off, and the bones are turned as they were before it."""
     number, tracks = identity(armature), {track.name: (track.mute, track.is_solo) for track in _tracks(armature)}
     before = [action.get(KEPT, "") for action in _actions(armature)]
-    turned = rotations.kept(armature, [bone for text in before for bone in remembered(text)])
+    turned = rotations.kept(armature, [bone for text in before for bone in rotations.kept_in(text)])
     try:
         for track in _tracks(armature):
             _unstar(track)

@@ -25,7 +25,7 @@ def mute_deformers(hair, kept: str = "muted") -> None:
     """
     settings = hair.neuralocks_hair
     text = getattr(settings, kept)
-    found, deforms = remembered(text), False
+    found, deforms = remembered(text, _fits), False
     for modifier in hair.modifiers:
         shown = modifier.show_viewport or modifier.show_render
         if _moves(modifier, hair):
@@ -51,15 +51,15 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
         unbound.bind(hair.data, kept)
     if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
         return
-    found = remembered(getattr(settings, kept))
+    found = remembered(getattr(settings, kept), _fits)
     off, resting = iter(_renamed(hair, found)), iter(_renamed_resting(hair, found))
     for name, before in found.items():
-        inputs = not before or isinstance(before[0], str)
+        inputs = isinstance(before[0], str)
         modifier = hair.modifiers.get(name) or next(resting if inputs else off, None)
         if modifier is None:
             continue
         if inputs:
-            _write(hair, modifier, before, True)
+            _write(hair, modifier, [name for name in _resting(modifier) if name in before], True)
         else:
             modifier.show_viewport, modifier.show_render = before
     setattr(settings, kept, "")
@@ -68,13 +68,21 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
 def off_meanwhile(hair) -> list[str]:
     """Names of the modifiers that are switched off as a whole while the hair is live, or plays a cache."""
     own = hair.neuralocks_hair
-    found = [name for kept in (own.muted, own.replaced) for name, before in remembered(kept).items() if True in before]
+    found = [
+        name for kept in (own.muted, own.replaced) for name, before in remembered(kept, _fits).items() if True in before
+    ]
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
 
 def on_top(hair) -> list[str]:
     """Names of the modifiers that do more than to move the hair, and are not switched off: a cache plays below them."""
     return [m.name for m in hair.modifiers if (m.show_viewport or m.show_render) and not _only_moves(m)]
+
+
+def _fits(values: list) -> bool:
+    """Whether this was remembered of a modifier: where it was shown, or which of its inputs were on."""
+    shown = len(values) == 2 and all(isinstance(value, bool) for value in values)
+    return shown or (bool(values) and all(isinstance(value, str) for value in values))
 
 
 def _before(hair, modifier, found: dict) -> list[bool]:

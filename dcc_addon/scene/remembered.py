@@ -2,13 +2,26 @@
 """What a scene remembers of things that were changed for live hair, as text in the file: anybody may have written it."""
 
 import json
+from collections.abc import Callable, Sequence
+
+LARGEST = 1e15
+"""Numbers that Blender's single precision holds, squared too."""
 
 
-def remembered(text: str) -> dict[str, list]:
-    """Values by name; none where the text holds something else."""
+def remembered(text: str, fits: Callable[[list], bool]) -> dict[str, list]:
+    """Values by name, those that fit; none where the text holds something else."""
     try:
         found = json.loads(text or "{}")
     except (json.JSONDecodeError, RecursionError):
         return {}
     pairs = found.items() if isinstance(found, dict) else ()
-    return {name: values for name, values in pairs if isinstance(values, list)}
+    return {name: values for name, values in pairs if isinstance(values, list) and fits(values)}
+
+
+def are_numbers(values, count: int) -> bool:
+    """Whether these are so many numbers that Blender can hold."""
+    return isinstance(values, Sequence) and len(values) == count and all(map(_is_number, values))
+
+
+def _is_number(value) -> bool:
+    return type(value) in (int, float) and -LARGEST < value < LARGEST  # neither of which holds of NaN

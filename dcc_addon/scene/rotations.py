@@ -10,7 +10,7 @@ from mathutils import Euler, Quaternion
 from neuralocks_core.errors import NeuralocksError
 
 from .animated import animated
-from .remembered import remembered
+from .remembered import are_numbers, remembered
 
 SAME = 1e-7
 """Values that differ by less are the same turn."""
@@ -18,6 +18,8 @@ SAME_PLACE = 1e-5
 """Places that differ by less, in the armature's unit, are the same."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
 """Rotation mode -> the property in which a bone keeps its rotation."""
+MODES = ("QUATERNION", "AXIS_ANGLE", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+"""All rotation modes of Blender."""
 KEPT = ("rotation_mode", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
 """What is put aside of a bone."""
 KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
@@ -38,11 +40,16 @@ def kept(armature, bones) -> str:
     return json.dumps(found)
 
 
-def give_back(armature, text: str, keyed: bool = False) -> bool:
-    """Turn bones as `kept` found them, those that are still there; whether there was anything to give back. With `keyed`
-    those that animation has come to turn since, as Blender's Bake Action does, are left to that.
+def kept_in(text: str) -> dict[str, list]:
+    """What `kept` put aside, by bone; without what it never wrote."""
+    return remembered(text, _fits)
+
+
+def give_back(armature, text: str, keyed: bool = False) -> None:
+    """Turn bones as `kept` found them, those that are still there. With `keyed` those that animation has come to turn since,
+    as Blender's Bake Action does, are left to that.
     """
-    found, written = remembered(text), animated(armature.animation_data) if keyed else set()
+    found, written = kept_in(text), animated(armature.animation_data) if keyed else set()
     for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
         bone = _bone(armature, name, more, found) if armature.pose else None
         if bone is not None and (since := _written_since(bone, mode, more, written)):
@@ -52,7 +59,16 @@ def give_back(armature, text: str, keyed: bool = False) -> bool:
             bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
     if found:
         armature.update_tag()
-    return bool(found)
+
+
+def _fits(values: list) -> bool:
+    """Whether `kept` writes such values of a bone; earlier ones are without its place, or without modes."""
+    return (
+        4 <= len(values) <= 6
+        and values[0] in MODES
+        and all(are_numbers(numbers, count) for numbers, count in zip(values[1:5], (4, 3, 4, 6)))
+        and all(isinstance(modes, list) and set(map(str, modes)) <= set(CHANNELS) for modes in values[5:])
+    )
 
 
 def _modes(bone, written: set[str]) -> list[str]:

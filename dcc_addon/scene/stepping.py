@@ -9,7 +9,6 @@ import numpy as np
 from ..session import session
 from . import actions, rotations
 from .lookup import find
-from .remembered import remembered
 from .unkeyed import Unkeyed
 
 
@@ -33,7 +32,7 @@ class stepping:
         self._live = {}
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
             text = armature.neuralocks_character.rig_kept
-            self._live[armature.name_full] = rotations.kept(armature, remembered(text))
+            self._live[armature.name_full] = rotations.kept(armature, rotations.kept_in(text))
             rotations.give_back(armature, text, keyed=True)
         self._keyed = ExitStack()
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):

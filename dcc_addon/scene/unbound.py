@@ -21,7 +21,7 @@ def unbind(data, kept: str) -> None:
 def bind(data, kept: str) -> None:
     """Put the name back, unless another one was given meanwhile."""
     if data.library is None and _key(kept) in data:
-        data.surface_uv_map = data.surface_uv_map or data[_key(kept)]
+        data.surface_uv_map = data.surface_uv_map or str(data[_key(kept)])
         del data[_key(kept)]
 
 

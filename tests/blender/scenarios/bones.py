@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair bones: live, baked and exported the same, without their mesh, and with other names."""
 
+import json
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, bones_at, give_bone_model, messages
+from tests.blender.checks import SAME, apart, bones_at, give_bone_model, make_live, messages
 
 
 def bones(folder: Path) -> None:
@@ -132,3 +133,49 @@ def renamed_bones(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     scene.frame_set(7)
     assert "hair_01" in messages()["Rig"], messages()  # the model was made for other bones
+
+
+def forged_memories(folder: Path) -> None:
+    """What a file remembers of bones and modifiers may have been written by anybody: what nobody can have put aside is
+    ignored, the rest comes back, and live bones still know their rest.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig)
+    own, first, second = rig.neuralocks_character, rig.pose.bones["hair.01"], rig.pose.bones["hair.02"]
+    give_bone_model(rig, folder)
+    whole = [[0.9, 0.3, 0.1, -0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
+    first.rotation_mode = second.rotation_mode = "QUATERNION"
+    first.rotation_quaternion = whole[0]
+    rest = bones_at(rig, 12)
+    for values in (
+        [],
+        [[]],
+        ["XYZ"],
+        ["ABC", *whole],
+        ["XYZ", *whole[1:], whole[0]],
+        ["XYZ", *whole, [{}]],
+        ["XYZ", *whole, [0.0] * 6, [3]],
+    ):
+        own.rig_kept = json.dumps({"hair.01": values, "hair.02": ["QUATERNION", *whole]})
+        own.rig_live = True
+        bones_at(rig, 9)
+        own.rig_live = False
+        assert apart(np.array(second.rotation_quaternion), np.array(whole[0])) < 1e-6 and not own.rig_kept, values
+        first.rotation_quaternion, second.rotation_quaternion = whole[0], (1, 0, 0, 0)
+        own.rig_kept = json.dumps({"hair.01": values})
+        own.rig_live = True
+        assert apart(bones_at(rig, 12), rest) > 0.01, "not live"
+        own.rig_live = False
+        assert apart(bones_at(rig, 12), rest) < 1e-6 and not messages(), (values, messages())
+    scenes.surface_deform(strands)
+    make_live(rig, strands)
+    settings = strands.neuralocks_hair
+    settings.live = False
+    for values in ([], [3], [True], [True, 3], [True, "Input"], [[]], ["Nothing"]):
+        settings.muted = json.dumps({modifier.name: values for modifier in strands.modifiers} | {"Gone": values})
+        settings.live = True
+        bones_at(rig, 9)
+        settings.live = False
+        assert not settings.muted and not messages(), (values, messages())
