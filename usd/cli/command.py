@@ -16,6 +16,7 @@ import typer
 from neuralocks_core.errors import CannotWrite, NeuralocksError
 from neuralocks_core.json_values import plain
 
+from ..border.alike import told_once
 from ..border.stopping import deferred, stoppable, stopped
 
 
@@ -106,8 +107,8 @@ def one_line(text) -> None:
 
 
 def note(notes) -> None:
-    """Print what a user should know."""
-    for text in notes:
+    """Print what a user should know; of a crowd, what is the same of many prims once."""
+    for text in told_once(notes):
         one_line(f"note: {text}")
 
 

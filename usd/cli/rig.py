@@ -3,6 +3,7 @@
 
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -110,9 +111,9 @@ def bake(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write the hair joints' animation as an override layer of the shot.
+    """Write the hair joints' animation, of every character that has the model's chains, as an override layer of the shot.
 
-    Of several characters bake one with --skeleton, then the next from that bake: the last layer moves them all.
+    Where characters need different models, bake one with --skeleton, then the next from that bake: the last layer moves them all.
     """
     from ..rig.bake import bake_rig
 
@@ -133,10 +134,12 @@ def bake(
             progress=progress,
         )
     if as_json:
-        print_json(vars(result))
+        print_json(asdict(result))
     else:
+        rig, *others = result.rigs
+        also = f", and {counted(len(others), 'more character')}" if others else ""
         typer.echo(
-            f"{result.path}: {counted(result.joints, 'hair joint')}, {counted(result.samples, 'sample')}, in {result.animation}"
+            f"{result.path}: {counted(rig.joints, 'hair joint')}, {counted(rig.samples, 'sample')}, in {rig.animation}{also}"
         )
 
 

@@ -3,9 +3,11 @@
 
 from neuralocks_core.anatomy.joint_names import leaf
 
+from ..border.alike import grouped, told_once, without_paths
+
 
 def as_text(facts: dict, indent: int = 0) -> str:
-    """The facts for a person to read."""
+    """The facts for a person to read; what is the same of many prims but for their paths stands there once."""
     lines = []
     pad = "  " * indent
     for name, value in facts.items():
@@ -20,12 +22,14 @@ def as_text(facts: dict, indent: int = 0) -> str:
         elif isinstance(value, list) and value and isinstance(value[0], dict):
             if len(value[0]) <= 3:
                 lines.append(f"{pad}{name}:")
-            for entry in value:
+            for entry, *same in grouped(value, lambda entry: without_paths(repr(entry))):
                 if len(entry) <= 3:  # a line each
-                    first, *others = entry.items()
-                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
+                    for first, *others in (each.items() for each in (entry, *same)):
+                        lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
                     continue
                 lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
+                if same:
+                    lines.append(f"{pad}  likewise: {', '.join(str(next(iter(each.values()))) for each in same)}")
         elif name == "joint names":
             lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
         elif isinstance(value, list):
@@ -35,8 +39,8 @@ def as_text(facts: dict, indent: int = 0) -> str:
                 f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
             )
     if indent == 0:
-        lines += [f"would stop a bake: {line}" for line in facts.get("stops", [])]
-        lines += [f"note: {line}" for line in facts.get("spoils", [])]
+        lines += [f"would stop a bake: {line}" for line in told_once(facts.get("stops", []))]
+        lines += [f"note: {line}" for line in told_once(facts.get("spoils", []))]
     return "\n".join(line for line in lines if line)
 
 

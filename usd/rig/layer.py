@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The override layer of a rig bake: one SkelAnimation, the shot's own channels with new rotations of the hair joints."""
+"""The override layer of a rig bake: a SkelAnimation for each character, the shot's own channels with new rotations of the
+hair joints.
+"""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,27 +21,51 @@ from ..skel.rig_copy import hair_of, tell_source
 from .stage import BAKED, RiggedHair
 
 
-def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path, codes: list[float], turns) -> str:
+@dataclass(frozen=True)
+class MovedHair:
+    """How the hair joints of one character turn.
+
+    Attributes:
+        hair: the character as read.
+        codes: ascending time codes of the rotations, (T,).
+        turns: of the hair joints in their own bind axes as authored, (T, N, 4) wxyz.
+    """
+
+    hair: RiggedHair
+    codes: list[float]
+    turns: np.ndarray
+
+    @property
+    def joints(self) -> np.ndarray:
+        """Indices of the hair joints in the skeleton, (N,)."""
+        return self.hair.rig.chains.joints
+
+
+def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path) -> list[str]:
     """Write the layer; nothing under `out` but a complete file.
 
     Args:
-        hair: the shot as read.
-        joints: indices of the hair joints in its skeleton, (N,).
+        characters: of one shot.
         shot: file that the layer goes over.
         out: file to write.
-        codes: ascending time codes of the rotations, (T,).
-        turns: of the hair joints in their own bind axes as authored, (T, N, 4) wxyz.
 
     Returns:
-        path of the new SkelAnimation.
+        path of the new SkelAnimation of each.
 
     Raises:
         NeuralocksError: the file cannot be written.
     """
-    layer = Sdf.Layer.CreateAnonymous(out.suffix)
+    layer, hair = Sdf.Layer.CreateAnonymous(out.suffix), characters[0].hair
+    codes = sorted({code for character in characters for code in character.codes})
     write_header(layer, hair.stage, hair.border, shot, out, codes)
+    paths = [_write_animation(layer, character) for character in characters]
+    _save(layer, out)
+    return paths
+
+
+def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
+    hair, joints, source = character.hair, character.joints, character.hair.source.source
     prim = _animation_spec(layer, hair)
-    source = hair.source.source
     own = _usable_animation(source)
     order = [str(name) for name in own.GetJointsAttr().Get()] if own else []
     moved, kept = [source.names[j] for j in joints], kept_hair(source, joints)
@@ -63,7 +90,7 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     attribute = own.GetRotationsAttr() if own else None
     if _has_default(attribute):
         spec.default = Vt.QuatfArray(_joined(attribute, Usd.TimeCode.Default(), rest["rotations"]))
-    for code, turn in zip(codes, turns):
+    for code, turn in zip(character.codes, character.turns):
         values = _joined(attribute, code, rest["rotations"])
         # The second factors keep w > 0, so no sign flips between samples.
         for place, q in zip(places, quaternion_product(bind, turn)):
@@ -75,7 +102,6 @@ def write_rig_layer(hair: RiggedHair, joints: np.ndarray, shot: Path, out: Path,
     if source.animation is not None:
         _blend_shapes(layer, prim, UsdSkel.Animation(source.animation))
         tell_source(prim, source.animation, [*moved, *kept])
-    _save(layer, out)
     return str(prim.path)
 
 

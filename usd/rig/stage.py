@@ -35,6 +35,10 @@ RIG_JOINTS = rig_spec().pose_joints
 """Semantic joints that rig models read beside the head."""
 
 
+_FEW = 4
+"""So many prims are named in an error."""
+
+
 @dataclass(frozen=True)
 class RiggedHair:
     """One skeleton of a stage with hair chains.
@@ -55,7 +59,31 @@ class RiggedHair:
 
 
 @names_damage
-def read_rigged_hair(
+def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) -> RiggedHair:
+    """Read the rigged mesh hair of one character of a stage.
+
+    Args:
+        path: USD file.
+        baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
+        options: see `read_rigged_hairs`, as what it raises.
+
+    Raises:
+        NeuralocksError: there are several.
+    """
+    found, _ = read_rigged_hairs(path, **options)
+    if baked_first:
+        first, *others = sorted(found, key=lambda hair: not _is_baked(hair.source))
+        return replace(first, others=tuple(hair.source.path for hair in others))
+    if len(found) > 1:
+        few = ", ".join(hair.source.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")
+        raise NeuralocksError(
+            f"{path}: {len(found)} skeletons have hair chains ({few}); choose one with --skeleton PRIM"
+        )
+    return found[0]
+
+
+@names_damage
+def read_rigged_hairs(
     path: str | Path,
     *,
     skeleton: str | None = None,
@@ -64,21 +92,19 @@ def read_rigged_hair(
     joints: dict[str, str] | None = None,
     all_shapes: bool = False,
     cuts: list[float] | None = None,
-    baked_first: bool = False,
     unbaked: bool = False,
     model: HairChains | None = None,
-) -> RiggedHair:
-    """Read the rigged mesh hair of a stage.
+) -> tuple[list[RiggedHair], list[NeuralocksError]]:
+    """Read the rigged mesh hair of a stage, and why other skeletons with joints that are named like hair cannot be used.
 
     Args:
         path: USD file.
-        skeleton: path of the Skeleton prim; needed where several have hair chains.
+        skeleton: path of the only Skeleton prim to read.
         head: joint that carries the hair, if it is not named like a head.
         chains: name patterns of the chains' first joints, instead of finding them.
         joints: semantic joint -> joint path or its last part, where names do not tell.
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
-        baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
         unbaked: as for `read_rig`.
         model: a model's chains, in whatever names they have here: no guess is made then about which joints are hair.
 
@@ -105,25 +131,17 @@ def read_rigged_hair(
             source = read_rig(stage, prim, border, head, skins=skins, **given)
             wanted = chains if model is None else _of_model(model, source.character)
             rig = assemble_rig(source.character, core_meshes(source), wanted)
+            check_orients(source, rig.chains)
         except NeuralocksError as error:
-            errors.append(type(error)(_with_path(prim, error)))
+            errors.append((has_hair_joints(prim), type(error), _with_path(prim, error)))
             continue
         found.append(RiggedHair(stage, border, source, rig))
+    # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
+    hairy = [(kind, text) for named, kind, text in errors if named]
     if not found:
-        # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
-        hairy = [has_hair_joints(prim) for prim in prims]
-        raise errors[hairy.index(True) if any(hairy) else 0]
-    if baked_first:
-        first, *others = sorted(found, key=lambda hair: not _is_baked(hair.source))
-        found = [replace(first, others=tuple(hair.source.path for hair in others))]
-    if len(found) > 1:
-        paths = ", ".join(f.source.path for f in found)
-        raise NeuralocksError(
-            f"{path}: several skeletons have hair chains ({paths}); choose one with --skeleton PRIM; to bake them "
-            "all, bake the next from the bake of the one before"
-        )
-    check_orients(found[0].source, found[0].rig.chains)
-    return found[0]
+        kind, text = (hairy or [error[1:] for error in errors])[0]
+        raise kind(text)
+    return found, [kind(text) for kind, text in hairy]
 
 
 def _of_model(model: HairChains, character: Character) -> HairChains:

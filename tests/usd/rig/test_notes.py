@@ -195,4 +195,4 @@ def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp
         bake_rig(path, tmp_path / "out.usda", model)
     assert re.search(said, "\n".join(inspect(path)["stops"]))
     path = edited(lambda stage: hide(stage, 4))
-    assert bake_rig(path, tmp_path / "out.usda", model).samples and not inspect(path)["stops"]
+    assert bake_rig(path, tmp_path / "out.usda", model).rigs[0].samples and not inspect(path)["stops"]

@@ -35,7 +35,7 @@ def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, firs
     stage.SetEndTimeCode(24)
     stage.GetRootLayer().Save()
     out = bake_rig(shot=shot, out=tmp_path / "out.usda", model=model)
-    assert out.samples == len(read_rigged_hair(shot).source.time_codes)
+    assert out.rigs[0].samples == len(read_rigged_hair(shot).source.time_codes)
 
 
 def test_a_held_head_is_that_of_a_held_pose(tmp_path):
@@ -95,7 +95,7 @@ def test_a_body_that_nothing_animates_stays_where_it_rests(tmp_path):
     stage.Save()
     result = bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))
     baked = Usd.Stage.Open(str(result.path))
-    animation = UsdSkel.Animation(baked.GetPrimAtPath(result.animation))
+    animation = UsdSkel.Animation(baked.GetPrimAtPath(result.rigs[0].animation))
     assert [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()] == ["hair_0", "hair_1", "hair_2"]
 
 

@@ -70,7 +70,7 @@ def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path):
     for code, value in values.items():
         rotations.Set(value, code)
     stage.Save()
-    assert bake_rig(shot, tmp_path / "out.usda", model).samples == len(values)
+    assert bake_rig(shot, tmp_path / "out.usda", model).rigs[0].samples == len(values)
 
 
 def test_what_the_body_is_at_no_time_stays(tmp_path):

@@ -54,7 +54,7 @@ def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
     baked = bake_rig(tmp_path / "two.usda", tmp_path / "out.usda", model, skeleton="/B/Rig").path
     assert read_rigged_hair(baked, baked_first=True).source.path == "/B/Rig"
     assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).source.path == "/A/Rig"
-    with pytest.raises(NeuralocksError, match="several skeletons"):
+    with pytest.raises(NeuralocksError, match="2 skeletons have hair chains"):
         read_rigged_hair(baked)
 
 

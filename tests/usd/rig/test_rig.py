@@ -238,7 +238,7 @@ def test_an_open_stage_sees_what_was_baked_last(tmp_path):
     model = model_for(read_rigged_hair(shot))
     result = bake_rig(shot, tmp_path / "bake.usda", model)
     stage = Usd.Stage.Open(str(result.path))
-    turns = stage.GetAttributeAtPath(f"{result.animation}.rotations")
+    turns = stage.GetAttributeAtPath(f"{result.rigs[0].animation}.rotations")
     before = turns.GetNumTimeSamples()
     bake_rig(shot, result.path, model, subframes=2)
     assert turns.GetNumTimeSamples() > before

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdSkel
+from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
@@ -15,28 +15,57 @@ from usd.rig.stage import BAKED, read_rigged_hair
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 
-def test_the_next_is_baked_from_the_bake_of_the_one_before(tmp_path):
-    """As the message says that refuses to guess: the last layer moves all of them."""
-    one = small_shot(tmp_path / "one.usda")
+@pytest.fixture
+def crowd(tmp_path):
+    """Two characters that move alike, a third whose head stands still, a fourth with other hair, and one without any."""
+    one, still = small_shot(tmp_path / "one.usda"), small_shot(tmp_path / "still.usda", head_moves=False)
+    longer = small_shot(tmp_path / "longer.usda", step=0.11)
+    stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, file in (("A", one), ("B", one), ("Still", still), ("Longer", longer)):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(file))
+    UsdSkel.Skeleton.Define(stage, "/Prop").GetJointsAttr().Set(["lever"])
+    stage.Save()
     model = model_for(read_rigged_hair(one))
-    bake_rig(one, tmp_path / "alone.usda", model)
-    layer = Sdf.Layer.FindOrOpen(str(one))
-    both = Sdf.Layer.CreateNew(str(tmp_path / "both.usda"))
-    both.TransferContent(layer)
-    Sdf.CopySpec(layer, "/Who", both, "/Else")
-    both.Save()
-    with pytest.raises(
-        NeuralocksError, match="--skeleton PRIM; to bake them all, bake the next from the bake of the one"
-    ):
-        bake_rig(both.realPath, tmp_path / "out.usda", model)
-    bake_rig(both.realPath, tmp_path / "first.usda", model, skeleton="/Who/Rig")
-    bake_rig(tmp_path / "first.usda", tmp_path / "second.usda", model, skeleton="/Else/Rig")
-    stage, codes = Usd.Stage.Open(str(tmp_path / "second.usda")), [1, 7, 20]
-    wanted = hair_turns(tmp_path / "alone.usda", codes)
-    for who in ("Who", "Else"):
+    return tmp_path / "crowd.usda", model, bake_rig(one, tmp_path / "alone.usda", model).path
+
+
+def test_every_character_with_the_models_chains_moves(crowd, tmp_path):
+    shot, model, alone = crowd
+    result = bake_rig(shot, tmp_path / "out.usda", model)
+    assert [rig.skeleton for rig in result.rigs] == ["/A/Rig", "/B/Rig"]
+    left = [note for note in result.notes if "is left out" in note]
+    assert len(left) == 2 and left[0].startswith("/Longer/Rig: ") and "/Still/Rig: its head joint" in left[1]
+    codes = [1, 7, 20]
+    stage, wanted = Usd.Stage.Open(str(result.path)), hair_turns(alone, codes)
+    for who, moves in (("A", True), ("B", True), ("Still", False), ("Longer", False)):
         source = UsdSkel.BindingAPI(stage.GetPrimAtPath(f"/{who}/Rig")).GetInheritedAnimationSource()
-        assert str(source.GetPath()) == f"/{who}/Rig/{BAKED}"
-        np.testing.assert_array_equal(hair_turns(tmp_path / "second.usda", codes, who), wanted)
+        assert (source.GetName() == BAKED) == moves
+        if moves:
+            np.testing.assert_array_equal(hair_turns(result.path, codes, who), wanted)
+    with pytest.raises(NeuralocksError, match="4 skeletons have hair chains .*choose one with --skeleton"):
+        read_rigged_hair(shot, model=model.chains)
+
+
+def test_where_no_character_can_move_the_first_says_why(crowd, tmp_path):
+    shot, model, _ = crowd
+    stage = Usd.Stage.Open(str(shot))
+    for name in ("A", "B"):
+        stage.GetPrimAtPath(f"/{name}").SetActive(False)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="/Still/Rig: its head joint 'head' is not animated"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+    assert not (tmp_path / "out.usda").exists()
+
+
+def test_the_next_is_baked_from_the_bake_of_the_one_before(crowd, tmp_path):
+    """Where characters need different models: the last layer moves all of them."""
+    shot, model, alone = crowd
+    bake_rig(shot, tmp_path / "first.usda", model, skeleton="/A/Rig")
+    bake_rig(tmp_path / "first.usda", tmp_path / "second.usda", model, skeleton="/B/Rig")
+    codes = [1, 7, 20]
+    for who in ("A", "B"):
+        np.testing.assert_array_equal(hair_turns(tmp_path / "second.usda", codes, who), hair_turns(alone, codes))
 
 
 def test_the_documents_show_how_python_turns_one_or_many():

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One character of a rig bake: the model on its chains, its samples, the turns of its hair joints, and what to tell of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import UsdSkel
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig.carried import CarriedHair
+from neuralocks_core.rig.network import RigModel
+
+from ..border.time_codes import time_codes
+from ..shot.notes import on_twos, without_turn
+from ..shot.stage import frame_range
+from .layer import kept_hair
+from .stage import RiggedHair, mirrored_notes, rigged_notes
+
+STILL = 1e-4
+"""A rotation that differs by less from none is none."""
+
+
+@dataclass(frozen=True)
+class BoundHair:
+    """A rig model on the hair chains of one character of a shot.
+
+    Attributes:
+        hair: the character as read.
+        model: with the names that its joints have here.
+        size: how many times as large as the model's rig this one is.
+        trained_name: what the model calls its first joint.
+    """
+
+    hair: RiggedHair
+    model: RigModel
+    size: float
+    trained_name: str
+
+    @classmethod
+    def of(cls, hair: RiggedHair, model: RigModel) -> "BoundHair":
+        """Bind a model.
+
+        Raises:
+            NeuralocksError: it was made for other chains, or a joint that it reads cannot be told.
+        """
+        here, trained_name = hair.rig.chains, model.chains.names[0]
+        if here.names != model.chains.names:
+            model = replace(model, chains=replace(model.chains, names=here.names))
+        size = model.chains.check_same(here)
+        if stops := without_turn(hair.source, model.spec.pose_joints):
+            raise NeuralocksError(stops[0])
+        return cls(hair, model, size, trained_name)
+
+    @property
+    def joints(self) -> np.ndarray:
+        """Where the hair joints are in the skeleton, (N,)."""
+        return self.hair.rig.chains.joints
+
+    def codes(self, frames, subframes: int) -> tuple[list[float], list[float]]:
+        """The time codes that were asked for, see `time_codes.time_codes`, and those with the animation's own samples: the body
+        must come out sample for sample.
+        """
+        wanted = time_codes(
+            frames, *frame_range(self.hair.stage, [self.hair.source]), subframes, self.hair.border.frame
+        )
+        own = self._rotation_samples()
+        # A frame and a sample at the same time, up to rounding, are one.
+        edges = np.array([-np.inf, *own, np.inf])
+        after = np.searchsorted(edges, wanted)
+        near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * self.hair.border.frame
+        return wanted, sorted({*np.array(wanted)[~near].tolist(), *own})
+
+    def turns(
+        self, codes: list[float], loop: bool, strength: float, say: Callable[[], None]
+    ) -> tuple[np.ndarray, list[str]]:
+        """Turns of the hair joints (T, N, 4) wxyz in their own bind axes as authored, and notes on them.
+
+        Args:
+            codes: time codes, (T,).
+            loop, strength: see `bake.bake_rig`.
+            say: called after each.
+
+        Raises:
+            NeuralocksError: the head is held as it was bound, so that no hair would move.
+        """
+        source, chains = self.hair.source, self.model.chains
+        clip = replace(source.clip, loop=True) if loop else source.clip
+        carried = CarriedHair(self.model, self.joints, source.character, clip)
+        turns = np.empty((len(codes), len(chains), 4))
+        for row, code in enumerate(codes):
+            # One at a time: a matrix product may round otherwise for other batches.
+            second = self.hair.border.seconds([code])
+            wrapped = clip.loop and not clip.start <= second[0] <= clip.end
+            shown = clip.at(second) if wrapped else source.joints_at(code)[None]
+            turns[row] = carried.turns(second, strength, shown)[0]
+            say()
+        turns = source.authored_turns(self.joints, chains.turns_on(self.hair.rig.chains, turns))
+        return turns, self._held(carried.carriers, turns)
+
+    def notes(self, wanted: list[float], loop: bool, find_cuts: bool) -> list[str]:
+        """What a user should know before hair is turned at these time codes."""
+        rig, read = self.hair.source, self.model.spec.pose_joints
+        return [
+            *self._renamed(),
+            *self._resized(),
+            *rigged_notes(rig, read),
+            *_name_notes(rig.source),
+            *mirrored_notes(rig, self.hair.rig.chains),
+            *(rig.loop_notes(wanted, self.joints) if loop else []),
+            *(on_twos(rig, read) if self.model.dynamic else []),
+            *(rig.cut_notes(loop) if (loop or find_cuts) and self.model.dynamic else []),
+        ]
+
+    def _rotation_samples(self) -> list[float]:
+        source = self.hair.source.source
+        read = [source.animation] + [source.copied] * bool(kept_hair(source, self.joints))
+        attributes = [UsdSkel.Animation(prim).GetRotationsAttr() for prim in read if prim]
+        return sorted({code for attribute in attributes for code in attribute.GetTimeSamples()})
+
+    def _held(self, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
+        """The note on a head that is held still, with all else that carries hair; see `turns` for what it raises."""
+        rig = self.hair.source
+        source, character, joints = rig.source, rig.character, rig.clip.joints
+        if np.ptp(joints[:, carriers], axis=0).max() >= 1e-7:
+            return []
+        if source.ignored:
+            raise NeuralocksError(source.ignored)
+        name = leaf(character.skeleton.names[character.head])
+        turned = np.abs((joints[0, carriers] @ character.inverse_bind[carriers])[:, :3, :3] - np.eye(3)).max()
+        if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
+            raise NeuralocksError(
+                f"{rig.path}: its head joint '{name}' is not animated, so the hair would not move; "
+                "animate the skeleton, or name the joint that carries the hair with --head JOINT"
+            )
+        return [f"{rig.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
+
+    def _renamed(self) -> list[str]:
+        """The note on joints that are called otherwise than in the rig that the model was trained for."""
+        here = self.model.chains.names[0]
+        if here == self.trained_name:
+            return []
+        return [f"model: its joints have other names here, '{here}' for '{self.trained_name}'"]
+
+    def _resized(self) -> list[str]:
+        """The note on a character of another size than the model's."""
+        if self.size == 1:
+            return []
+        return [
+            f"{self.hair.source.source.path}: is {self.size:.2f} times as large as the character that the model was trained for; its "
+            "hair swings as fast as that one's"
+        ]
+
+
+def _name_notes(source) -> list[str]:
+    """Blender names a bone after the last part of its joint's path, and cuts that at 63 bytes."""
+    leaves = [leaf(name) for name in source.names]
+    long = next((n for n in leaves if len(n.encode()) > 63), None)
+    if long:
+        return [f"{source.path}: the name of joint '{long}' has more than 63 bytes in UTF-8; Blender cuts it"]
+    double = next((n for n in leaves if leaves.count(n) > 1), None)
+    if double:
+        return [f"{source.path}: several joints are named '{double}'; Blender renames all but one"]
+    return []
