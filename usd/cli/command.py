@@ -16,7 +16,7 @@ import typer
 from neuralocks_core.errors import CannotWrite, NeuralocksError
 from neuralocks_core.json_values import plain
 
-from ..border.alike import told_once
+from ..border.told_once import told_once
 from ..border.stopping import deferred, stoppable, stopped
 
 

@@ -3,7 +3,7 @@
 
 from neuralocks_core.anatomy.joint_names import leaf
 
-from ..border.alike import grouped, told_once, without_paths
+from ..border.told_once import grouped, told_once, without_paths
 
 
 def as_text(facts: dict, indent: int = 0) -> str:

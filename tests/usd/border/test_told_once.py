@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is the same of many prims is told once; what differs in anything else stays."""
 
-from usd.border.alike import told_once
+from usd.border.told_once import told_once
 from usd.review.facts_text import as_text
 
 
