@@ -16,8 +16,8 @@ import typer
 from neuralocks_core.errors import CannotWrite, NeuralocksError
 from neuralocks_core.json_values import plain
 
-from ..border.told_once import told_once
 from ..border.stopping import deferred, stoppable, stopped
+from ..border.told_once import told_once
 
 
 def command_of(app: typer.Typer):
