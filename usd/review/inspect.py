@@ -49,7 +49,8 @@ from ..shot.notes import (
 from ..shot.recorded import recorded, recorded_cuts, retimed
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import frame_range
-from ..skel.source import StageRig, find_skeletons
+from ..skel.source import find_skeletons
+from ..skel.stage_rig import StageRig
 
 
 def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:

@@ -6,7 +6,7 @@ import numpy as np
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 
 ASKEW = 2.0
 """A bind pose that faces further off a stage's axis [degrees] is told."""

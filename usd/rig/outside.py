@@ -9,7 +9,7 @@ from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.hair_names import says_hair_alone
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 
 
 def outside_notes(source: StageRig) -> list[str]:

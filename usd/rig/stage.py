@@ -24,7 +24,8 @@ from ..border.units import Border
 from ..shot.character_notes import lies_down
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import another_head, unfound, unlikely_head
-from ..skel.source import StageRig, find_skeletons, read_rig
+from ..skel.source import find_skeletons, read_rig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins, rest_primvar
 from .facing import facing_notes
 from .outside import left_out_notes, outside_notes

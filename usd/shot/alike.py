@@ -7,7 +7,7 @@ from pxr import Sdf, Usd
 from neuralocks_core.anatomy.joint_names import words
 from neuralocks_core.errors import NeuralocksError
 
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from .seat import CLEARLY, Seat, kinship
 
 SAME = 0.01

@@ -10,7 +10,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 
 from ..border.placement import Placement
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from .seat import some_places
 
 STILL = 1e-4

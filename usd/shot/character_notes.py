@@ -17,7 +17,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
 from ..border.values import as_numbers
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import bound_skeleton, drawn
 from .notes import partial_body, unlikely_head
 from .seat import beginnings

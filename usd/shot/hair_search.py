@@ -11,7 +11,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 
 from ..border.placement import Placement
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import bound_skeleton
 from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained

@@ -21,7 +21,7 @@ from neuralocks_core.strands.arclength import count_pointlike
 from ..border.damage import text_of
 from ..border.stage_files import unsaved
 from ..border.units import Border
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from .alike import one_person
 from .attach import Attachment, rig_joint
 

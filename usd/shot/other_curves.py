@@ -11,7 +11,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
 from ..border.values import as_numbers
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import rest_value
 from .attach import REACH
 from .seat import NEAR, ways

@@ -18,7 +18,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import StageMesh
 from .curve_ends import Beyond, beyond_ends, ends
 from .curves import moment, rest_points

@@ -9,7 +9,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.rotation import inverse, sizes, transformed
 
 from ..border.placement import Placement
-from ..skel.source import StageRig
+from ..skel.stage_rig import StageRig
 from .curve_ends import Beyond
 from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends, some_places
 

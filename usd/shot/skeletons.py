@@ -10,7 +10,8 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..border.placement import Placement
 from ..border.units import Border
-from ..skel.source import StageRig, read_rig
+from ..skel.source import read_rig
+from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins
 from .attach import bound_joint
 from .curves import find_curves, rest_points, without_points

@@ -16,7 +16,8 @@ from ..border.placement import Placement
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
 from ..border.units import Border
-from ..skel.source import StageRig, find_skeletons
+from ..skel.source import find_skeletons
+from ..skel.stage_rig import StageRig
 from .attach import Attachment, off_head, rig_joint
 from .character_notes import lies_down, without_body
 from .curve_ends import Beyond, groom_between

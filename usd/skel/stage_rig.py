@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One skeleton of a stage, as it was read."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import LOOP_GAP, Clip
+from neuralocks_core.rotation import angle_between, transformed
+
+from ..border.units import Border
+from .joints import JointSource
+from .motion_sketch import motion_sketch
+from .surface import StageMesh
+
+
+@dataclass(frozen=True)
+class StageRig:
+    """One skeleton with its body and motion.
+
+    Attributes:
+        path: the Skeleton prim.
+        source: the skeleton as authored.
+        border: the stage's units.
+        meshes: what it skins.
+        to_bind: authored bind space to bind world [m], (4, 4).
+        character: in core axes and metres.
+        clip: world joint transforms at the time codes `time_codes`.
+        time_codes: (T,).
+        notes: what a user should know about it.
+        by_hand: semantic joint -> joint, as the user named them.
+    """
+
+    path: str
+    source: JointSource = field(repr=False)
+    border: Border
+    meshes: list[StageMesh] = field(repr=False)
+    to_bind: np.ndarray = field(repr=False)
+    character: Character = field(repr=False)
+    clip: Clip = field(repr=False)
+    time_codes: np.ndarray = field(repr=False)
+    notes: list[str] = field(repr=False)
+    by_hand: dict[str, str] = field(default_factory=dict, repr=False)
+    _carrying: dict[tuple[int, float], np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+
+    def carrying_at(self, time_code: float) -> np.ndarray:
+        """What the carrying joint does to bind world [m] at a time code, (4, 4), remembered: each groom of a crowd asks each
+        character for it at the same few; nothing where it has no head.
+        """
+        if "head" not in self.character.humanoid:
+            return np.eye(4)
+        key = self.character.carrying_joint, time_code
+        if key not in self._carrying:
+            self._carrying[key] = self.character.carrying(self.joints_at(time_code))
+        return self._carrying[key]
+
+    def joints_at(self, time_code: float) -> np.ndarray:
+        """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
+        return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+
+    def authored_turns(self, joints: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, out of those in the core's: a turn
+        about axes that `joint_trim` mirrors along x is (w, x, -y, -z) in the file's.
+        """
+        result = np.array(turns)
+        result[..., self._trim[joints, 0, 0] < 0, 2:] *= -1
+        return result
+
+    def loop_notes(self, codes=(), replaced=()) -> list[str]:
+        """What is wrong with the motion as a loop, whose last sample must show the pose of its first, and with time codes at
+        which it is to be baked.
+
+        Args:
+            codes: ascending time codes that were asked for.
+            replaced: joints that a bake replaces; how these move does not matter.
+        """
+        ends = self.clip.joints[[0, -1], :, :3, :3]
+        first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
+        turn = np.degrees(angle_between(first, last))
+        for joint in replaced:  # and what hangs from it
+            turn[self.character.skeleton.below(joint)] = 0
+        start, end = self.time_codes[[0, -1]]
+        notes = []
+        if turn.max() > LOOP_GAP:
+            # What hangs from a joint turns with it, up to rounding: the first of them is the one that does.
+            name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
+            notes.append(
+                f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
+                "a loop ends with the pose that it begins with"
+            )
+        if len(codes) and (codes[0] < start or codes[-1] > end):
+            notes.append(
+                f"{self.path}: its animation goes from {start:g} to {end:g}; outside of that its hair moves on as the loop "
+                "does while the body stands, so bake one round and repeat it"
+            )
+        return notes
+
+    def cut_notes(self, loop: bool = False) -> list[str]:
+        """Where the hair starts anew, if it does anywhere, and where it does not, though the head leaps; of a loop, in which it
+        never does, where it ought to.
+        """
+        if "head" not in self.character.humanoid:
+            return []
+        # A loop was read as if it had none.
+        cuts = find_cuts(self.clip, self.character.head) if loop else self.clip.cuts
+        flashes = [] if loop else find_flashes(self.clip, self.character.head)
+        what = (
+            "a loop has no cuts, so the hair is flung there; leave out --loop, or repair the animation"
+            if loop
+            else "the hair starts anew there (--cuts says where)"
+        )
+        notes = [f"{self.path}: its head is put elsewhere at {self._named(cuts)}; {what}"] if len(cuts) else []
+        if len(flashes):
+            every = self._named(np.union1d(cuts, flashes))
+            notes.append(
+                f"{self.path}: its head leaps at {self._named(flashes)}, less than {APART:g} s from one leap to the next, so these "
+                f"are no cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
+            )
+        return notes
+
+    def _named(self, times: np.ndarray) -> str:
+        """The time codes of samples of the clip [s], as `--cuts` takes them."""
+        codes = self.time_codes[np.searchsorted(self.clip.times, times - 1e-9)]
+        return ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
+
+    @cached_property
+    def skins(self) -> list[cKDTree]:
+        """The points of each mesh in bind world [m], by nearness."""
+        return [cKDTree(transformed(mesh.points, self.to_bind @ mesh.geom_bind)) for mesh in self.meshes]
+
+    @cached_property
+    def surface(self) -> Collider | None:
+        """The body in bind pose, for distances from its faces; None where it has no face."""
+        body = self.character.body
+        try:
+            return None if body is None else Collider(body.points, body.triangles)
+        except NeuralocksError:  # a mesh of points alone
+            return None
+
+    @cached_property
+    def motion_sketch(self) -> str:
+        """What `motion_sketch` tells of it."""
+        return motion_sketch(self.source, self.border.rate)
+
+    @cached_property
+    def _to_world(self) -> np.ndarray:
+        return self.border.to_core
+
+    @cached_property
+    def _trim(self) -> np.ndarray:
+        return joint_trim(self.source, self.to_bind)
+
+
+def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:
+    """Per joint, the scale (J, 4, 4) that makes its bind transform a plain rotation and translation.
+
+    Applied to bind and posed transforms alike it cancels; it keeps stage units, and the mirrored joint orients of some
+    rigs, out of the core.
+    """
+    determinant = np.linalg.det((to_bind @ source.bind)[:, :3, :3])
+    trim = np.zeros((len(determinant), 4, 4))
+    size = 1 / np.cbrt(np.abs(determinant))
+    trim[:, 0, 0] = size * np.sign(determinant)
+    trim[:, 1, 1] = trim[:, 2, 2] = size
+    trim[:, 3, 3] = 1
+    return trim
