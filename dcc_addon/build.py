@@ -9,7 +9,7 @@ import argparse
 import shutil
 import subprocess
 import sys
-import tempfile
+import uuid
 import zipfile
 from pathlib import Path
 
@@ -27,8 +27,12 @@ PINNED = ("onnxruntime", "usd-core")
 """Packages that come along as `constraints.txt` has them. numpy is Blender's own."""
 HELD_BACK = {"scipy": "1.15.3"}
 """The newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons."""
-OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}}
-"""The last with wheels for a platform; on Linux it gives the same points as the newest, bit for bit."""
+OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}, "windows-x64": {"onnxruntime": "1.20.1"}}
+"""The last with wheels for Intel Macs, which on Linux gives the same points as the newest, bit for bit; and the last that begins
+with the C++ runtime that Blender 4.2 to 5.0 bring along on Windows (14.29: later ones want 14.40), 0.05 mm off at most.
+"""
+BLENDERS_OWN = {"windows-x64": ("usd-core",)}
+"""What is left to Blender, which has it, too: Windows would take Blender's usd_ms.dll for that of usd-core, which is called so."""
 ENDED = {"macos-x64": ("3.13",)}
 """Pythons that no Blender of a platform has: the last for Intel Macs is 4.5 LTS."""
 LEGACY = ("linux-x64", "3.11")
@@ -81,6 +85,8 @@ def download(folder: Path, versions: dict[str, str], platform: str, python: str)
     folder.mkdir(parents=True, exist_ok=True)
     found = []
     for name, version in versions.items():
+        if name in BLENDERS_OWN.get(platform, ()):
+            continue
         version = OLDER.get(platform, {}).get(name, version)
         pattern = f"{name.replace('-', '_')}-{version}-*.whl"
         if not list(folder.glob(pattern)):
@@ -152,8 +158,9 @@ class Written:
         self._path = path
 
     def __enter__(self) -> zipfile.ZipFile:
-        self._folder = tempfile.TemporaryDirectory(dir=self._path.parent, prefix=".zip-")
-        self._part = Path(self._folder.name) / self._path.name
+        self._folder = self._path.parent / f".zip-{uuid.uuid4().hex}"
+        self._folder.mkdir()
+        self._part = self._folder / self._path.name
         self._archive = zipfile.ZipFile(self._part, "w", zipfile.ZIP_DEFLATED, compresslevel=6)
         return self._archive
 
@@ -161,7 +168,7 @@ class Written:
         self._archive.close()
         if kind is None:
             self._part.replace(self._path)
-        self._folder.cleanup()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,9 @@
 
 import errno
 import os
-import tempfile
+import shutil
+import time
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -11,6 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import CannotWrite, NeuralocksError
+
+_HOLDS_OPEN_FILES = os.name == "nt"
+_PAUSES = (0.05, 0.2, 0.5)
+_ASIDE = ".replaced"
 
 
 @contextmanager
@@ -30,12 +36,12 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     try:
         made = make_way(path)
         try:
-            with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-", ignore_cleanup_errors=True) as folder:
-                part = Path(folder) / path.name
+            with own_folder(path.parent) as folder:
+                part = folder / path.name
                 yield part
                 with open(part, "rb+") as file:  # else a power cut may leave the name with nothing under it
                     os.fsync(file.fileno())
-                os.replace(part, path)
+                put_in_place(part, path)
         except BaseException:
             remove_empty(made)
             raise
@@ -56,12 +62,62 @@ def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
                 np.savez(file, **arrays)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(temporary, path)
+            put_in_place(temporary, path)
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+@contextmanager
+def own_folder(parent: Path) -> Iterator[Path]:
+    """A new hidden folder, which goes with all that is in it. Unlike one of `tempfile`, whose rights on Windows stay with the
+    files that are moved out of it, it is nobody's private one; and where no folder can be made, that is told at once.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    folder = parent / f".part-{uuid.uuid4().hex}"
+    folder.mkdir()
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def put_in_place(part: Path, path: Path) -> None:
+    """Give a file its final name, in place of what is there.
+
+    Windows replaces no file that a program shows, and lends files to virus scanners for a moment. So it is tried again for
+    about a second; then the old file steps aside, which Windows allows, and is removed once nobody shows it: by the next call.
+
+    Raises:
+        OSError: it cannot be done; both files are as they were.
+    """
+    try:
+        os.replace(part, path)
+        return
+    except PermissionError:
+        if not _HOLDS_OPEN_FILES:
+            raise
+    for stray in path.parent.glob(f".{path.name}.*{_ASIDE}"):
+        with suppress(OSError):
+            stray.unlink()
+    for pause in _PAUSES:
+        time.sleep(pause)
+        with suppress(PermissionError):
+            os.replace(part, path)
+            return
+    aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}{_ASIDE}")
+    os.rename(path, aside)
+    try:
+        os.replace(part, path)
+    except BaseException:
+        os.rename(aside, path)
+        raise
+    with suppress(OSError):
+        aside.unlink()
 
 
 def make_way(path: Path) -> list[Path]:
@@ -96,5 +152,7 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:
         return CannotWrite(f"{path}: no space left on the disk; free some, or choose another folder")
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         return CannotWrite(f"{path}: there is a file, not a folder, on the way; choose another folder")
+    if _HOLDS_OPEN_FILES and isinstance(error, PermissionError) and os.path.exists(path):
+        return CannotWrite(f"{path}: cannot be written; close the program that has it open, or choose another name")
     fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
     return CannotWrite(f"{path}: cannot be written ({fact}); choose a folder you can write to")

@@ -65,8 +65,9 @@ def _taken(path: Path):
         return None
     try:
         _lock(lock)
-        # Whoever opens the file before it is removed, and locks it after, holds a file that others cannot see.
-        if os.path.samestat(os.fstat(lock.fileno()), os.stat(path)):
+        # Whoever opens the file before it is removed, and locks it after, holds a file that others cannot see. Windows removes
+        # no open file, and its network drives may number one file in two ways.
+        if os.name == "nt" or os.path.samestat(os.fstat(lock.fileno()), os.stat(path)):
             return lock
     except FileNotFoundError:
         pass

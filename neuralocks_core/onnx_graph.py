@@ -25,7 +25,7 @@ class OnnxGraph:
             from onnx import helper, numpy_helper
         except ImportError:
             raise NeuralocksError(
-                "onnx: not installed, it writes the model's graph; pip install 'neuralocks[train]'"
+                'onnx: not installed, it writes the model\'s graph; pip install "neuralocks[train]"'
             ) from None
         self.helper, self.numpy_helper = helper, numpy_helper
         self.name, self.nodes, self.constants = name, [], []

@@ -23,7 +23,7 @@ def start_warp(device: str) -> ModuleType:
     try:
         import warp as wp
     except ImportError as missing:
-        raise NeuralocksError("warp: is not installed; pip install 'neuralocks[compare]'") from missing
+        raise NeuralocksError('warp: is not installed; pip install "neuralocks[compare]"') from missing
     wp.config.log_level = wp.LOG_ERROR
     wp.config.enable_backward = False
     with _quiet() if device == "cpu" else nullcontext():

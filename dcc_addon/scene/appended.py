@@ -7,7 +7,7 @@ import os
 
 import bpy
 
-from .paths import library_of
+from .paths import full, library_of
 from .save_as import relative, set_path
 
 
@@ -28,5 +28,5 @@ def remake(items, settings) -> None:
         for setting in settings:
             path = thing.path_resolve(setting)
             if path.startswith("//") and library_of(thing, setting) is None:
-                full = os.path.normpath(bpy.path.abspath(path, library=library))
-                set_path(thing, setting, relative(full, here) if here else full)
+                whole = os.path.normpath(full(path, library))
+                set_path(thing, setting, relative(whole, here) if here else whole)

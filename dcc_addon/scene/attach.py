@@ -9,6 +9,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
+from .paths import full
 from .save_as import named_here
 
 MODIFIER = "Neuralocks Cache"
@@ -150,5 +151,5 @@ def _cache_file(path: str):
 
 
 def _is(cache, path: str) -> bool:
-    named = bpy.path.abspath(cache.filepath, library=cache.library)
+    named = full(cache.filepath, cache.library)
     return os.path.normcase(os.path.abspath(named)) == os.path.normcase(os.path.abspath(path))

@@ -20,6 +20,13 @@ def absolute(path: str, library=None) -> str:
         raise NeuralocksError(
             f"{path}: this file is not saved yet, so there is no folder beside it; save the file or choose a full path"
         )
+    return full(path, library)
+
+
+def full(path: str, library=None) -> str:
+    """The same, unchecked. What Windows wrote after the // may part folders by backslashes, which are letters elsewhere."""
+    if path.startswith("//"):
+        path = path.replace("\\", "/")
     return bpy.path.abspath(path, library=library)
 
 

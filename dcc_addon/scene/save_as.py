@@ -7,7 +7,7 @@ import os
 
 import bpy
 
-from .paths import library_of
+from .paths import full, library_of
 
 
 class Remade:
@@ -23,7 +23,7 @@ class Remade:
                 path = thing.path_resolve(setting)
                 if path.startswith("//") and library_of(thing, setting) is None:
                     self._kept.append((thing.name, setting, path))
-                    set_path(thing, setting, relative(bpy.path.abspath(path), folder))
+                    set_path(thing, setting, relative(full(path), folder))
 
     def put_back(self) -> None:
         """Take that back if this is still the file that it was: after a copy was saved, or nothing was."""
@@ -39,9 +39,10 @@ def named_here(path: str) -> str:
 
 
 def relative(path: str, folder: str) -> str:
-    """An absolute path as it is named in a file in `folder`; itself on another drive."""
-    same = os.path.splitdrive(path)[0] == os.path.splitdrive(folder)[0]
-    return bpy.path.relpath(path, start=folder) if same else path
+    """An absolute path as it is named in a file in `folder`, so that every system finds it; itself on another drive."""
+    if os.path.splitdrive(path)[0] != os.path.splitdrive(folder)[0]:
+        return path
+    return bpy.path.relpath(path, start=folder).replace(os.sep, "/")
 
 
 def set_path(thing, setting: str, path: str) -> None:

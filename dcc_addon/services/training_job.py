@@ -13,6 +13,8 @@ from pathlib import Path
 
 CHILD = Path(__file__).with_name("training_child.py")
 ADDON = Path(__file__).resolve().parent.parent
+_NEW_GROUP, _NO_WINDOW = 0x00000200, 0x08000000
+"""How Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console of its own."""
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
 """For a child's input and output. In a code page of Windows, a letter that it lacks would end the reader."""
 
@@ -36,6 +38,7 @@ def problem(python: str) -> str:
             **UTF8,
             timeout=60,
             stdin=subprocess.DEVNULL,
+            creationflags=_NO_WINDOW if os.name == "nt" else 0,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"{python}: cannot be run ({type(error).__name__}); {remedy}"
@@ -50,7 +53,8 @@ def installing() -> str:
     checkout, with that. No package index has the project.
     """
     wheel = next((ADDON / "wheels").glob("neuralocks-*.whl"), None)
-    return f'python3 -m pip install "{wheel or ADDON.parent}[train]"'
+    python = "py" if os.name == "nt" else "python3"
+    return f'{python} -m pip install "{wheel or ADDON.parent}[train]"'
 
 
 def environment() -> dict[str, str]:
@@ -84,7 +88,7 @@ class TrainingJob:
         self.notes: list[str] = []
         self._began = time.monotonic()
         self._cancelled = False
-        group = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x00000200}
+        group = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP | _NO_WINDOW}
         self._process = subprocess.Popen(
             [python, str(CHILD)],
             stdin=subprocess.PIPE,
@@ -129,8 +133,11 @@ class TrainingJob:
     def _end(self, hard: bool) -> None:
         if os.name == "posix":
             os.killpg(self._process.pid, signal.SIGKILL if hard else signal.SIGTERM)
-        else:
-            self._process.terminate()
+        else:  # `terminate` would leave those that it started at work
+            command = ["taskkill", "/T", "/F", "/PID", str(self._process.pid)]
+            subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, creationflags=_NO_WINDOW, check=False
+            )
 
     def failure(self) -> str:
         """Why it failed, in one line."""

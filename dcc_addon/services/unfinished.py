@@ -3,10 +3,13 @@
 
 import os
 import shutil
-from contextlib import contextmanager
+import uuid
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from neuralocks_core.files import cannot_write, remove_empty
+from neuralocks_core.files import cannot_write, put_in_place, remove_empty
+
+_BEFORE = ".before"
 
 
 @contextmanager
@@ -18,7 +21,8 @@ def undone_on_failure(*paths: Path):
         NeuralocksError: what is there cannot be kept meanwhile.
     """
     made = [folder for path in paths for folder in path.parents if not folder.exists()]
-    kept = {path: path.with_name(f".{path.name}.before") for path in paths if path.is_file()}
+    # Windows removes no file that a program shows: what stays of an earlier time must not be in the way.
+    kept = {path: path.with_name(f".{path.name}.{uuid.uuid4().hex}{_BEFORE}") for path in paths if path.is_file()}
     try:
         for path, before in kept.items():
             _keep(path, before)
@@ -26,24 +30,28 @@ def undone_on_failure(*paths: Path):
             yield
         except BaseException:
             for path in paths:
-                if path not in kept:
-                    path.unlink(missing_ok=True)
-                elif kept[path].exists():
-                    os.replace(kept[path], path)
+                with suppress(OSError):  # what went wrong before is what is told
+                    if path not in kept:
+                        path.unlink(missing_ok=True)
+                    elif kept[path].exists():
+                        put_in_place(kept[path], path)
             remove_empty(made)
             raise
     finally:
         for before in kept.values():
-            before.unlink(missing_ok=True)
+            with suppress(OSError):
+                before.unlink(missing_ok=True)
 
 
 def _keep(path: Path, before: Path) -> None:
     """Another name for a file, which what is put in its place does not change."""
-    before.unlink(missing_ok=True)
+    for stray in path.parent.glob(f".{path.name}.*{_BEFORE}"):
+        with suppress(OSError):
+            stray.unlink()
     try:
-        os.link(path, before)
-    except OSError:  # not on this file system
         try:
+            os.link(path, before)
+        except OSError:  # not on this file system
             shutil.copy2(path, before)
-        except OSError as error:
-            raise cannot_write(path, error) from None
+    except OSError as error:
+        raise cannot_write(path, error) from None

@@ -31,7 +31,7 @@ class Collider:
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
         self.points = np.asarray(points, float)
-        triangles = np.asarray(triangles, int).reshape(-1, 3)
+        triangles = np.asarray(triangles, np.int64).reshape(-1, 3)
         if not np.isfinite(self.points).all():
             raise NeuralocksError("body: some points are not finite; repair the mesh or its animation")
         if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(self.points)):

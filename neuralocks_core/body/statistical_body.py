@@ -111,7 +111,7 @@ def _load_anny():
         from anny import Anny
         from anny.paths import get_anny_cache_path, set_anny_cache_path
     except ImportError:
-        remedy = "run: pip install 'neuralocks[body]'"
+        remedy = 'run: pip install "neuralocks[body]"'
         raise NeuralocksError(f"anny: the statistical body is not installed; {remedy}") from None
     from neuralocks_core.warp_device import start_warp
 

@@ -198,7 +198,7 @@ def check_plot(path: str | os.PathLike) -> Path:
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; give a file name")
     if find_spec("matplotlib") is None:
-        raise NeuralocksError(f"{path}: matplotlib is not installed; pip install 'neuralocks[compare]'")
+        raise NeuralocksError(f'{path}: matplotlib is not installed; pip install "neuralocks[compare]"')
     return path
 
 

@@ -161,4 +161,4 @@ def _need(module: str) -> None:
 
     if find_spec(module) is None:
         package = {"PIL": "pillow"}.get(module, module.replace("_", "-"))
-        raise NeuralocksError(f"preview: {package} is not installed; pip install 'neuralocks[preview]'")
+        raise NeuralocksError(f'preview: {package} is not installed; pip install "neuralocks[preview]"')

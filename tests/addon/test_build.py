@@ -46,3 +46,23 @@ def test_zips_hold_what_blender_expects(tmp_path):
     assert json.dumps(manifest["version"]) == json.dumps(
         build.version((build.HERE / "blender_manifest.toml").read_text())
     )
+
+
+def test_windows_gets_what_runs_beside_blenders_own_libraries(tmp_path, monkeypatch):
+    """Blender's usd_ms.dll and C++ runtime are loaded before ours would be."""
+
+    def fetch(*arguments):
+        name, _, version = arguments[-1].partition("==")
+        folder = tmp_path / arguments[arguments.index("-d") + 1]
+        (folder / f"{name.replace('-', '_')}-{version}-cp311-none-{arguments[5]}.whl").touch()
+
+    monkeypatch.setattr(build, "pip", fetch)
+    versions = build.compiled()
+    for platform in ("linux-x64", "windows-x64"):
+        got = {
+            wheel.name.split("-")[0]: wheel.name.split("-")[1]
+            for wheel in build.download(tmp_path / platform, versions, platform, "3.11")
+        }
+        windows = platform == "windows-x64"
+        assert ("usd_core" in got) != windows and set(got) >= {"onnxruntime", "scipy"}
+        assert (got["onnxruntime"] == "1.20.1") == windows

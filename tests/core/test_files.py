@@ -2,11 +2,14 @@
 """A file is whole or not there, whatever happens while it is written."""
 
 import errno
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core import files
+from neuralocks_core.errors import CannotWrite, NeuralocksError
 from neuralocks_core.files import atomic_write, replace_npz
 from tests.full_disk import room_for
 
@@ -53,3 +56,57 @@ def test_arrays_that_find_no_room_leave_those_that_were_there(tmp_path):
     with pytest.raises(NeuralocksError, match="a.npz: no space"), room_for(10_000):
         replace_npz(path, {"many": np.zeros(10_000)})
     assert np.load(path)["few"].size == 3 and list(tmp_path.iterdir()) == [path]
+
+
+class _Windows:
+    """Refuses, as Windows does, to replace or remove files that a program shows; to rename them it allows."""
+
+    def __init__(self, monkeypatch, shown: Path):
+        self._shown, self._identity = shown, shown.stat().st_ino
+        self._replace, self._unlink = os.replace, Path.unlink
+        monkeypatch.setattr(files, "_HOLDS_OPEN_FILES", True)
+        monkeypatch.setattr(files, "_PAUSES", (0.0, 0.0))
+        monkeypatch.setattr(os, "replace", self.replace)
+        monkeypatch.setattr(Path, "unlink", lambda path, missing_ok=False: self.unlink(path, missing_ok))
+
+    def replace(self, source, target):
+        self._refuse(target)
+        self._replace(source, target)
+
+    def unlink(self, path, missing_ok):
+        self._refuse(path)
+        self._unlink(path, missing_ok)
+
+    def _refuse(self, path):
+        if os.path.exists(path) and os.stat(path).st_ino == self._identity:
+            raise PermissionError(13, "Access is denied", str(path))
+
+
+def test_a_file_that_windows_does_not_replace_steps_aside(tmp_path, monkeypatch):
+    path = tmp_path / "hair.usdc"
+    path.write_bytes(b"old")
+    with monkeypatch.context() as patch:
+        _Windows(patch, path)
+        for content in (b"new", b"newer"):
+            with atomic_write(path) as part:
+                part.write_bytes(content)
+            assert path.read_bytes() == content
+        (aside,) = (other for other in tmp_path.iterdir() if other != path)
+        assert aside.read_bytes() == b"old" and aside.name.startswith(".hair.usdc.")
+    with monkeypatch.context() as patch:
+        _Windows(patch, path)  # the one before is not shown any more
+        with atomic_write(path) as part:
+            part.write_bytes(b"last")
+        assert path.read_bytes() == b"last" and len(list(tmp_path.iterdir())) == 2 and not aside.exists()
+
+
+def test_what_cannot_step_aside_is_told_to_be_open_and_stays(tmp_path, monkeypatch):
+    path = tmp_path / "hair.usdc"
+    path.write_bytes(b"old")
+    with monkeypatch.context() as patch:
+        windows = _Windows(patch, path)
+        patch.setattr(os, "rename", lambda source, target: windows._refuse(source))
+        with pytest.raises(CannotWrite, match="hair.usdc: cannot be written; close the program that has it open"):
+            with atomic_write(path) as part:
+                part.write_bytes(b"new")
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.files import put_in_place
+
 _BLOCK = 1 << 16
 """Words whose sum is taken at a time: half a megabyte stays in a core's cache."""
 
@@ -24,7 +26,7 @@ def write_frame(path: Path, points: np.ndarray, spare: Path | None = None) -> No
         for data in (numbers[:even], odd, _checksum(total)):
             file.write(data.data)
         file.truncate()
-    os.replace(part, path)
+    put_in_place(part, path)
 
 
 def read_rows(path: Path, first: int, into: np.ndarray) -> None:

@@ -8,6 +8,7 @@ the file.
 import hashlib
 import math
 import shutil
+import traceback
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -89,6 +90,9 @@ def write_samples(
         if isinstance(error, KeyboardInterrupt | CannotWrite) or stopped():
             spool.close()
         else:
+            traceback.clear_frames(
+                error.__traceback__
+            )  # which hold the layer, and Windows removes no file that is shown
             spool.discard()
         raise
 

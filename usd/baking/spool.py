@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import cannot_write, make_way, remove_empty
+from neuralocks_core.files import cannot_write, make_way, put_in_place, remove_empty
 from neuralocks_core.lock_file import FolderLock
 
 from ..border.stopping import deferred
@@ -99,9 +99,16 @@ class Spool:
         return 0
 
     def drop_layers(self) -> None:
-        """Remove the layers that were left, to make a new one."""
-        for layer in self._named(_LAYER):
-            _remove(layer)
+        """Remove the layers that were left, to make a new one.
+
+        Raises:
+            CannotWrite: the file system refuses.
+        """
+        try:
+            for layer in self._named(_LAYER):
+                _remove(layer)
+        except OSError as error:
+            raise cannot_write(self.out, error) from None
 
     def size(self) -> int:
         """Bytes of all that is there to go on from."""
@@ -158,7 +165,7 @@ class Spool:
         """Put the assembled layer under its final name and remove the rest, which is not stopped halfway."""
         with deferred():
             try:
-                os.replace(self.layer_path, self.out)
+                put_in_place(self.layer_path, self.out)
             except OSError as error:
                 raise cannot_write(self.out, error) from None
             self.discard()

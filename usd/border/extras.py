@@ -16,4 +16,4 @@ def check_training() -> None:
         try:
             import_module(name)
         except ImportError as error:
-            raise NeuralocksError(f"train: {error.name} is not installed; pip install 'neuralocks[train]'") from None
+            raise NeuralocksError(f'train: {error.name} is not installed; pip install "neuralocks[train]"') from None

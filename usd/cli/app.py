@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line `neuralocks`. Each command imports what it needs when it runs, so that `--help` comes at once."""
 
+import glob
 import logging
+import os
 import sys
 from io import TextIOWrapper
 from pathlib import Path
@@ -42,11 +44,18 @@ def main(arguments: list[str] | None = None) -> None:
     # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     words = [_kept(word) for word in (sys.argv[1:] if arguments is None else arguments)]
+    if os.name == "nt" and words[:1] == ["join"]:  # no shell there does it
+        words = [name for word in words for name in _matching(word)]
     try:
         app(one_by_one(words) if words[:1] == ["train"] else words)
     except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
         one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
         raise SystemExit(1) from None
+
+
+def _matching(word: str) -> list[str]:
+    """The files that a word with * or ? stands for; itself where there are none."""
+    return (sorted(glob.glob(word)) if {"*", "?"} & {*word} else []) or [word]
 
 
 def _kept(word: str) -> str:

@@ -52,7 +52,7 @@ def command_of(app: typer.Typer):
 
 def _out_of_memory(error: Exception) -> bool:
     """Whether memory was refused to Python, or to torch, which has no type of its own for the processor's."""
-    words = ("can't allocate memory", "OutOfMemoryError")
+    words = ("can't allocate memory", "not enough memory", "OutOfMemoryError")
     return isinstance(error, MemoryError) or any(word in f"{type(error).__name__} {error}" for word in words)
 
 

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks rig train`: from a USD rig to a model file."""
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import as_path, cannot_write, make_way, remove_empty
+from neuralocks_core.files import as_path, cannot_write, make_way, own_folder, remove_empty
 from neuralocks_core.progress import Progress
 from neuralocks_core.shortcomings import shortcomings
 
@@ -136,7 +135,7 @@ def _check_writable(out: Path) -> None:
         raise NeuralocksError(f"{out}: is a folder; give a file name")
     try:
         made = make_way(out)
-        with tempfile.TemporaryFile(dir=out.parent):
+        with own_folder(out.parent):
             pass
     except OSError as error:
         raise cannot_write(out, error) from None

@@ -32,7 +32,12 @@ FEW = 3
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose: missing layers, for example."""
-    return [f"{path.name}: {' '.join(text_of(error).split())[:200]}" for error in stage.GetCompositionErrors()]
+    return [f"{path.name}: {' '.join(text_of(error).split())[:200]}" for error in _composition_errors(stage)]
+
+
+def _composition_errors(stage: Usd.Stage) -> list:
+    """None where USD does not tell them: that of Blender 4.2, 24.05."""
+    return stage.GetCompositionErrors() if hasattr(stage, "GetCompositionErrors") else []
 
 
 def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -74,8 +79,8 @@ def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
     """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
     if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
         return []
-    found = {text_of(error) for error in stage.GetCompositionErrors()}
-    told = [text_of(error) for error in Usd.Stage.Open(str(out)).GetCompositionErrors()]
+    found = {text_of(error) for error in _composition_errors(stage)}
+    told = [text_of(error) for error in _composition_errors(Usd.Stage.Open(str(out)))]
     lost = [text for text in told if text not in found]
     return [
         f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "

@@ -46,6 +46,6 @@ def test_joints_hold_with_each_pose_and_a_bake_tells_it(tmp_path):
     done = bake_rig(shot, tmp_path / "bake.usda", model)
     assert [note for note in done.notes if note.endswith(NOTE)] == [f"/Who/Rig: {NOTE}"]
     stage = Usd.Stage.Open(str(done.path))
-    animation = UsdSkel.Animation(stage.GetPrimAtPath(done.animation))
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(done.rigs[0].animation))
     for code in range(1, 25, 2):
         np.testing.assert_allclose(rotations(animation, code + 1), rotations(animation, code), atol=1e-6)
