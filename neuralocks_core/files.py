@@ -78,7 +78,7 @@ def own_folder(parent: Path) -> Iterator[Path]:
     Raises:
         OSError: it cannot be made.
     """
-    folder = parent / f".part-{uuid.uuid4().hex}"
+    folder = parent / f".part-{uuid.uuid4().hex[:12]}"
     folder.mkdir()
     try:
         yield folder
@@ -109,7 +109,7 @@ def put_in_place(part: Path, path: Path) -> None:
         with suppress(PermissionError):
             os.replace(part, path)
             return
-    aside = path.with_name(f".{path.name}.{uuid.uuid4().hex}{_ASIDE}")
+    aside = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}{_ASIDE}")
     os.rename(path, aside)
     try:
         os.replace(part, path)

@@ -22,7 +22,7 @@ def undone_on_failure(*paths: Path):
     """
     made = [folder for path in paths for folder in path.parents if not folder.exists()]
     # Windows removes no file that a program shows: what stays of an earlier time must not be in the way.
-    kept = {path: path.with_name(f".{path.name}.{uuid.uuid4().hex}{_BEFORE}") for path in paths if path.is_file()}
+    kept = {path: path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}{_BEFORE}") for path in paths if path.is_file()}
     try:
         for path, before in kept.items():
             _keep(path, before)
