@@ -2,6 +2,7 @@
 """Files that appear under their name whole or not at all."""
 
 import errno
+import glob
 import os
 import shutil
 import time
@@ -17,6 +18,7 @@ from neuralocks_core.errors import CannotWrite, NeuralocksError
 _HOLDS_OPEN_FILES = os.name == "nt"
 _PAUSES = (0.05, 0.2, 0.5)
 _ASIDE = ".replaced"
+_LETTERS = 8
 
 
 @contextmanager
@@ -99,17 +101,16 @@ def put_in_place(part: Path, path: Path) -> None:
         os.replace(part, path)
         return
     except PermissionError:
-        if not _HOLDS_OPEN_FILES:
+        # What nobody may write, as under some version controls, stays; and a folder that refuses has no file to step aside.
+        if not (_HOLDS_OPEN_FILES and path.is_file() and os.access(path, os.W_OK)):
             raise
-    for stray in path.parent.glob(f".{path.name}.*{_ASIDE}"):
-        with suppress(OSError):
-            stray.unlink()
+    remove_strays(path, _ASIDE)
     for pause in _PAUSES:
         time.sleep(pause)
         with suppress(PermissionError):
             os.replace(part, path)
             return
-    aside = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}{_ASIDE}")
+    aside = stray_name(path, _ASIDE)
     os.rename(path, aside)
     try:
         os.replace(part, path)
@@ -118,6 +119,18 @@ def put_in_place(part: Path, path: Path) -> None:
         raise
     with suppress(OSError):
         aside.unlink()
+
+
+def stray_name(path: Path, ending: str) -> Path:
+    """A new hidden name beside a file, for what is to be there for a while."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:_LETTERS]}{ending}")
+
+
+def remove_strays(path: Path, ending: str) -> None:
+    """Remove what has such a name beside a file, as far as the system lets us."""
+    for stray in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * _LETTERS}{ending}"):
+        with suppress(OSError):
+            stray.unlink()
 
 
 def make_way(path: Path) -> list[Path]:

@@ -27,16 +27,17 @@ def mute_deformers(hair, kept: str = "muted") -> None:
     text = getattr(settings, kept)
     found, deforms = remembered(text, _fits), False
     for modifier in hair.modifiers:
-        shown = modifier.show_viewport or modifier.show_render
+        shown, before = modifier.show_viewport or modifier.show_render, found.get(modifier.name, ())
+        hidden = any(isinstance(value, bool) for value in before)  # else its inputs are remembered, if anything is
         if _moves(modifier, hair):
             if shown:
-                if modifier.name not in found:
+                if not hidden:
                     found[modifier.name] = _before(hair, modifier, found)
                 modifier.show_viewport = modifier.show_render = False
             continue
         deforms = deforms or (shown and _has(_tree(modifier), {DEFORM}))
-        if on := [name for name in _resting(modifier) if read_input(modifier, name)]:
-            found[modifier.name] = sorted({*on, *found.get(modifier.name, ())})
+        if not hidden and (on := [name for name in _resting(modifier) if read_input(modifier, name)]):
+            found[modifier.name] = sorted({*on, *before})
             _write(hair, modifier, on, False)
     if deforms:
         unbound.unbind(hair.data, kept)

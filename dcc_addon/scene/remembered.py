@@ -12,15 +12,20 @@ def remembered(text: str, fits: Callable[[list], bool]) -> dict[str, list]:
     """Values by name, those that fit; none where the text holds something else."""
     try:
         found = json.loads(text or "{}")
-    except (json.JSONDecodeError, RecursionError):
+    except (ValueError, TypeError, RecursionError):  # it may be no text at all, or a number too long to read
         return {}
     pairs = found.items() if isinstance(found, dict) else ()
-    return {name: values for name, values in pairs if isinstance(values, list) and fits(values)}
+    return {name: values for name, values in pairs if isinstance(values, list) and _is_name(name) and fits(values)}
 
 
 def are_numbers(values, count: int) -> bool:
     """Whether these are so many numbers that Blender can hold."""
     return isinstance(values, Sequence) and len(values) == count and all(map(_is_number, values))
+
+
+def _is_name(text: str) -> bool:
+    """Whether Blender can look this up."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in text)
 
 
 def _is_number(value) -> bool:

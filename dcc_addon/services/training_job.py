@@ -126,7 +126,7 @@ class TrainingJob:
         self._cancelled = True
         for hard in (False, True):
             if self._process.poll() is None:
-                with suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                with suppress(OSError, subprocess.TimeoutExpired):
                     self._end(hard)
                     self._process.wait(5)
 

@@ -3,11 +3,10 @@
 
 import os
 import shutil
-import uuid
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from neuralocks_core.files import cannot_write, put_in_place, remove_empty
+from neuralocks_core.files import cannot_write, put_in_place, remove_empty, remove_strays, stray_name
 
 _BEFORE = ".before"
 
@@ -22,8 +21,10 @@ def undone_on_failure(*paths: Path):
     """
     made = [folder for path in paths for folder in path.parents if not folder.exists()]
     # Windows removes no file that a program shows: what stays of an earlier time must not be in the way.
-    kept = {path: path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}{_BEFORE}") for path in paths if path.is_file()}
+    kept = {path: stray_name(path, _BEFORE) for path in paths if path.is_file()}
     try:
+        for path in kept:
+            remove_strays(path, _BEFORE)
         for path, before in kept.items():
             _keep(path, before)
         try:
@@ -45,9 +46,6 @@ def undone_on_failure(*paths: Path):
 
 def _keep(path: Path, before: Path) -> None:
     """Another name for a file, which what is put in its place does not change."""
-    for stray in path.parent.glob(f".{path.name}.*{_BEFORE}"):
-        with suppress(OSError):
-            stray.unlink()
     try:
         try:
             os.link(path, before)

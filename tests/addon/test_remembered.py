@@ -15,7 +15,10 @@ def test_values_come_back_by_name_where_they_fit():
     assert remembered("", len) == {}
 
 
-@pytest.mark.parametrize("text", ["{", "3", "[[1]]", '{"a": 3, "b": {"c": [1]}}', "[" * 100_000])
+@pytest.mark.parametrize(
+    "text",
+    ["{", "3", "[[1]]", '{"a": 3, "b": {"c": [1]}}', "[" * 100_000, "1" * 5_000, 3, b"\xff", r'{"\ud800": [1]}'],
+)
 def test_anything_else_is_nothing(text):
     assert remembered(text, lambda values: True) == {}
 

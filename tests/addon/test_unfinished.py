@@ -64,3 +64,23 @@ def _put(path: Path, content: bytes) -> None:
     part = path.with_name("part")
     part.write_bytes(content)
     os.replace(part, path)
+
+
+def test_files_whose_names_are_alike_all_come_back(tmp_path):
+    names = ("h.usd.x.usd", "h.usd", "shot[1].usdc", "shot1.usdc", "a**b.usdc")
+    for name in names:
+        (tmp_path / name).write_bytes(name.encode())
+    with pytest.raises(ValueError), undone_on_failure(*(tmp_path / name for name in names)):
+        for name in names:
+            _put(tmp_path / name, b"new")
+        raise ValueError
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {name: name.encode() for name in names}
+
+
+def test_what_a_killed_work_left_is_gone_after_the_next(tmp_path):
+    path = tmp_path / "shot[1].usdc"
+    path.write_bytes(b"earlier")
+    (tmp_path / ".shot[1].usdc.0123abcd.before").write_bytes(b"left")
+    with undone_on_failure(path):
+        pass
+    assert list(tmp_path.iterdir()) == [path]

@@ -110,3 +110,14 @@ def test_what_cannot_step_aside_is_told_to_be_open_and_stays(tmp_path, monkeypat
             with atomic_write(path) as part:
                 part.write_bytes(b"new")
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_what_windows_lets_nobody_write_stays(tmp_path, monkeypatch):
+    path = tmp_path / "hair.usdc"
+    path.write_bytes(b"checked in")
+    with monkeypatch.context() as patch:
+        _Windows(patch, path)
+        patch.setattr(os, "access", lambda where, mode: Path(where) != path)
+        with pytest.raises(CannotWrite, match="hair.usdc: cannot be written"), atomic_write(path) as part:
+            part.write_bytes(b"new")
+    assert path.read_bytes() == b"checked in" and list(tmp_path.iterdir()) == [path]

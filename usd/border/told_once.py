@@ -6,18 +6,14 @@ from collections.abc import Hashable, Iterable
 
 _PATH = re.compile(r"(?<![\w.])/[\w/:.{}=-]*\w")
 _FEW = 2
-"""Up to so many texts of one kind stay apart: who reads them sees each prim."""
+"""Up to so many texts of one kind stay apart."""
+_NAMED = 8
+"""So many prims are named."""
 
 
 def without_paths(text: str) -> str:
     """A text with the same mark in place of each prim path."""
     return _PATH.sub("/", text)
-
-
-def first_path(text: str) -> str:
-    """The first prim path in a text, empty where there is none."""
-    found = _PATH.search(text)
-    return found[0] if found else ""
 
 
 def grouped(things: Iterable, key) -> list[list]:
@@ -29,14 +25,18 @@ def grouped(things: Iterable, key) -> list[list]:
 
 
 def told_once(texts: Iterable[str]) -> list[str]:
-    """Texts of which those that differ in nothing but prim paths are one, with how many more there are of them, and the
-    first and last of these prims.
+    """Texts of which those that differ in nothing but prim paths are one, with these prims of the others, or the first and the
+    last of many.
     """
     result = []
     for same in grouped(dict.fromkeys(texts), without_paths):
-        others = [first_path(text) for text in same[1:]]
-        if len(same) <= _FEW or not all(others):
+        if len(same) <= _FEW:
             result += same
-        else:
-            result.append(f"{same[0]} (likewise {len(others)} more, {others[0]} to {others[-1]})")
+            continue
+        # In the first place where they differ: before it may stand a file that all of them tell of.
+        columns = zip(*(_PATH.findall(text) for text in same), strict=True)
+        _, *others = next(column for column in columns if len(set(column)) > 1)
+        if len(others) > _NAMED:
+            others[_NAMED - 2 : -1] = ["..."]
+        result.append(f"{same[0]} (likewise {len(same) - 1} more: {', '.join(others)})")
     return result

@@ -16,12 +16,13 @@ from neuralocks_core.shortcomings import shortcomings
 from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_input
+from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.notes import asked_notes, left_out, out_of_place
 from ..shot.stage import check_cuts
 from .bound import BoundHair
 from .layer import MovedHair, write_rig_layer
-from .stage import read_rigged_hairs
+from .stage import of_skeleton, read_rigged_hairs
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def bake_rig(
     check_not_input(out, stage)
     misfits: list[tuple] = []
     bound = _each(found, lambda hair: BoundHair.of(hair, model), misfits)
-    left += [NeuralocksError(f"{hair.source.path}: {error}") for hair, error in misfits]
+    left += [of_skeleton(hair.source.path, error) for hair, error in misfits]
     check_cuts(cuts, [one.hair.source for one in bound])
     codes = [one.codes(frames, subframes) for one in bound]
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]
@@ -131,7 +132,8 @@ def bake_rig(
 
     written = _each(list(zip(bound, codes)), moved, still)
     animations = write_rig_layer(written, shot, out)
-    late = [text for text in dict.fromkeys([*(left_out(error) for _, error in still), *said]) if text not in notes]
+    left = [of_skeleton(one.hair.source.path, error) for (one, _), error in still]
+    late = [text for text in dict.fromkeys([*map(left_out, left), *said]) if text not in notes]
     late += out_of_place(stage, out)
     if tell:
         tell(late)
@@ -153,6 +155,7 @@ def _each(things: list, work: Callable, errors: list[tuple]) -> list:
         try:
             done.append(work(thing))
         except NeuralocksError as error:
+            check()  # for what a stop by the user may have led to
             errors.append((thing, error.with_traceback(None)))  # which would hold the stage
     if not done:
         first = errors[0][1]

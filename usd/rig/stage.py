@@ -20,6 +20,7 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
+from ..border.stopping import check
 from ..border.units import Border
 from ..shot.character_notes import lies_down
 from ..shot.lacking import has_hair_joints, nothing_found
@@ -73,13 +74,14 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
     """
     found, _ = read_rigged_hairs(path, **options)
     if baked_first:
-        first, *others = sorted(found, key=lambda hair: not _is_baked(hair.source))
-        return replace(first, others=tuple(hair.source.path for hair in others))
+        found.sort(key=lambda hair: not _is_baked(hair.source))
+        found = [replace(found[0], others=tuple(hair.source.path for hair in found[1:]))]
     if len(found) > 1:
         few = ", ".join(hair.source.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")
         raise NeuralocksError(
             f"{path}: {len(found)} skeletons have hair chains ({few}); choose one with --skeleton PRIM"
         )
+    check_orients(found[0].source, found[0].rig.chains)
     return found[0]
 
 
@@ -132,17 +134,32 @@ def read_rigged_hairs(
             source = read_rig(stage, prim, border, head, skins=skins, **given)
             wanted = chains if model is None else _of_model(model, source.character)
             rig = assemble_rig(source.character, core_meshes(source), wanted)
-            check_orients(source, rig.chains)
+            if model is not None:  # else it is checked of the one that is chosen
+                check_orients(source, rig.chains)
         except NeuralocksError as error:
-            errors.append((has_hair_joints(prim), type(error), _with_path(prim, error)))
+            check()  # for what a stop by the user may have led to
+            errors.append((str(prim.GetPath()), _is_hairy(prim, model), type(error), _with_path(prim, error)))
             continue
         found.append(RiggedHair(stage, border, source, rig))
     # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
-    hairy = [(kind, text) for named, kind, text in errors if named]
+    hairy = [error for error in errors if error[1]]
     if not found:
-        kind, text = (hairy or [error[1:] for error in errors])[0]
+        *_, kind, text = (hairy or errors)[0]
         raise kind(text)
-    return found, [kind(text) for kind, text in hairy]
+    return found, [of_skeleton(path, text) for path, *_, text in hairy]
+
+
+def of_skeleton(path: str, error) -> NeuralocksError:
+    """What is wrong with one of several skeletons, with its path before it."""
+    text = str(error)
+    return NeuralocksError(text if text.startswith(f"{path}: ") else f"{path}: {text}")
+
+
+def _is_hairy(prim: Usd.Prim, model: HairChains | None) -> bool:
+    """Whether joints of a Skeleton are named like hair, or like those of a model."""
+    if has_hair_joints(prim) or model is None:
+        return has_hair_joints(prim)
+    return bool({leaf(str(name)) for name in UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()} & set(model.names))
 
 
 def _of_model(model: HairChains, character: Character) -> HairChains:

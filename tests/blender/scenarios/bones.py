@@ -173,7 +173,7 @@ def forged_memories(folder: Path) -> None:
     make_live(rig, strands)
     settings = strands.neuralocks_hair
     settings.live = False
-    for values in ([], [3], [True], [True, 3], [True, "Input"], [[]], ["Nothing"]):
+    for values in ([], [3], [True], [True, True], [True, 3], [True, "Input"], [[]], ["Nothing"]):
         settings.muted = json.dumps({modifier.name: values for modifier in strands.modifiers} | {"Gone": values})
         settings.live = True
         bones_at(rig, 9)

@@ -9,7 +9,7 @@ def test_a_crowd_is_one_note():
     notes = [f"/Crowd/c{i}/Rig: no SkelRoot is above /Crowd/c{i}/Skin; type /Crowd/c{i} so" for i in range(40)]
     other = "/Crowd/c3/Hair: 3 strands without two distinct points"
     assert told_once([*notes[:20], other, *notes[20:]]) == [
-        f"{notes[0]} (likewise 39 more, /Crowd/c1/Rig to /Crowd/c39/Rig)",
+        f"{notes[0]} (likewise 39 more: {', '.join(f'/Crowd/c{i}/Rig' for i in range(1, 7))}, ..., /Crowd/c39/Rig)",
         other,
     ]
 
@@ -30,3 +30,8 @@ def test_alike_facts_are_printed_once():
     text = as_text({"skeletons": [skeleton("/A", 3), skeleton("/B", 4), skeleton("/C", 3)]})
     assert text.count("joints: 3") == 1 and text.count("joints: 4") == 1
     assert "likewise: /C" in text and "path: /B" in text and "path: /C" not in text
+
+
+def test_the_prims_that_differ_are_named_behind_a_file_that_does_not():
+    notes = [f"shot.usda: could not open /shots/gone.usda, introduced by </{name}>" for name in "ABCD"]
+    assert told_once(notes) == [f"{notes[0]} (likewise 3 more: /B, /C, /D)"]

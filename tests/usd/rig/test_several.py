@@ -2,6 +2,7 @@
 """Several characters with hair on joints, in one shot or as rows of one batch."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,6 +46,24 @@ def test_every_character_with_the_models_chains_moves(crowd, tmp_path):
             np.testing.assert_array_equal(hair_turns(result.path, codes, who), wanted)
     with pytest.raises(NeuralocksError, match="4 skeletons have hair chains .*choose one with --skeleton"):
         read_rigged_hair(shot, model=model.chains)
+
+
+def test_who_lacks_a_joint_of_the_model_is_named(tmp_path):
+    """Also where nothing but the model tells that the joints are hair."""
+    one = small_shot(tmp_path / "one.usda")
+    text = Path(one).read_text().replace("hair_", "strip_")
+    Path(one).write_text(text)
+    (tmp_path / "other.usda").write_text(text.replace("strip_2", "ribbon_2"))
+    stage = Usd.Stage.CreateNew(str(tmp_path / "both.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, file in (("A", "one"), ("B", "other"), ("C", "other")):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(f"./{file}.usda")
+    stage.Save()
+    model = model_for(read_rigged_hair(tmp_path / "one.usda", chains=["strip_0"]))
+    result = bake_rig(tmp_path / "both.usda", tmp_path / "out.usda", model)
+    assert [rig.skeleton for rig in result.rigs] == ["/A/Rig"]
+    left = [note for note in result.notes if "is left out" in note]
+    assert len(left) == 2 and all(note.startswith(f"/{who}/Rig: ") for who, note in zip("BC", left, strict=True)), left
 
 
 def test_where_no_character_can_move_the_first_says_why(crowd, tmp_path):

@@ -21,7 +21,7 @@ def test_what_is_missing_is_told_before_anything_is_read(tmp_path, monkeypatch, 
     monkeypatch.setitem(sys.modules, package, None)
     none, out = tmp_path / "none.usda", tmp_path / "m.neuralocks"
     for work in (lambda: train_rig(none, out), lambda: train(none, ["library"], [], out, {})):
-        with pytest.raises(NeuralocksError, match=rf"{package} is not installed; pip install 'neuralocks\[train\]'"):
+        with pytest.raises(NeuralocksError, match=rf"{package} is not installed; pip install \"neuralocks\[train\]\""):
             work()
 
 

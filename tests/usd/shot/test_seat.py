@@ -13,8 +13,7 @@ from usd.review.baked import read_baked
 from usd.shot import seat
 from usd.shot.seat import NEAR, find_seat
 from usd.shot.stage import read_rigs, read_shot
-from usd.skel import source as rig_source
-from usd.skel import surface
+from usd.skel import stage_rig, surface
 
 from ..shots import HEAD, Recipe, world_points, write_shot
 
@@ -199,7 +198,7 @@ def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
         UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(number, 0, 0))
     stage.Save()
     sorted_, tree = [], cKDTree
-    monkeypatch.setattr(rig_source, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
+    monkeypatch.setattr(stage_rig, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
     asked, bound = [], surface.bound_skeleton
     monkeypatch.setattr(surface, "bound_skeleton", lambda prim: asked.append(prim.GetPath()) or bound(prim))
     assert len(read_shot(stage.GetRootLayer().realPath).grooms) == 4
