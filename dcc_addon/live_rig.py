@@ -32,7 +32,10 @@ def _update(armature, scene, graph, moved) -> None:
     if sampled is None:
         session.wanting = True
         raise NeuralocksError(f"{armature.name_full}: its motion is not sampled yet; press Sample Motion")
-    bones, modes, _ = bind(armature, sampled)
+    before = session.chains.get(armature.name_full)
+    bones, modes, _ = bound = bind(armature, sampled)
+    if bound is not before:  # another model turned other bones, or a file remembers what nobody can have put aside
+        show_rest(armature)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
     turns = bones.turns([shown_frame(scene) / sampled.motion.rate], settings.rig_motion, joints[None])[0]
@@ -57,9 +60,6 @@ def bind(armature, sampled) -> Bound:
         bones = LiveBones.of(RigModel.load(path), sampled.rig, sampled.character)
         bound = Bound(bones, rotations.free_modes(armature, bones.bones), file)
         session.chains[armature.name_full] = bound
-        own = armature.neuralocks_character
-        if own.rig_kept and not rotations.kept_in(own.rig_kept):  # damaged: nothing is put aside yet
-            own.rig_kept = ""
     rotations.check_free(armature, bound.bones.bones)
     bound.bones.follow(sampled.character, sampled.clip)
     return bound

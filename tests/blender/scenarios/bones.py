@@ -2,6 +2,7 @@
 """Hair bones: live, baked and exported the same, without their mesh, and with other names."""
 
 import json
+import shutil
 from pathlib import Path
 
 import bpy
@@ -133,6 +134,40 @@ def renamed_bones(folder: Path) -> None:
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     scene.frame_set(7)
     assert "hair_01" in messages()["Rig"], messages()  # the model was made for other bones
+
+
+def another_model(folder: Path) -> None:
+    """Bones that only one of two models turns are as they were when the other one takes over, and when Live goes off."""
+    side = (("hair.L", "head", (0.09, 0, 1.7), (0.14, 0, 1.6)), ("hair.L.02", "hair.L", (0.14, 0, 1.6), (0.15, 0, 1.5)))
+    models = []
+    for name, more in (("Few", ()), ("Rig", side)):
+        rig = scenes.armature(name, scenes.BONES + scenes.TAIL + more)
+        scenes.dance(rig)
+        (folder / name).mkdir()
+        give_bone_model(rig, folder / name)
+        models.append(rig.neuralocks_character.rig_model)
+    few, every = models
+    own, tail, lock = rig.neuralocks_character, rig.pose.bones["hair.01"], rig.pose.bones["hair.L"]
+    tail.rotation_euler, lock.rotation_euler = (0.1, 0.2, 0.3), (0.3, 0.1, 0.2)
+    rest = bones_at(rig, 12)
+
+    def turned(bone) -> float:
+        return apart(np.array(bone.matrix_basis), at_rest[bone.name])
+
+    at_rest = {bone.name: np.array(bone.matrix_basis) for bone in rig.pose.bones}
+    own.rig_model, own.rig_live = few, True
+    bones_at(rig, 12)
+    assert turned(tail) > 0.01 and turned(lock) < 1e-6 and not messages(), messages()
+    for model, moves in ((every, True), (few, False), (every, True)):
+        own.rig_model = model
+        bones_at(rig, 12)
+        assert turned(tail) > 0.01 and (turned(lock) > 0.01) == moves and not messages(), (model, messages())
+    shutil.copy(few, every)  # trained anew under the same name, for fewer bones
+    bones_at(rig, 9)
+    bones_at(rig, 12)
+    assert turned(tail) > 0.01 and turned(lock) < 1e-6 and not messages(), messages()
+    own.rig_live = False
+    assert apart(bones_at(rig, 12), rest) < 1e-6 and tail.rotation_mode == lock.rotation_mode == "XYZ"
 
 
 def forged_memories(folder: Path) -> None:
