@@ -90,9 +90,8 @@ def write_samples(
         if isinstance(error, KeyboardInterrupt | CannotWrite) or stopped():
             spool.close()
         else:
-            traceback.clear_frames(
-                error.__traceback__
-            )  # which hold the layer, and Windows removes no file that is shown
+            # These frames hold the layer, and Windows removes no file that is shown.
+            traceback.clear_frames(error.__traceback__)
             spool.discard()
         raise
 

@@ -20,13 +20,12 @@ def as_text(facts: dict, indent: int = 0) -> str:
         elif isinstance(value, dict):
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and isinstance(value[0], dict):
-            if len(value[0]) <= 3:
+            if len(value[0]) <= 3:  # a line each
                 lines.append(f"{pad}{name}:")
+                for first, *others in (entry.items() for entry in value):
+                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
+                continue
             for entry, *same in grouped(value, lambda entry: without_paths(repr(entry))):
-                if len(entry) <= 3:  # a line each
-                    for first, *others in (each.items() for each in (entry, *same)):
-                        lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
-                    continue
                 lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
                 if same:
                     lines.append(f"{pad}  likewise: {', '.join(str(next(iter(each.values()))) for each in same)}")

@@ -106,60 +106,56 @@ def bake_rig(
     )
     stage = found[0].stage
     check_not_input(out, stage)
-    misfits: list[tuple] = []
-    bound = _each(found, lambda hair: BoundHair.of(hair, model), misfits)
-    left += [of_skeleton(hair.source.path, error) for hair, error in misfits]
+    bound = _each(found, lambda hair: BoundHair.of(hair, model, frames, subframes), left)
     check_cuts(cuts, [one.hair.source for one in bound])
-    codes = [one.codes(frames, subframes) for one in bound]
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]
-    for one, (wanted, _) in zip(bound, codes):
-        notes += one.notes(wanted, loop, find_cuts=cuts is None)
-        notes += asked_notes(stage, [one.hair.source], wanted)
+    for one in bound:
+        notes += one.notes(loop, find_cuts=cuts is None)
+        notes += asked_notes(stage, [one.hair.source], one.wanted)
     if strength != 1 and not model.dynamic:
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
     notes = list(dict.fromkeys(notes))
     if tell:
         tell(notes)
-    still: list[tuple] = []
+    still: list[NeuralocksError] = []
     said: list[str] = []
-    counter = _Counter(sum(len(every) for _, every in codes), progress)
+    counter = _Counter(sum(len(one.codes) for one in bound), progress)
 
-    def moved(one_and_codes) -> MovedHair:
-        one, (_, every) = one_and_codes
-        turns, held = one.turns(every, loop, strength, counter)
+    def moved(one: BoundHair) -> MovedHair:
+        turns, held = one.turns(loop, strength, counter)
         said.extend(held + one.hair.source.notes)  # of poses between those of the clip, too
-        return MovedHair(one.hair, every, turns)
+        return MovedHair(one.hair, one.codes, turns)
 
-    written = _each(list(zip(bound, codes)), moved, still)
+    written = _each(bound, moved, still)
     animations = write_rig_layer(written, shot, out)
-    left = [of_skeleton(one.hair.source.path, error) for (one, _), error in still]
-    late = [text for text in dict.fromkeys([*map(left_out, left), *said]) if text not in notes]
+    late = [text for text in dict.fromkeys([*map(left_out, still), *said]) if text not in notes]
     late += out_of_place(stage, out)
     if tell:
         tell(late)
     rigs = [
-        BakedRig(one.hair.source.path, animation, len(one.joints), len(one.codes))
+        BakedRig(one.hair.path, animation, len(one.joints), len(one.codes))
         for one, animation in zip(written, animations)
     ]
     return RigBakeResult(out, tuple(rigs), notes + late)
 
 
-def _each(things: list, work: Callable, errors: list[tuple]) -> list:
-    """What `work` gives of each thing of which it raises no error; `errors` takes the others and theirs.
+def _each(characters: list, work: Callable, left: list[NeuralocksError]) -> list:
+    """What `work` gives of each character of which it raises no error; `left` takes the errors of the others.
 
     Raises:
-        NeuralocksError: the first one, if there is no thing left.
+        NeuralocksError: the first one, if there is no character left.
     """
-    done = []
-    for thing in things:
+    done, first = [], None
+    for character in characters:
         try:
-            done.append(work(thing))
+            done.append(work(character))
         except NeuralocksError as error:
             check()  # for what a stop by the user may have led to
-            errors.append((thing, error.with_traceback(None)))  # which would hold the stage
+            first = first or (type(error), error.args)  # the error itself would hold the stage
+            left.append(of_skeleton(character.path, error))
     if not done:
-        first = errors[0][1]
-        raise type(first)(*first.args)
+        kind, arguments = first
+        raise kind(*arguments)
     return done
 
 

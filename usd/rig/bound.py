@@ -31,19 +31,23 @@ class BoundHair:
         model: with the names that its joints have here.
         size: how many times as large as the model's rig this one is.
         trained_name: what the model calls its first joint.
+        wanted: the time codes that were asked for, see `time_codes.time_codes`.
+        codes: these and the animation's own samples: the body must come out sample for sample.
     """
 
     hair: RiggedHair
     model: RigModel
     size: float
     trained_name: str
+    wanted: list[float]
+    codes: list[float]
 
     @classmethod
-    def of(cls, hair: RiggedHair, model: RigModel) -> "BoundHair":
-        """Bind a model.
+    def of(cls, hair: RiggedHair, model: RigModel, frames, subframes: int) -> "BoundHair":
+        """Bind a model; `frames` and `subframes` are those of `bake.bake_rig`.
 
         Raises:
-            NeuralocksError: it was made for other chains, or a joint that it reads cannot be told.
+            NeuralocksError: it was made for other chains, or a joint that it reads cannot be told; or there are no such frames.
         """
         here, trained_name = hair.rig.chains, model.chains.names[0]
         if here.names != model.chains.names:
@@ -51,34 +55,23 @@ class BoundHair:
         size = model.chains.check_same(here)
         if stops := without_turn(hair.source, model.spec.pose_joints):
             raise NeuralocksError(stops[0])
-        return cls(hair, model, size, trained_name)
+        wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
+        return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted))
+
+    @property
+    def path(self) -> str:
+        """The Skeleton prim."""
+        return self.hair.path
 
     @property
     def joints(self) -> np.ndarray:
         """Where the hair joints are in the skeleton, (N,)."""
         return self.hair.rig.chains.joints
 
-    def codes(self, frames, subframes: int) -> tuple[list[float], list[float]]:
-        """The time codes that were asked for, see `time_codes.time_codes`, and those with the animation's own samples: the body
-        must come out sample for sample.
-        """
-        wanted = time_codes(
-            frames, *frame_range(self.hair.stage, [self.hair.source]), subframes, self.hair.border.frame
-        )
-        own = self._rotation_samples()
-        # A frame and a sample at the same time, up to rounding, are one.
-        edges = np.array([-np.inf, *own, np.inf])
-        after = np.searchsorted(edges, wanted)
-        near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * self.hair.border.frame
-        return wanted, sorted({*np.array(wanted)[~near].tolist(), *own})
-
-    def turns(
-        self, codes: list[float], loop: bool, strength: float, say: Callable[[], None]
-    ) -> tuple[np.ndarray, list[str]]:
+    def turns(self, loop: bool, strength: float, say: Callable[[], None]) -> tuple[np.ndarray, list[str]]:
         """Turns of the hair joints (T, N, 4) wxyz in their own bind axes as authored, and notes on them.
 
         Args:
-            codes: time codes, (T,).
             loop, strength: see `bake.bake_rig`.
             say: called after each.
 
@@ -88,8 +81,8 @@ class BoundHair:
         source, chains = self.hair.source, self.model.chains
         clip = replace(source.clip, loop=True) if loop else source.clip
         carried = CarriedHair(self.model, self.joints, source.character, clip)
-        turns = np.empty((len(codes), len(chains), 4))
-        for row, code in enumerate(codes):
+        turns = np.empty((len(self.codes), len(chains), 4))
+        for row, code in enumerate(self.codes):
             # One at a time: a matrix product may round otherwise for other batches.
             second = self.hair.border.seconds([code])
             wrapped = clip.loop and not clip.start <= second[0] <= clip.end
@@ -99,8 +92,8 @@ class BoundHair:
         turns = source.authored_turns(self.joints, chains.turns_on(self.hair.rig.chains, turns))
         return turns, self._held(carried.carriers, turns)
 
-    def notes(self, wanted: list[float], loop: bool, find_cuts: bool) -> list[str]:
-        """What a user should know before hair is turned at these time codes."""
+    def notes(self, loop: bool, find_cuts: bool) -> list[str]:
+        """What a user should know before hair is turned."""
         rig, read = self.hair.source, self.model.spec.pose_joints
         return [
             *self._renamed(),
@@ -108,16 +101,10 @@ class BoundHair:
             *rigged_notes(rig, read),
             *_name_notes(rig.source),
             *mirrored_notes(rig, self.hair.rig.chains),
-            *(rig.loop_notes(wanted, self.joints) if loop else []),
+            *(rig.loop_notes(self.wanted, self.joints) if loop else []),
             *(on_twos(rig, read) if self.model.dynamic else []),
             *(rig.cut_notes(loop) if (loop or find_cuts) and self.model.dynamic else []),
         ]
-
-    def _rotation_samples(self) -> list[float]:
-        source = self.hair.source.source
-        read = [source.animation] + [source.copied] * bool(kept_hair(source, self.joints))
-        attributes = [UsdSkel.Animation(prim).GetRotationsAttr() for prim in read if prim]
-        return sorted({code for attribute in attributes for code in attribute.GetTimeSamples()})
 
     def _held(self, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
         """The note on a head that is held still, with all else that carries hair; see `turns` for what it raises."""
@@ -151,6 +138,19 @@ class BoundHair:
             f"{self.hair.source.source.path}: is {self.size:.2f} times as large as the character that the model was trained for; its "
             "hair swings as fast as that one's"
         ]
+
+
+def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
+    """Time codes that were asked for and those at which the animation, or hair of an earlier bake that stays, has rotations."""
+    source = hair.source.source
+    read = [source.animation] + [source.copied] * bool(kept_hair(source, hair.rig.chains.joints))
+    attributes = [UsdSkel.Animation(prim).GetRotationsAttr() for prim in read if prim]
+    own = sorted({code for attribute in attributes for code in attribute.GetTimeSamples()})
+    # A frame and a sample at the same time, up to rounding, are one.
+    edges = np.array([-np.inf, *own, np.inf])
+    after = np.searchsorted(edges, wanted)
+    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * hair.border.frame
+    return sorted({*np.array(wanted)[~near].tolist(), *own})
 
 
 def _name_notes(source) -> list[str]:

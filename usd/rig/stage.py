@@ -35,8 +35,6 @@ BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
 RIG_JOINTS = rig_spec().pose_joints
 """Semantic joints that rig models read beside the head."""
-
-
 _FEW = 4
 """So many prims are named in an error."""
 
@@ -58,6 +56,11 @@ class RiggedHair:
     source: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
     others: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> str:
+        """The Skeleton prim."""
+        return self.source.path
 
 
 @names_damage
@@ -157,9 +160,8 @@ def of_skeleton(path: str, error) -> NeuralocksError:
 
 def _is_hairy(prim: Usd.Prim, model: HairChains | None) -> bool:
     """Whether joints of a Skeleton are named like hair, or like those of a model."""
-    if has_hair_joints(prim) or model is None:
-        return has_hair_joints(prim)
-    return bool({leaf(str(name)) for name in UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()} & set(model.names))
+    names = () if model is None else UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()
+    return has_hair_joints(prim) or any(leaf(str(name)) in model.names for name in names)
 
 
 def _of_model(model: HairChains, character: Character) -> HairChains:

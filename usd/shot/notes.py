@@ -36,7 +36,7 @@ def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
 
 
 def _composition_errors(stage: Usd.Stage) -> list:
-    """None where USD does not tell them: that of Blender 4.2, 24.05."""
+    """Nothing where USD does not tell them: that of Blender 4.2, 24.05."""
     return stage.GetCompositionErrors() if hasattr(stage, "GetCompositionErrors") else []
 
 
