@@ -17,6 +17,7 @@ from pathlib import Path
 import torch
 
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.network_sizes import PLAIN_STRAND, STRAND
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -31,6 +32,9 @@ ROWS = {
     "static (no history)": {"options": {"static": True}},
     "displacement output (paper)": {"options": {"output": "displacement"}},
     "no lock codes": {"locks": False},
+    "no rest points (paper)": {"points": False},
+    "strand part linear (paper)": {"options": {"strand_map": "linear"}},
+    "strand part linear, no rest points (paper)": {"options": {"strand_map": "linear"}, "points": False},
     "frame part linear (paper)": {"options": {"motion": "linear"}},
     "frame part deeper, scales nothing": {"options": {"motion": "encoder"}},
     "AdamW for all weights": {"options": {"optimiser": "adamw", "rate": 3e-3}},
@@ -69,12 +73,13 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
             if spec != scene.spec:
                 maker = RolloutMaker(which)
                 bank.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files[name], bank.rollouts)]
-            if not change.get("locks", True):
-                for inputs in bank.inputs:
-                    inputs[:, 34:66] = 0
+            for name, unread in (("locks", slice(34, 66)), ("points", slice(PLAIN_STRAND, STRAND))):
+                if not change.get(name, True):
+                    for inputs in bank.inputs:
+                        inputs[:, unread] = 0
         torch.manual_seed(options.seed)
         began = time.process_time()
-        net = StrandNet(spec.size, motion=options.motion)
+        net = StrandNet(spec.size, motion=options.motion, strand_map=options.strand_map)
         inputs = map(torch.from_numpy, samples(banks["rollouts"]))
         net.set_normalisation(*inputs, spec.slices["history"], static=options.static)
         *_, state = regress(banks["rollouts"], net, options, options.optimisers(net), list)
@@ -102,8 +107,10 @@ def main() -> None:
     parser.add_argument("--rollouts", type=int, default=10**6)
     parser.add_argument("--row", action="extend", nargs="+", choices=list(ROWS))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--variations", type=int, default=0)
     arguments = parser.parse_args()
-    scene = training_scene(arguments.character, arguments.groom, arguments.motion, seed=arguments.seed)
+    files = arguments.character, arguments.groom, arguments.motion
+    scene = training_scene(*files, seed=arguments.seed, variations=arguments.variations)
     start = time.monotonic()
     budget = {"rate": arguments.rate} | (
         {"steps": arguments.steps} if arguments.steps else {"minutes": arguments.minutes}

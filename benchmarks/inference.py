@@ -67,7 +67,7 @@ class Inputs:
 
         take = np.arange(strands) % len(real.rest)
         codes = model.run("encoder.onnx", "code", shape=scalp_local(real).reshape(len(real.rest), -1))
-        self.strand = strand_inputs(real, codes)[take]
+        self.strand = strand_inputs(real, codes)[take, : model.strand_size]
         edges = np.zeros_like(real.rest)
         edges[:, 1:] = np.diff(real.rest, axis=1)
         self.edges = edges.reshape(len(edges), SHAPE)[take]
@@ -120,7 +120,7 @@ def shipped(model):
 
 
 def whole_graph(model):
-    """One ONNX graph over (S, 70 + F): the network as a user without the split would run it, deep maps and all."""
+    """One ONNX graph over (S, 142 + F): the network as a user without the split would run it, deep maps and all."""
     import onnx
     import onnxruntime
     from onnx import compose, helper, numpy_helper

@@ -11,6 +11,7 @@ BEGUN.
 from __future__ import annotations
 
 import argparse
+from copy import deepcopy
 from pathlib import Path
 
 import torch
@@ -36,9 +37,11 @@ def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
 
     meta = model_file.read(begun, "strands").meta
     spec = BoundarySpec.from_json(meta["boundary"])
-    first, second = (StrandNet(spec.size, motion=meta["training"]["options"]["motion"]) for _ in range(2))
-    Beginning(model).fill(first)
+    kind = {name: meta["training"]["options"][name] for name in ("motion", "strand_map")}
+    second = StrandNet(spec.size, **kind)
     Beginning(begun).fill(second)
+    first = deepcopy(second)  # a deep map that the model lacks answers nothing, and has the other's hidden layers
+    Beginning(model).fill(first)
     with torch.no_grad():
         for ours, theirs in zip(first.parameters(), second.parameters(), strict=True):
             ours.lerp_(theirs, share)

@@ -66,7 +66,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
         start = time.monotonic()
         method = MomentMethod(own, coder.codes_of, options, None, lambda done, message: None)
         torch.manual_seed(options.seed)
-        net = StrandNet(own.spec.size, motion=options.motion)
+        net = StrandNet(own.spec.size, motion=options.motion, strand_map=options.strand_map)
         history = own.spec.slices["history"]
         net.set_normalisation(*map(torch.from_numpy, method.samples()), history, static=options.static)
         for _ in method.train(net, options.optimisers(net)):

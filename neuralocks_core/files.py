@@ -41,8 +41,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
             with own_folder(path.parent) as folder:
                 part = folder / path.name
                 yield part
-                with open(part, "rb+") as file:  # else a power cut may leave the name with nothing under it
-                    os.fsync(file.fileno())
+                reach_disk(part)
                 put_in_place(part, path)
         except BaseException:
             remove_empty(made)
@@ -86,6 +85,16 @@ def own_folder(parent: Path) -> Iterator[Path]:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def reach_disk(path: Path) -> None:
+    """Wait until a file is on the disk: else a power cut may leave its later name with nothing under it.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
 
 
 def put_in_place(part: Path, path: Path) -> None:

@@ -7,7 +7,9 @@ SHAPE = 3 * K
 """Numbers of a strand's vertices or edges, and of the network's answer."""
 CODE = 32
 """Numbers that stand for a strand's rest shape."""
-STRAND = 2 + 2 * CODE + 3 + 1
-"""What the network reads of a strand: uv, its code and its lock's, root normal, length."""
+PLAIN_STRAND = 2 + 2 * CODE + 3 + 1
+"""What the paper's network reads of a strand: uv, its code and its lock's, root normal, length."""
+STRAND = PLAIN_STRAND + SHAPE
+"""What ours reads: that, and the strand's rest points."""
 HIDDEN = 256
 """Width of both hidden layers."""

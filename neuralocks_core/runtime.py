@@ -19,18 +19,17 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.measures import another_body
 from neuralocks_core.motion import Clip
-from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND
+from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
 do not depend on the machine."""
 IN = {
     "encoder.onnx": {"shape": SHAPE},
-    "strand.onnx": {"strand": STRAND},
     "tail.onnx": {"strand_part": HIDDEN, "anchor": SHAPE, "edges": SHAPE},
 }
-"""What the graphs read, and how many numbers in a row. `frame.onnx` reads the boundary vector, and the tail all that it gives,
-too."""
+"""What the graphs read, and how many numbers in a row. `strand.onnx` reads `StrandModel.strand_size` of a strand, `frame.onnx`
+the boundary vector, and the tail all that it gives, too."""
 OUT = {
     "encoder.onnx": {"code": CODE},
     "strand.onnx": {"strand_part": HIDDEN},
@@ -45,6 +44,11 @@ LARGEST = 1e7
 
 class StrandModel:
     """A strand model ready to run.
+
+    Attributes:
+        spec: of the boundary vectors that it reads.
+        anchored: whether its answers are measured from that for the bind pose.
+        strand_size: how many numbers of `strand_session.strand_inputs` it reads, from the first.
 
     Args:
         file: a model read by `model.read`.
@@ -117,10 +121,16 @@ class StrandModel:
         Raises:
             NeuralocksError: one reads or gives something else.
         """
+        plain = [value.shape[1:] for value in self._sessions["strand.onnx"].get_inputs()] == [[PLAIN_STRAND]]
+        self.strand_size = PLAIN_STRAND if plain else STRAND
         given = {value.name for value in self._sessions["frame.onnx"].get_outputs()}
         self._shared = OUT["frame.onnx"] | (CHANGED if given & set(CHANGED) else {})
         gives = OUT | {"frame.onnx": self._shared}
-        reads = IN | {"frame.onnx": {"frame": self.spec.size}, "tail.onnx": IN["tail.onnx"] | self._shared}
+        reads = IN | {
+            "strand.onnx": {"strand": self.strand_size},
+            "frame.onnx": {"frame": self.spec.size},
+            "tail.onnx": IN["tail.onnx"] | self._shared,
+        }
         for name, session in self._sessions.items():
             for does, wanted, values in (
                 ("reads", reads[name], session.get_inputs()),

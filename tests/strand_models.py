@@ -7,6 +7,7 @@ import pytest
 
 from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.network_sizes import PLAIN_STRAND
 
 
 def write_random_model(
@@ -33,6 +34,17 @@ def write_random_model(
     return model.write(path, meta, strand_graphs(encoder, net, output))
 
 
+def without_rest_points(graphs: dict[str, bytes]) -> dict[str, bytes]:
+    """The graphs of a model, whose strand part is linear, as if it read no rest points of a strand."""
+    import onnx
+
+    strand = onnx.load_model_from_string(graphs["strand.onnx"])
+    weight = next(array for array in strand.graph.initializer if array.name == "strand_part.weight")
+    weight.CopyFrom(onnx.numpy_helper.from_array(onnx.numpy_helper.to_array(weight)[:PLAIN_STRAND], weight.name))
+    strand.graph.input[0].type.tensor_type.shape.dim[1].dim_value = PLAIN_STRAND
+    return graphs | {"strand.onnx": strand.SerializeToString()}
+
+
 def offsets_of(net, strands, frames):
-    """What a network answers, (B, S, 24, 3), to strands (S, 70) or (B, S, 70) in frames (B, F)."""
+    """What a network answers, (B, S, 24, 3), to strands (S, 142) or (B, S, 142) in frames (B, F)."""
     return net.tail(net.strand_part(strands), net.frame_part(frames)[:, None]).unflatten(-1, (24, 3))

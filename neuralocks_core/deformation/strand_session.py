@@ -30,7 +30,8 @@ class StrandSession:
         self.model, self.strands = model, strands
         count = len(strands.rest)
         shape = np.ascontiguousarray(scalp_local(strands).reshape(count, -1))
-        inputs = strand_inputs(strands, self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32))
+        codes = self._by_chunk(lambda s: model.run("encoder.onnx", "code", shape=shape[s]), 32)
+        inputs = np.ascontiguousarray(strand_inputs(strands, codes)[:, : model.strand_size])
         self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), HIDDEN)
         self.anchor_offsets = np.zeros((count, SHAPE), np.float32)
         self._anchored_at: np.ndarray | None = None
@@ -151,8 +152,10 @@ def rest_edges(rest: np.ndarray) -> np.ndarray:
 
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
-    """What the network reads of each strand (S, 70) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1."""
+    """What the network reads of each strand (S, 142) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1, as in
+    the paper (section 3.3), and rest points from the root 72 [m, canonical space], since the way it points is not in its code.
+    """
     locks = lock_codes(codes, strands.lock, strands.valid)
-    return np.concatenate([strands.uv, codes, locks, strands.root_normal, strands.length[:, None]], axis=1).astype(
-        np.float32
-    )
+    points = (strands.rest - strands.rest[:, :1]).reshape(len(codes), -1)
+    read = [strands.uv, codes, locks, strands.root_normal, strands.length[:, None], points]
+    return np.concatenate(read, axis=1).astype(np.float32)

@@ -67,7 +67,7 @@ class Beginning:
 
         Args:
             spec: what the training's network reads.
-            options: of the training, with `output`, `motion`, `static` and `anchored`.
+            options: of the training, with `output`, `motion`, `strand_map`, `static` and `anchored`.
         """
         deep = self._graphs["frame.onnx"].layers
         has = {name: self._meta.get(name) for name in ("output", "anchored", "static")}
@@ -75,6 +75,8 @@ class Beginning:
             read = BoundarySpec.from_json(self._meta.get("boundary"))
         has["boundary"] = spec if _reads_all_of(read, spec) else read
         has["motion"] = "modulated" if "deep" in deep else "encoder" if "bent" in deep else "linear"
+        if "bent" in self._graphs["strand.onnx"].layers:  # a deep map can be added to a linear one, not taken away
+            has["strand_map"] = "deep"
         wanted = {name: spec if name == "boundary" else getattr(options, name) for name in has}
         return [name for name, value in wanted.items() if has[name] != value]
 
@@ -93,27 +95,22 @@ class Beginning:
 
     def fill(self, net: StrandNet) -> None:
         """Make `net`, normalised already, give the model's answers, as if nothing had been in the part of the history that
-        only the model reads. What the normalisation left out, since it did not vary, is read again: the model has learned
+        only the model reads; what only `net` reads or has changes no answer at first. What the normalisation left out, since it did not vary, is read again: the model has learned
         from motion in which it did.
         """
         frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
         layers = dict(frame.layers)
         with self._fits():
-            strand = self._graphs["strand.onnx"].layers["strand_part"]
+            constant = self._fill_strand(net)
             reading = "frame_part" if net.encoder is None else "flat"
             for name in [reading, *[n for n in layers if n != reading][:1]]:
                 # The oldest of the history comes last.
                 layers[name] = (layers[name][0][: len(net.frame_scale)], layers[name][1])
             linear = layers.pop(reading)
-            _read_again(net.strand_scale, strand)
             _read_again(net.frame_scale, linear, *list(layers.values())[:1])
-            constant = _unfold(net.strand, *strand, net.strand_mean, net.strand_scale)
             net.frame.bias.copy_(constant + _unfold(net.frame, *linear, net.frame_mean, net.frame_scale))
             if net.encoder is not None:
-                first, *others = zip(net.encoder[::2], layers.values(), strict=True)
-                first[0].bias.copy_(_unfold(first[0], *first[1], net.frame_mean, net.frame_scale))
-                for layer, (weight, bias) in others:
-                    _fill(layer, weight, bias)
+                _fill_deep(net.encoder, layers, net.frame_mean, net.frame_scale)
             for name, layer in (("middle", net.middle), ("out", net.out)):
                 back = self._before_smoothing() if name == "out" else np.eye(layer.out_features)
                 if net.motion != "modulated":
@@ -123,6 +120,22 @@ class Beginning:
                 change = getattr(net, f"{name}_change")
                 _fill(change.to_terms, frame.constants[f"{name}.to_terms"])
                 _fill(change.back, frame.constants[f"{name}.back"] @ back)
+
+    def _fill_strand(self, net: StrandNet) -> Tensor:
+        """The strand's part of the first layer; returns the bias (HIDDEN,) that belongs to it."""
+        layers = dict(self._graphs["strand.onnx"].layers)
+        linear = layers.pop("flat" if "flat" in layers else "strand_part")
+        unread = np.zeros((len(net.strand_scale) - len(linear[0]), len(linear[1])), np.float32)
+        linear = np.concatenate([linear[0], unread]), linear[1]
+        _read_again(net.strand_scale, linear, *list(layers.values())[:1])
+        if net.strand_encoder is None:
+            if layers:
+                raise ValueError("a deep map of a strand")
+        elif layers:
+            _fill_deep(net.strand_encoder, layers, net.strand_mean, net.strand_scale)
+        else:
+            net.strand_encoder[-1].weight.zero_()
+        return _unfold(net.strand, *linear, net.strand_mean, net.strand_scale)
 
     def _before_smoothing(self) -> np.ndarray:
         """(72, 72), from the right: undoes the smoothing that is folded into a model's last layer."""
@@ -161,6 +174,14 @@ def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) 
     layer.weight.copy_(_tensor(weight, layer.weight.T.shape).T)
     if bias is not None:
         layer.bias.copy_(_tensor(bias, layer.bias.shape))
+
+
+def _fill_deep(net: nn.Sequential, layers: dict, mean: Tensor, scale: Tensor) -> None:
+    """A deep map from the layers of a graph, the first of which reads what is not normalised."""
+    first, *others = zip(net[::2], layers.values(), strict=True)
+    first[0].bias.copy_(_unfold(first[0], *first[1], mean, scale))
+    for layer, (weight, bias) in others:
+        _fill(layer, weight, bias)
 
 
 def _read_again(scale: Tensor, *layers: tuple[np.ndarray, np.ndarray]) -> None:

@@ -17,12 +17,12 @@ from neuralocks_core.training.networks import StrandNet, smoothing
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
-    Normalisation is folded into the weights, so all inputs are SI. Where the frame has a deep map, all that is computed
-    once a frame, or once a groom by a deep map, is stored in float16, which keeps the file small (0.006 mm in the mean on
+    Normalisation is folded into the weights, so all inputs are SI. What is computed once a frame or once a groom is stored
+    in float16 where a deep map is part of it, which keeps the file small (0.006 mm in the mean on
     the shipped shot); all is computed in float32.
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
-    - `strand.onnx`: `strand` (S, 70) -> `strand_part` (S, 256);
+    - `strand.onnx`: `strand` (S, 142) -> `strand_part` (S, 256);
     - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256), and where the frame also changes the weights behind,
       `middle` (256, 256) and `out` (256, 72);
     - `tail.onnx`: `strand_part` (S, 256), what `frame.onnx` gave, `anchor` (S, 72) offsets of the held bind pose,
@@ -32,7 +32,7 @@ def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -
     encoder = [_folded(autoencoder.encoder[0], autoencoder.mean, autoencoder.scale, True), *autoencoder.encoder[1:]]
     return {
         "encoder.onnx": _encoder_graph(encoder, into),
-        "strand.onnx": _strand_graph(_folded(net.strand, net.strand_mean, net.strand_scale)),
+        "strand.onnx": _strand_graph(net),
         "frame.onnx": _frame_graph(net, output),
         "tail.onnx": _tail_graph(net, output),
     }
@@ -95,9 +95,15 @@ def _encoder_graph(layers, into) -> bytes:
     return graph.finish({"shape": ("S", SHAPE)}, {"code": ("S", len(_weights(layers[-1])[1]))})
 
 
-def _strand_graph(layer) -> bytes:
-    graph = _Graph("strand")
-    graph.linear("strand", layer, "strand_part")
+def _strand_graph(net: StrandNet) -> bytes:
+    half = net.strand_encoder is not None
+    graph, layer = _Graph("strand"), _folded(net.strand, net.strand_mean, net.strand_scale, half)
+    if half:
+        first = _folded(net.strand_encoder[0], net.strand_mean, net.strand_scale, True)
+        graph.mlp("strand", [first, *net.strand_encoder[1:]], "bent")
+        graph.node("Add", [graph.linear("strand", layer, "flat", half=True), "bent"], "strand_part")
+    else:
+        graph.linear("strand", layer, "strand_part")
     return graph.finish({"strand": ("S", len(layer[0]))}, {"strand_part": ("S", len(layer[1]))})
 
 

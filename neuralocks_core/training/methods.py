@@ -53,7 +53,7 @@ class RolloutMethod:
         self.bank.add(self._at_step(0) if options.steps else farm.files())
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
+        """Strand inputs (n, 142) and boundary vectors (m, F) as they come in training."""
         return samples(self.bank)
 
     def train(self, net: StrandNet, optimisers, **since) -> Iterator[Descended]:
@@ -98,7 +98,7 @@ class MomentMethod:
             self.pool.grow()
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strand inputs (n, 70) and boundary vectors (m, F) as they come in training."""
+        """Strand inputs (n, 142) and boundary vectors (m, F) as they come in training."""
         frames = np.concatenate([m.vectors for m in self.pool.moments])
         if not self.options.random_materials:
             frames = frames.copy()
@@ -119,7 +119,7 @@ class MomentMethod:
 
 
 def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
-    """Strand inputs (n, 70) and boundary vectors (m, F) of a bank's rollouts."""
+    """Strand inputs (n, 142) and boundary vectors (m, F) of a bank's rollouts."""
     strands = np.concatenate([bank.inputs[r.groom][r.strands] for r in bank.rollouts])
     strands = np.concatenate([strands, *(inputs[:: max(1, len(inputs) // 500)] for inputs in bank.inputs)])
     frames = []

@@ -36,7 +36,7 @@ def moment_losses(
         net: the network.
         moments: B moments.
         hair: the hair of each. Of small grooms it has fewer strands: moments are stacked with those of as many.
-        inputs: what the network reads of each groom's strands, one (S, 70) a groom.
+        inputs: what the network reads of each groom's strands, one (S, 142) a groom.
         spec: of the boundary vectors.
         options: weights of the potentials, ranges of the materials, the device.
         rng: draws the materials.

@@ -23,6 +23,7 @@ class SelfSupervisedOptions:
         rate: Adam's first step size, falling along a cosine.
         output: "direction" or, as in the paper, "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
+        strand_map: "linear" or "deep", see StrandNet.
         static: the quasi-static variant: no history, no inertia.
         undetached: weight of a second inertia term whose past is not detached. The paper's detached term alone (0)
             diverges for long, weakly damped hair; this one damps fast swings.
@@ -46,6 +47,7 @@ class SelfSupervisedOptions:
     rate: float = 1e-3
     output: str = "direction"
     motion: str = "linear"
+    strand_map: str = "linear"
     static: bool = False
     undetached: float = 8.0
     warmup: float = 0.2

@@ -7,15 +7,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
+from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
 from neuralocks_core.strands.strand_set import CLAMPED
 
 OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
-CODES = slice(2, 2 + 2 * CODE)
-"""Where the strand's and its lock's code lie among the strand inputs."""
+STRAND_MAPS = ("linear", "deep")
+LIMITED = (slice(2, 2 + 2 * CODE), slice(PLAIN_STRAND, STRAND))
+"""Where the strand's and its lock's code, and its rest points, lie among the strand inputs."""
 DEEP = 192
 """Width of the deep map of the frame."""
+DEEP_STRAND = 128
+"""Width of the deep map of a strand."""
 RANKS = (64, 32)
 """Ranks of the matrices that a frame adds to the second layer's and to the output layer's."""
 HISTORY_SCALE = 0.25
@@ -43,40 +46,35 @@ class StrandNet(nn.Module):
     """Maps what a strand is and what the body did to offsets of 24 vertices (paper section 3.3, figure 2).
 
     The first layer is one linear map of the whole input, written as a sum of two: the strand part is constant for a
-    groom, the frame part for a frame, so a bake computes each once. Inputs are SI; normalisation lies in buffers and is
-    folded into the weights at export.
+    groom, the frame part for a frame, so a bake computes each once. What it reads of a strand is
+    `strand_session.strand_inputs`. Inputs are SI; normalisation lies in buffers and is folded into the weights at export.
 
     Args:
         frame_size: length of the boundary vector, `BoundarySpec.size`.
-        strand_size: uv 2, rest code 32, lock code 32, root normal 3, length 1.
         motion: `"linear"`, as in the paper; `"encoder"`: a deeper map of the boundary vector is added to the linear
             one; `"modulated"`: that map also scales the units of both hidden layers and adds matrices of low rank to
             the weights behind them. It runs once per frame, and so do these changes of the weights: nothing is added
             per strand.
+        strand_map: `"linear"`, as in the paper; `"deep"`: a deeper map of what a strand is is added to the linear one. It
+            runs once per groom: which way a strand points is no linear matter of its code, which lies in the scalp's axes.
     """
 
-    def __init__(self, frame_size: int, strand_size: int = STRAND, *, motion: str = "linear"):
+    def __init__(self, frame_size: int, *, motion: str = "linear", strand_map: str = "linear"):
         super().__init__()
-        if motion not in MOTIONS:
-            raise ValueError(f"motion: {motion!r} is not one of {MOTIONS}")
+        for name, value, known in (("motion", motion, MOTIONS), ("strand_map", strand_map, STRAND_MAPS)):
+            if value not in known:
+                raise ValueError(f"{name}: {value!r} is not one of {known}")
         self.motion = motion
-        self.strand = nn.Linear(strand_size, HIDDEN, bias=False)
+        self.strand = nn.Linear(STRAND, HIDDEN, bias=False)
         self.frame = nn.Linear(frame_size, HIDDEN)
         # Both halves start as the slices of one Linear over the whole input would.
-        bound = (strand_size + frame_size) ** -0.5
+        bound = (STRAND + frame_size) ** -0.5
         for parameter in (self.strand.weight, self.frame.weight, self.frame.bias):
             nn.init.uniform_(parameter, -bound, bound)
+        self.strand_encoder = _deep(STRAND, DEEP_STRAND, 2, HIDDEN) if strand_map == "deep" else None
         self.encoder = None
         if motion != "linear":
-            self.encoder = nn.Sequential(
-                nn.Linear(frame_size, DEEP),
-                nn.ReLU(),
-                nn.Linear(DEEP, DEEP),
-                nn.ReLU(),
-                nn.Linear(DEEP, DEEP),
-                nn.ReLU(),
-                nn.Linear(DEEP, 3 * HIDDEN + sum(RANKS) if motion == "modulated" else HIDDEN),
-            )
+            self.encoder = _deep(frame_size, DEEP, 3, 3 * HIDDEN + sum(RANKS) if motion == "modulated" else HIDDEN)
         self.middle = nn.Linear(HIDDEN, HIDDEN)
         self.out = nn.Linear(HIDDEN, SHAPE)
         if motion == "modulated":
@@ -86,12 +84,15 @@ class StrandNet(nn.Module):
             # Hair starts at rest: zero offsets are both the groom and a direction that exists.
             self.out.weight.mul_(0.1)
             self.out.bias.zero_()
+            if strand_map == "deep":
+                self.strand_encoder[-1].weight.mul_(0.02)
+                self.strand_encoder[-1].bias.zero_()
             if motion == "modulated":
                 self.encoder[-1].weight.mul_(0.1)
                 self.encoder[-1].bias.zero_()
                 self.middle_change.back.weight.mul_(0.3)
                 self.out_change.back.weight.mul_(0.1)
-        for name, size in (("strand", strand_size), ("frame", frame_size)):
+        for name, size in (("strand", STRAND), ("frame", frame_size)):
             self.register_buffer(f"{name}_mean", torch.zeros(size))
             self.register_buffer(f"{name}_scale", torch.ones(size))
 
@@ -100,7 +101,7 @@ class StrandNet(nn.Module):
         """Takes mean and standard deviation of the inputs from training samples.
 
         Args:
-            strands: (n, strand_size) sampled strand inputs.
+            strands: (n, 142) sampled strand inputs.
             frames: (m, frame_size) sampled boundary vectors.
             history: where the velocity history lies in the boundary vector.
             static: the quasi-static variant: the history is not read at all.
@@ -112,9 +113,10 @@ class StrandNet(nn.Module):
             floor = 1e-5 * (1.0 + mean.abs())
             scale = torch.where(std > floor, 1.0 / std.clamp_min(1e-12), torch.zeros_like(std))
             if name == "strand":
-                # A code's last components tell hairs of one groom apart; blown up to the size of the first, they
-                # would throw a groom that was not trained on far outside.
-                scale[CODES] = scale[CODES].clamp_max(50.0 / float(std[CODES].max().clamp_min(1e-9)))
+                # A code's last components tell hairs of one groom apart, as does how far a mohawk's lie beside each other;
+                # blown up to the size of the first, they would throw a groom that was not trained on far outside.
+                for part in LIMITED:
+                    scale[part] = scale[part].clamp_max(50.0 / float(std[part].max().clamp_min(1e-9)))
             if name == "frame":
                 mean[history] = 0.0  # a held pose is exactly zero here and stays so
                 rms = samples[:, history].square().mean(0).sqrt()
@@ -124,8 +126,10 @@ class StrandNet(nn.Module):
             getattr(self, f"{name}_scale").copy_(scale)
 
     def strand_part(self, strands: Tensor) -> Tensor:
-        """First layer, strand part: (..., S, strand_size) -> (..., S, HIDDEN)."""
-        return self.strand((strands - self.strand_mean) * self.strand_scale)
+        """First layer, strand part: (..., S, 142) -> (..., S, 256)."""
+        normal = (strands - self.strand_mean) * self.strand_scale
+        part = self.strand(normal)
+        return part if self.strand_encoder is None else part + self.strand_encoder(normal)
 
     def frame_part(self, frames: Tensor) -> Tensor:
         """First layer, body part and bias: (..., frame_size) -> (..., HIDDEN), or (..., 3 HIDDEN + sum(RANKS)) with the
@@ -148,6 +152,13 @@ class StrandNet(nn.Module):
         first = torch.relu(strand_part + added) * one
         second = torch.relu(self.middle(first) + self.middle_change(first, middle)) * two
         return self.out(second) + self.out_change(second, out)
+
+
+def _deep(inputs: int, width: int, layers: int, outputs: int) -> nn.Sequential:
+    """So many hidden layers with ReLU behind each, and a linear one."""
+    sizes = [inputs, *[width] * layers]
+    hidden = [part for pair in zip(sizes, sizes[1:]) for part in (nn.Linear(*pair), nn.ReLU())]
+    return nn.Sequential(*hidden, nn.Linear(width, outputs))
 
 
 class LowRank(nn.Module):

@@ -8,9 +8,9 @@ import dataclasses
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.training.networks import MOTIONS, OUTPUTS
+from neuralocks_core.training.networks import MOTIONS, OUTPUTS, STRAND_MAPS
 
-CHOICES = {"output": OUTPUTS, "motion": MOTIONS, "optimiser": ("muon", "adamw")}
+CHOICES = {"output": OUTPUTS, "motion": MOTIONS, "strand_map": STRAND_MAPS, "optimiser": ("muon", "adamw")}
 SHARES = ("mirror", "warmup")
 """Settings that are a share of something, 1 at most."""
 MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}

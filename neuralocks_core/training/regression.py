@@ -58,6 +58,7 @@ class RegressionOptions:
         mirror: share of the rollouts of a step that are seen in a mirror.
         output: "direction" or "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
+        strand_map: "linear" or "deep", see StrandNet.
         static: learn without history (the quasi-static variant, and the baseline of equal budget).
         seed: of weights and batches.
         device: torch device.
@@ -80,6 +81,7 @@ class RegressionOptions:
     mirror: float = 0.0
     output: str = "direction"
     motion: str = "modulated"
+    strand_map: str = "deep"
     static: bool = False
     seed: int = 0
     device: str = "cpu"

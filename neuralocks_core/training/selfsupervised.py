@@ -40,7 +40,7 @@ def train_on_moments(
 
     Args:
         pool: has moments already; grows to `options.pool` meanwhile.
-        inputs: what the network reads of each groom's strands, one (S, 70) a groom.
+        inputs: what the network reads of each groom's strands, one (S, 142) a groom.
         net: normalised, on `options.device`.
         options: budget and settings.
         optimisers: `options.optimisers(net)`, or what a checkpoint made of them.

@@ -171,7 +171,8 @@ class _Run:
         self._options, self._history = method.options, scene.spec.slices["history"]
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self._options.seed)
-            self.net = StrandNet(scene.spec.size, method.inputs[0].shape[1], motion=self._options.motion)
+            kind = {"motion": self._options.motion, "strand_map": self._options.strand_map}
+            self.net = StrandNet(scene.spec.size, **kind)
         samples = map(torch.from_numpy, method.samples())
         self.net.set_normalisation(*samples, self._history, static=self._options.static)
         if beginning:
@@ -180,7 +181,7 @@ class _Run:
         self._begun = deepcopy(self.net) if beginning else None
         self._optimisers = self._options.optimisers(self.net)
         settings = {"method": method.name, "boundary": scene.spec.to_json(), "anchored": self._options.anchored}
-        settings |= {name: getattr(self._options, name, None) for name in ("output", "motion", "static", "optimiser")}
+        settings |= {name: getattr(self._options, name, None) for name in ("output", *kind, "static", "optimiser")}
         # Tuples become lists, as in a checkpoint.
         settings, now = json.loads(json.dumps([settings, asdict(self._options, dict_factory=_plain)]))
         self.meta = {"settings": settings, "options": now, "changed": [], "step": 0, "seconds": 0.0, "curve": []}

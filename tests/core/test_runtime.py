@@ -17,6 +17,7 @@ from neuralocks_core.deformation.clumping import COLUMN, Locks
 from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.network_sizes import PLAIN_STRAND
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import scalp_local, strand_set
 
@@ -24,7 +25,7 @@ torch = pytest.importorskip("torch", reason="the extra 'train' is not installed"
 from neuralocks_core.training.autoencoder import StrandAutoencoder  # noqa: E402
 from neuralocks_core.training.export import strand_graphs  # noqa: E402
 from neuralocks_core.training.networks import StrandNet, deform  # noqa: E402
-from tests.strand_models import offsets_of
+from tests.strand_models import offsets_of, without_rest_points
 
 SPEC = BoundarySpec()
 CLUMPING = SPEC.slices["material"].start + COLUMN
@@ -71,6 +72,19 @@ def test_split_inference_equals_the_whole_network(path, net, strands):
     assert np.abs(session.displacement(vector) - expected).max() < 1e-5
     with pytest.raises(NeuralocksError, match=r"vector: is of shape \(5,\); this model reads"):
         session.displacement(vector[:5])
+
+
+def test_a_model_that_reads_no_rest_points_is_given_none(path, net, strands, tmp_path):
+    file = model.read(path)
+    plain = model.write(tmp_path / "plain.neuralocks", file.meta, without_rest_points(file.graphs))
+    vector = np.random.default_rng(1).normal(size=SPEC.size).astype(np.float32)
+    unread = net[0].strand.weight[:, PLAIN_STRAND:].clone()
+    with torch.no_grad():
+        net[0].strand.weight[:, PLAIN_STRAND:] = 0
+        same = model.write(tmp_path / "same.neuralocks", file.meta, strand_graphs(net[1], net[0], path.stem))
+        net[0].strand.weight[:, PLAIN_STRAND:] = unread
+    moved = [StrandSession(StrandModel.load(each), strands).displacement(vector) for each in (plain, same)]
+    assert np.abs(moved[0] - moved[1]).max() < 1e-6
 
 
 def test_threads_and_chunks_give_the_same_bits(path, strands):
@@ -205,7 +219,7 @@ def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
 def test_graphs_in_each_others_place_are_refused(path, tmp_path):
     graphs = model.read(path).graphs
     changes = {"encoder_onnx": graphs["strand.onnx"], "strand_onnx": graphs["encoder.onnx"]}
-    with pytest.raises(NeuralocksError, match=r"encoder.onnx reads strand \(70\), not shape \(72\); get"):
+    with pytest.raises(NeuralocksError, match=r"encoder.onnx reads strand \(142\), not shape \(72\); get"):
         StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import cannot_write, make_way, put_in_place, remove_empty
+from neuralocks_core.files import cannot_write, make_way, put_in_place, reach_disk, remove_empty
 from neuralocks_core.lock_file import FolderLock
 
 from ..border.stopping import deferred
@@ -165,6 +165,7 @@ class Spool:
         """Put the assembled layer under its final name and remove the rest, which is not stopped halfway."""
         with deferred():
             try:
+                reach_disk(self.layer_path)
                 put_in_place(self.layer_path, self.out)
             except OSError as error:
                 raise cannot_write(self.out, error) from None

@@ -9,7 +9,7 @@ from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import about
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES
-from neuralocks_core.network_sizes import CODE, HIDDEN, SHAPE, STRAND, K
+from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
 from neuralocks_core.stepped import LONGEST
 
@@ -21,8 +21,8 @@ UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the
 GRAPHS = {
     "encoder.onnx": f"once a groom: `shape` (S, {SHAPE}), root-relative points of {K} vertices in scalp axes [m] "
     f"-> `code` (S, {CODE})",
-    "strand.onnx": f"once a groom: `strand` (S, {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
-    f"length 1 [m] -> `strand_part` (S, {HIDDEN})",
+    "strand.onnx": f"once a groom: `strand` (S, {PLAIN_STRAND} or {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
+    f"length 1 [m], and where it reads {STRAND}, rest points from the root {SHAPE} [m, canonical space] -> `strand_part` (S, {HIDDEN})",
     "frame.onnx": f"once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, {HIDDEN}), and where the frame "
     f"changes the weights behind, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
     "tail.onnx": f"per strand and frame: `strand_part` (S, {HIDDEN}), all that `frame.onnx` gave, `anchor` (S, {SHAPE}): the `offsets` "

@@ -9,11 +9,13 @@ import pytest
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from tests.core.rigs import person, straight_hair
+from tests.strand_models import without_rest_points
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.network_sizes import PLAIN_STRAND, STRAND
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.beginning import Beginning
 from neuralocks_core.training.export import strand_graphs
@@ -26,19 +28,19 @@ from neuralocks_core.training.work import keep_beginning
 SPEC = BoundarySpec()
 
 
-def _normalised(motion, seed, spec=SPEC):
+def _normalised(motion, seed, spec=SPEC, strand_map="linear"):
     """A network of random weights and inputs of any mean and size, one of which never varies."""
     torch.manual_seed(seed)
-    net = StrandNet(spec.size, motion=motion)
-    strands = torch.randn(50, 70) * torch.linspace(0.1, 3, 70) + torch.randn(70)
+    net = StrandNet(spec.size, motion=motion, strand_map=strand_map)
+    strands = torch.randn(50, STRAND) * torch.linspace(0.1, 3, STRAND) + torch.randn(STRAND)
     frames = torch.randn(50, spec.size) * torch.linspace(0.01, 5, spec.size) + torch.randn(spec.size)
-    strands[:, 69], frames[:, 0] = 0.3, 0.7
+    strands[:, PLAIN_STRAND - 1], frames[:, 0] = 0.3, 0.7
     net.set_normalisation(strands, frames, spec.slices["history"])
     return net, strands, frames
 
 
-def _written(path, motion="modulated", output="direction", principal=True):
-    net, _, _ = _normalised(motion, 0)
+def _written(path, motion="modulated", output="direction", principal=True, strand_map="linear"):
+    net, _, _ = _normalised(motion, 0, strand_map=strand_map)
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.05 * torch.randn_like(parameter))
@@ -48,14 +50,22 @@ def _written(path, motion="modulated", output="direction", principal=True):
     return model.write(path, {**meta, "credits": ["Hair: Rapunzel."]}, strand_graphs(coder, net, output))
 
 
-@pytest.mark.parametrize(("motion", "principal"), [("linear", False), ("encoder", True), ("modulated", True)])
-def test_the_network_answers_as_the_model_does(tmp_path, motion, principal):
+@pytest.mark.parametrize(
+    ("motion", "principal", "maps"),
+    [
+        ("linear", False, ("linear", "linear")),
+        ("encoder", True, ("deep", "deep")),
+        ("modulated", True, ("linear", "deep")),
+        ("modulated", True, ("deep", "deep")),
+    ],
+)
+def test_the_network_answers_as_the_model_does(tmp_path, motion, principal, maps):
     """Whatever its inputs are normalised by, and to what never varied there, too."""
-    path = _written(tmp_path / "a.neuralocks", motion, principal=principal)
-    net, strands, frames = _normalised(motion, 1)
+    path = _written(tmp_path / "a.neuralocks", motion, principal=principal, strand_map=maps[0])
+    net, strands, frames = _normalised(motion, 1, strand_map=maps[1])
     beginning = Beginning(path)
     beginning.fill(net)
-    strands[:, 69], frames[:, 0] = torch.linspace(0, 1, 50), -2
+    strands[:, PLAIN_STRAND - 1], frames[:, 0] = torch.linspace(0, 1, 50), -2
     graphs = model.read(path).graphs
     again = strand_graphs(beginning.coder(), net, "direction")
     shapes = 0.1 * torch.randn(9, 72).numpy()
@@ -79,6 +89,20 @@ def test_with_a_shorter_history_the_network_answers_as_the_model_does_where_noth
     assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
+def test_a_model_that_reads_no_rest_points_is_begun_with(tmp_path):
+    path = _written(tmp_path / "a.neuralocks")
+    file = model.read(path)
+    graphs = without_rest_points(file.graphs)
+    model.write(path, file.meta, graphs)
+    net, strands, frames = _normalised("modulated", 1, strand_map="deep")
+    beginning = Beginning(path)
+    beginning.check(SPEC, RegressionOptions(), resume=False)
+    beginning.fill(net)
+    wanted = _offsets(graphs, strands[:, :PLAIN_STRAND].contiguous().numpy(), frames[:1].numpy())
+    answer = _offsets(strand_graphs(beginning.coder(), net, "direction"), strands.numpy(), frames[:1].numpy())
+    assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
 def _offsets(graphs, strands, frame):
     edges = np.tile(np.float32([0, -0.01, 0]), (len(strands), 24))
     inputs = {"anchor": 0 * edges, "edges": edges, **_run(graphs["strand.onnx"], {"strand": strands})}
@@ -97,6 +121,7 @@ def _run(graph, inputs):
     [
         ({"output": "displacement"}, SPEC, "output"),
         ({"motion": "linear", "static": True}, SPEC, "static, motion"),
+        ({"strand_map": "linear"}, SPEC, "strand_map"),
         ({}, BoundarySpec(bins=(1,) * 30), "boundary"),
         ({}, replace(SPEC, bins=(*SPEC.bins, 4)), "boundary"),
         ({}, replace(SPEC, bins=()), "boundary"),
@@ -104,7 +129,7 @@ def _run(graph, inputs):
     ],
 )
 def test_a_model_of_another_kind_is_refused_before_anything_is_simulated(tmp_path, changes, spec, differs):
-    path = _written(tmp_path / "a.neuralocks")
+    path = _written(tmp_path / "a.neuralocks", strand_map="deep")
     scene = TrainingScene(person(), (straight_hair(),), spec=spec)
     with pytest.raises(NeuralocksError, match=f"a.neuralocks: differs from this training in {differs};"):
         train_strands(scene, tmp_path / "b.neuralocks", RegressionOptions(steps=1, **changes), begin=path)

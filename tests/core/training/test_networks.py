@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import torch
 
+from neuralocks_core.network_sizes import STRAND
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.networks import RANKS, StrandNet, deform, smoothing
@@ -20,12 +21,12 @@ def rest():
     return steps.cumsum(1)
 
 
-def _net(motion="linear", static=False):
+def _net(motion="linear", static=False, strand_map="linear"):
     torch.manual_seed(0)
-    net = StrandNet(100, motion=motion)
+    net = StrandNet(100, motion=motion, strand_map=strand_map)
     frames = torch.randn(64, 100) * torch.linspace(0.01, 30, 100) + 2
     frames[:, 7] = 0.3
-    net.set_normalisation(torch.randn(50, 70) * 3 + 1, frames, HISTORY, static=static)
+    net.set_normalisation(torch.randn(50, STRAND) * 3 + 1, frames, HISTORY, static=static)
     return net
 
 
@@ -58,7 +59,7 @@ def _weights_in_frame(net, part):
 
 def test_the_weights_in_a_frame_are_what_the_network_computes_with():
     net = _net("modulated")
-    strands, frame = net.strand_part(torch.randn(9, 70)), net.frame_part(torch.randn(1, 100))
+    strands, frame = net.strand_part(torch.randn(9, STRAND)), net.frame_part(torch.randn(1, 100))
     middle, out = _weights_in_frame(net, frame)
     second = torch.relu(torch.relu(strands + frame[:, :256]) @ middle + net.middle.bias)
     torch.testing.assert_close(second @ out + net.out.bias, net.tail(strands, frame), atol=1e-5, rtol=1e-4)
@@ -66,11 +67,11 @@ def test_the_weights_in_a_frame_are_what_the_network_computes_with():
 
 def test_the_split_first_layer_is_one_linear_layer():
     net = _net()
-    whole = torch.nn.Linear(170, 256)
+    whole = torch.nn.Linear(STRAND + 100, 256)
     with torch.no_grad():
         whole.weight.copy_(torch.cat([net.strand.weight, net.frame.weight], 1))
         whole.bias.copy_(net.frame.bias)
-    strands, frame = torch.randn(5, 70), torch.randn(1, 100)
+    strands, frame = torch.randn(5, STRAND), torch.randn(1, 100)
     normal = torch.cat(
         [
             (strands - net.strand_mean) * net.strand_scale,
@@ -82,10 +83,11 @@ def test_the_split_first_layer_is_one_linear_layer():
 
 
 @pytest.mark.parametrize(
-    ("motion", "output"), [("linear", "direction"), ("encoder", "displacement"), ("modulated", "direction")]
+    ("motion", "strand_map", "output"),
+    [("linear", "linear", "direction"), ("encoder", "deep", "displacement"), ("modulated", "deep", "direction")],
 )
-def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
-    net, autoencoder = _net(motion), StrandAutoencoder(principal=motion != "encoder")
+def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, strand_map, output):
+    net, autoencoder = _net(motion, strand_map=strand_map), StrandAutoencoder(principal=motion != "encoder")
     shapes = torch.randn(9, 72) * 0.1 + 0.3
     autoencoder.set_normalisation(shapes)
     graphs = strand_graphs(autoencoder, net, output)
@@ -93,7 +95,7 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
     np.testing.assert_allclose(
         _run(graphs["encoder.onnx"], shape=shapes), autoencoder.encode(shapes).detach(), atol=2e-3
     )
-    strands, frame = torch.randn(9, 70) * 3 + 1, torch.randn(1, 100) * torch.linspace(0.01, 30, 100) + 2
+    strands, frame = torch.randn(9, STRAND) * 3 + 1, torch.randn(1, 100) * torch.linspace(0.01, 30, 100) + 2
     rest = (torch.randn(9, 24, 3) * 0.01 + torch.tensor([0.0, -0.01, 0.0])).cumsum(1)
     anchor = torch.randn(9, 24, 3)
     anchor[:, :2] = 0
@@ -117,9 +119,10 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, output):
         for name, weights in (("middle", middle), ("out", out)):
             np.testing.assert_allclose(inputs[name], weights, atol=close)
         middle, out = inputs["middle"], inputs["out"]
+    np.testing.assert_allclose(inputs["strand_part"], net.strand_part(strands).detach(), atol=close)
     # From here on exact: what is computed per strand and frame is stored as it is.
     with torch.no_grad():
-        second = torch.relu(torch.relu(net.strand_part(strands) + inputs["frame_part"]) @ middle + net.middle.bias)
+        second = torch.relu(torch.relu(inputs["strand_part"] + inputs["frame_part"]) @ middle + net.middle.bias)
         offsets = second @ out + net.out.bias @ read * (torch.arange(72) >= 6)
     np.testing.assert_allclose(_run(graphs["tail.onnx"], **inputs), offsets, atol=1e-5)
     offsets = torch.linalg.solve(along.double(), offsets.reshape(9, 24, 3).double()).float()
@@ -144,21 +147,21 @@ def test_a_static_network_does_not_read_the_history():
     net = _net(static=True)
     frames = torch.randn(1, 100).repeat(2, 1)
     frames[1, HISTORY] += 100.0
-    still, moving = offsets_of(net, torch.randn(4, 70), frames)
+    still, moving = offsets_of(net, torch.randn(4, STRAND), frames)
     assert torch.equal(still, moving)
-    assert not torch.equal(*offsets_of(_net(), torch.randn(4, 70), frames))
+    assert not torch.equal(*offsets_of(_net(), torch.randn(4, STRAND), frames))
 
 
 def test_an_input_that_never_varied_is_not_read():
     net = _net()
     frames = torch.zeros(2, 100)
     frames[1, 7] = 50.0
-    assert torch.equal(*offsets_of(net, torch.randn(4, 70), frames))
+    assert torch.equal(*offsets_of(net, torch.randn(4, STRAND), frames))
 
 
 def test_own_strands_in_each_frame_equal_the_same_strands_for_all():
-    net, strands, frames = _net(), torch.randn(4, 70), torch.randn(3, 100)
-    torch.testing.assert_close(offsets_of(net, strands, frames), offsets_of(net, strands.expand(3, 4, 70), frames))
+    net, strands, frames = _net(), torch.randn(4, STRAND), torch.randn(3, 100)
+    torch.testing.assert_close(offsets_of(net, strands, frames), offsets_of(net, strands.expand(3, 4, STRAND), frames))
 
 
 def test_zero_offsets_are_exactly_the_groom(rest):

@@ -6,7 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from neuralocks_core.network_sizes import K
+from neuralocks_core.network_sizes import STRAND, K
 from neuralocks_core.training.regression import RegressionOptions, regression_losses
 
 EDGE, KINK = 0.01, 0.6
@@ -39,7 +39,7 @@ def test_bending_is_the_turn_from_edge_to_edge_that_is_missing():
     straight, bent = hanging_and_kinked()
     moved = torch.tensor(bent - straight, dtype=torch.float32).expand(1, 2, 1, K, 3)
     batch = {
-        "strands": torch.zeros(1, 1, 70),
+        "strands": torch.zeros(1, 1, STRAND),
         "rest": torch.tensor(straight, dtype=torch.float32).expand(1, 1, K, 3),
         "length": torch.full((1, 1), (K - 1) * EDGE),
         "frames": torch.zeros(1, 3, 5),
