@@ -95,8 +95,8 @@ class Beginning:
 
     def fill(self, net: StrandNet) -> None:
         """Make `net`, normalised already, give the model's answers, as if nothing had been in the part of the history that
-        only the model reads; what only `net` reads or has changes no answer at first. What the normalisation left out, since it did not vary, is read again: the model has learned
-        from motion in which it did.
+        only the model reads; what `net` alone reads or has changes no answer at first. What the normalisation left out, since it
+        did not vary, is read again: the model has learned from motion in which it did.
         """
         frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
         layers = dict(frame.layers)

@@ -17,9 +17,9 @@ from neuralocks_core.training.networks import StrandNet, smoothing
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
-    Normalisation is folded into the weights, so all inputs are SI. What is computed once a frame or once a groom is stored
-    in float16 where a deep map is part of it, which keeps the file small (0.006 mm in the mean on
-    the shipped shot); all is computed in float32.
+    Normalisation is folded into the weights, so all inputs are SI. What is computed once a frame or once a groom is stored in
+    float16 where a deep map is part of it, which keeps the file small (0.006 mm in the mean on the shipped shot); all is computed
+    in float32.
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 142) -> `strand_part` (S, 256);
