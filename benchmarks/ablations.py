@@ -73,8 +73,8 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
             if spec != scene.spec:
                 maker = RolloutMaker(which)
                 bank.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files[name], bank.rollouts)]
-            for name, unread in (("locks", slice(34, 66)), ("points", slice(PLAIN_STRAND, STRAND))):
-                if not change.get(name, True):
+            for part, unread in (("locks", slice(34, 66)), ("points", slice(PLAIN_STRAND, STRAND))):
+                if not change.get(part, True):
                     for inputs in bank.inputs:
                         inputs[:, unread] = 0
         torch.manual_seed(options.seed)

@@ -164,6 +164,12 @@ def test_damaged_and_hostile_models_are_refused(tmp_path):
             Beginning(with_frame(data)).fill(StrandNet(SPEC.size, motion="modulated"))
 
 
+def test_a_deep_map_of_a_strand_is_not_left_out(tmp_path):
+    path = _written(tmp_path / "deep.neuralocks", strand_map="deep")
+    with pytest.raises(NeuralocksError, match="not built as ours .a deep map of a strand.; begin with another"):
+        Beginning(path).fill(StrandNet(SPEC.size, motion="modulated"))
+
+
 def test_a_static_network_stays_static(tmp_path):
     net, _, _ = _normalised("modulated", 0)
     net.frame_scale[SPEC.slices["history"]] = 0

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 
+from tests.strand_models import write_random_model
 from usd.baking.bake import bake
 from usd.shot.stage import read_shot
 
@@ -64,9 +65,9 @@ def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
     assert curves.GetPointsAttr().GetTimeSamples() == [5] and not curves.GetVelocitiesAttr().HasValue()
 
 
-def test_hair_that_swings_on_after_the_last_sample_has_the_velocities_of_its_points(tmp_path, model):
+def test_hair_that_swings_on_after_the_last_sample_has_the_velocities_of_its_points(tmp_path):
     """While the body stands, and whichever of these frames are baked."""
-    shot = write_shot(tmp_path)
+    shot, model = write_shot(tmp_path), write_random_model(tmp_path / "lively.neuralocks", gain=8.0)
     path = bake(shot, tmp_path / "bake.usdc", model, frames="7:15").path
     at, moving = ({code: samples(path, name, at=code).astype(float) for code in range(7, 16)} for name in NAMES)
     assert np.abs(at[12] - at[11]).max() * 24 > 0.02
@@ -78,7 +79,7 @@ def test_hair_that_swings_on_after_the_last_sample_has_the_velocities_of_its_poi
     few = bake(shot, tmp_path / "few.usdc", model, frames=[9.5, 12, 15]).path
     for code in (12, 15):
         np.testing.assert_array_equal(samples(few, "velocities", at=code), moving[code])
-    assert np.abs(samples(few, "velocities", at=9.5)).max() > 0.01
+    assert np.abs(samples(few, "velocities", at=9.5)).max() > 0.02
 
 
 def test_before_the_first_sample_hair_is_at_rest(tmp_path, model):
