@@ -23,7 +23,8 @@ from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.methods import samples
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
+from neuralocks_core.training.regression import RolloutBank, regress
+from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
 
 SPEC = BoundarySpec()
@@ -47,6 +48,7 @@ ROWS = {
     "no loss relative to the strand's motion": {"options": {"swing": 0.0}},
     "no loss relative to the strand's motion in a frame": {"options": {"settling": 0.0}},
     "no loss relative to how the hairs of a lock part": {"options": {"parting": 0.0}},
+    "no loss of what one constant of the material does": {"options": {"response": 0.0}},
     "no velocity loss": {"options": {"velocity": 0.0}},
     "no collision loss": {"options": {"collision": 0.0}},
 }

@@ -17,7 +17,8 @@ from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MOMENTS, MomentPool
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RegressionOptions, RolloutBank, regress
+from neuralocks_core.training.regression import RolloutBank, regress
+from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.selfsupervised import train_on_moments
 

@@ -29,7 +29,8 @@ from neuralocks_core.training.methods import method_of, wait
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.option_checks import changed, check_options
-from neuralocks_core.training.regression import RegressionOptions, RolloutBank
+from neuralocks_core.training.regression import RolloutBank
+from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import TrainingScene, learned_measures
 from neuralocks_core.training.threads import threads
 from neuralocks_core.training.work import (

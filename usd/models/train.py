@@ -80,7 +80,7 @@ def train(
 
     from neuralocks_core.training.moment_options import SelfSupervisedOptions
     from neuralocks_core.training.option_checks import check_options
-    from neuralocks_core.training.regression import RegressionOptions
+    from neuralocks_core.training.regression_options import RegressionOptions
     from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands
     from neuralocks_core.training.work import BEGINNING, work_folder
@@ -128,7 +128,7 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
         NeuralocksError: the one named is none, or differs from what is trained.
     """
     from neuralocks_core.training.beginning import Beginning
-    from neuralocks_core.training.regression import RegressionOptions
+    from neuralocks_core.training.regression_options import RegressionOptions
 
     if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
         return None

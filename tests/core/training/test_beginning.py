@@ -20,7 +20,7 @@ from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.beginning import Beginning
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RegressionOptions
+from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import keep_beginning

@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.regression import RegressionOptions
+from neuralocks_core.training.regression_options import RegressionOptions
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
 from usd.models.train import _command, begins_with
