@@ -48,7 +48,6 @@ ROWS = {
     "no loss relative to the strand's motion": {"options": {"swing": 0.0}},
     "no loss relative to the strand's motion in a frame": {"options": {"settling": 0.0}},
     "no loss relative to how the hairs of a lock part": {"options": {"parting": 0.0}},
-    "no loss of what one constant of the material does": {"options": {"response": 0.0}},
     "no velocity loss": {"options": {"velocity": 0.0}},
     "no collision loss": {"options": {"collision": 0.0}},
 }

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from numbers import Real
 
 import numpy as np
@@ -78,17 +78,11 @@ class Material:
         range.
         """
         values = {}
-        for name in RANGES:
-            anywhere = _anywhere(name, rng)
-            values[name] = getattr(cls(), name) if rng.random() < 1 / 3 else anywhere
+        for name, (low, high) in RANGES.items():
+            shift = _SOFT if name == "clumping" else 0.0
+            anywhere = float(np.exp(rng.uniform(np.log(low + shift), np.log(high + shift))) - shift)
+            values[name] = getattr(cls(), name) if rng.random() < 1 / 3 else float(np.clip(anywhere, low, high))
         return cls(**values)
-
-    def varied(self, rng: np.random.Generator) -> Material:
-        """The same but for one of the constants that networks answer to, which is anywhere in its range: what clumping does
-        lies between hairs (`deformation.clumping`).
-        """
-        name = ("bend", "weight", "damping")[rng.integers(3)]
-        return replace(self, **{name: _anywhere(name, rng)})
 
     @classmethod
     def parse(cls, settings: list[str] | tuple[str, ...]) -> Material:
@@ -120,14 +114,6 @@ class Material:
                 raise NeuralocksError(f"material '{setting}': {name} is given twice; give it once")
             given[name] = value
         return cls(**given)
-
-
-def _anywhere(name: str, rng: np.random.Generator) -> float:
-    """A random value of a constant, even in its logarithm."""
-    low, high = RANGES[name]
-    shift = _SOFT if name == "clumping" else 0.0
-    value = float(np.exp(rng.uniform(np.log(low + shift), np.log(high + shift))) - shift)
-    return float(np.clip(value, low, high))
 
 
 def _check(name: str, value, said: str) -> None:

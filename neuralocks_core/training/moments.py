@@ -7,7 +7,7 @@ these would take longer than the step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -86,8 +86,7 @@ class MomentPool:
     def __init__(
         self, scene: TrainingScene, *, supported: bool = True, nearest_vertices: bool = False, volume: bool = True
     ):
-        self.scene = scene = replace(scene, pairs=0.0)  # each strand once, among its neighbours
-        self.supported, self.nearest_vertices, self.volume = supported, nearest_vertices, volume
+        self.scene, self.supported, self.nearest_vertices, self.volume = scene, supported, nearest_vertices, volume
         self.hair: list[Hair] = []
         self.moments: list[Moment] = []
         self._maker = RolloutMaker(scene)

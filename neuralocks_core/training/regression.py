@@ -60,44 +60,35 @@ class RolloutBank:
         """Random strands of one material, which each lock has its own of: they share the frame's part of the first layer,
         and how they part from each other can be compared.
         """
-        materials = rollout.materials
-        if rollout.paired:  # both of a pair
-            materials = np.hstack([materials, np.roll(materials, len(materials) // 2, axis=0)])
-        same = materials == materials[rng.integers(len(rollout.strands))]
+        same = rollout.materials == rollout.materials[rng.integers(len(rollout.strands))]
         strands = np.flatnonzero(same.all(axis=1))
         return rng.choice(strands, count, replace=len(strands) < count)
 
     def batch(self, rng: np.random.Generator, options: RegressionOptions) -> dict[str, Tensor]:
         """A training step's tensors: M rollouts, n strands, 2 moments of consecutive frames and the anchor's vector
-        last; rollouts of pairs count as two, and `pairs` (P, 2) tells which of the M are the same in two materials.
+        last.
         """
         rows: dict[str, list] = {name: [] for name in ("strands", "rest", "length", "frames", "moved", "planes")}
-        pairs = []
-        while (row := len(rows["strands"])) < options.clips:
-            rollout = self.rollouts[rng.integers(len(self.rollouts))]
-            picks = [self._alike(rollout, rng, options.strands)]
-            if rollout.paired and row + 2 <= options.clips:
-                picks.append((picks[0] + len(rollout.strands) // 2) % len(rollout.strands))
-                pairs.append((row, row + 1))
+        for index in rng.integers(len(self.rollouts), size=options.clips):
+            rollout = self.rollouts[index]
+            pick = self._alike(rollout, rng, options.strands)
             late = rng.integers(max(rollout.first, 1), len(rollout.vectors), size=options.moments)
             moments = np.stack([late - 1, late], axis=1).ravel()
+            chosen = rollout.strands[pick]
             frames = np.concatenate([rollout.vectors[moments], rollout.bind[None]])
+            frames[:, self.material] = rollout.materials[pick[0]]
             inputs, sides = self.inputs, np.ones(3, np.float32)
             if options.mirror and rng.random() < options.mirror:
                 inputs, sides, frames = self._mirrored, POLAR, mirrored_vectors(self._scene.spec, frames)
-            for pick in picks:
-                chosen, frames = rollout.strands[pick], frames.copy()
-                frames[:, self.material] = rollout.materials[pick[0]]
-                rows["strands"].append(inputs[rollout.groom][chosen])
-                rows["rest"].append(rollout.rest[pick] * sides)
-                rows["length"].append(self.lengths[rollout.groom][chosen])
-                rows["frames"].append(frames)
-                rows["moved"].append(rollout.moved[moments[:, None], pick] * sides)
-                rows["planes"].append(rollout.planes[moments[:, None], pick] * np.append(sides, 1))
+            rows["strands"].append(inputs[rollout.groom][chosen])
+            rows["rest"].append(rollout.rest[pick] * sides)
+            rows["length"].append(self.lengths[rollout.groom][chosen])
+            rows["frames"].append(frames)
+            rows["moved"].append(rollout.moved[moments[:, None], pick] * sides)
+            rows["planes"].append(rollout.planes[moments[:, None], pick] * np.append(sides, 1))
         batch = {name: torch.from_numpy(np.stack(values)).to(options.device) for name, values in rows.items()}
         batch["moved"] = batch["moved"].float() * STEP
         batch["planes"] = batch["planes"].float()
-        batch["pairs"] = torch.tensor(pairs, device=options.device).reshape(-1, 2)
         return batch
 
 

@@ -17,20 +17,16 @@ CREEP = 0.002
 """Motion from frame to frame, in strand lengths, below which a strand hardly moves."""
 TOGETHER = 0.003
 """Distance, in strand lengths, below which the hairs of a lock count as one."""
-ALIKE = 0.003
-"""Distance, in strand lengths, below which a strand in one material lies as it does in another."""
 
 
 def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
-    """Weighted losses of a batch, each a mean in units of strand length, `swing`, `settling`, `parting` and `response`
-    ratios.
+    """Weighted losses of a batch, each a mean in units of strand length, `swing`, `settling` and `parting` ratios.
 
     `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
     that motion, so that small motion counts as much as large, `settling` the same of one frame difference, so that hair
     comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
-    they do, `response` the same of one strand in two materials, so that each slider does what it does in the solver,
-    `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies under
-    the plane of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    they do, `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies
+    under the plane of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
 
     Args:
         net: the network.
@@ -55,7 +51,6 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     swing = (_spread(error, 1).mean((1, 3)) / true_swing + 1e-6).sqrt()  # smooth at zero
     true_parting = _spread(batch["moved"], 2).mean((1, 2, 3)) + TOGETHER**2 * squared.mean(1)
     parting = (_spread(error, 2).mean((1, 2, 3)) / true_parting + 1e-6).sqrt()
-    response = _response(error, batch["moved"], batch["pairs"], squared)
     edge = length / (K - 1)
     bending = _norm(torch.diff(error, n=2, dim=-2) / edge[..., None])
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
@@ -68,19 +63,9 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
         "swing": options.swing * swing.mean(),
         "settling": options.settling * settling.mean(),
         "parting": options.parting * parting.mean(),
-        "response": options.response * response,
         "bending": options.bending * bending.mean(),
         "collision": options.collision * (depth / length).mean(),
     }
-
-
-def _response(error: Tensor, moved: Tensor, pairs: Tensor, squared: Tensor) -> Tensor:
-    """How wrong the difference of each of `pairs` is relative to that difference, a mean; zero where there are none."""
-    if not len(pairs):
-        return error.new_zeros(())
-    one, other = pairs.T
-    wrong, true = ((vectors[one] - vectors[other]).square().sum(-1).mean((1, 3)) for vectors in (error, moved))
-    return (wrong / (true + ALIKE**2 * squared[one]) + 1e-6).sqrt().mean()
 
 
 def _spread(vectors: Tensor, axis: int) -> Tensor:

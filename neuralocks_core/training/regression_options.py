@@ -29,7 +29,6 @@ class RegressionOptions:
         swing: weight of the error about its mean over a strand's moments, relative to the strand's own motion.
         settling: weight of the error of frame differences, relative to the strand's own frame difference.
         parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
-        response: weight of the error of how far a strand in one material lies from itself in another, relative to that.
         bending: weight of the error of the difference between successive edges, in edge lengths.
         collision: weight of the depth under the target's body plane, in strand lengths.
         mirror: share of the rollouts of a step that are seen in a mirror.
@@ -53,7 +52,6 @@ class RegressionOptions:
     swing: float = 0.4
     settling: float = 0.3
     parting: float = 0.3
-    response: float = 0.4
     bending: float = 0.0
     collision: float = 45.0
     mirror: float = 0.0

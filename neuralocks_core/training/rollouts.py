@@ -47,8 +47,6 @@ class TrainingScene:
         frames: length of a rollout, in steps of `spec.dt`.
         strands: strands of a rollout, in whole locks.
         held_out: draw from the locks and the random numbers that training never sees.
-        pairs: share of the rollouts that show half as many strands, each of them twice: the second time one of the material's
-            constants is another, so that what each does to hair can be learned by itself. None of those held out do.
     """
 
     character: Character
@@ -59,7 +57,6 @@ class TrainingScene:
     frames: int = 110
     strands: int = 64
     held_out: bool = False
-    pairs: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,7 @@ class Rollout:
 
     Attributes:
         groom: index into the scene's grooms.
-        strands: (n,) indices of its strands; of pairs, the first n / 2 and then the same again.
+        strands: (n,) indices of its strands.
         rest: their rest points on the body's shape (n, 24, 3) float32, canonical space.
         first: first frame to learn from.
         vectors: boundary vectors (T, F) float32.
@@ -91,12 +88,6 @@ class Rollout:
     residual: float
     materials: np.ndarray
 
-    @property
-    def paired(self) -> bool:
-        """Whether it shows each strand twice, in two materials."""
-        half, odd = divmod(len(self.strands), 2)
-        return half > 0 and not odd and np.array_equal(self.strands[:half], self.strands[half:])
-
 
 @dataclass(frozen=True, eq=False)
 class Draw:
@@ -104,8 +95,7 @@ class Draw:
 
     Attributes:
         groom: index into the scene's grooms.
-        strands: (n,) indices of its strands, see `Rollout`.
-        lock: (n,) the lock of each, numbered from 0; strands that are there twice lie in two.
+        strands: (n,) indices of its strands.
         materials: of each strand, the same within a lock: one motion shows many materials for the price of one.
         shape: blend shape weights.
         clip: the motion.
@@ -115,7 +105,6 @@ class Draw:
 
     groom: int
     strands: np.ndarray
-    lock: np.ndarray
     materials: tuple[Material, ...]
     shape: np.ndarray
     clip: Clip
@@ -152,7 +141,7 @@ class RolloutMaker:
             None if self.body is None else self.body.triangles,
             {name: np.array([getattr(m, name) for m in draw.materials]) for name in RANGES},
             dt=scene.spec.dt,
-            neighbours=lock_mates(rest, draw.lock),
+            neighbours=lock_mates(rest, groom.lock[draw.strands]),
             bind_body=None if self.body is None else scene.character.canonical(self.body.shaped(shape)),
             planes=True,
         )
@@ -182,19 +171,15 @@ class RolloutMaker:
         """Make all random choices of a rollout, in one place and order."""
         rng = np.random.default_rng([self.scene.seed, self.scene.held_out, index])
         which = int(rng.integers(len(self.scene.grooms)))
-        # From a generator of their own, so that motion does not depend on the number of locks.
-        others = np.random.default_rng([self.scene.seed, self.scene.held_out, index, 1])
-        paired = not self.scene.held_out and others.random() < self.scene.pairs
-        strands = self._locks(which, max(1, self.scene.strands // (2 if paired else 1)), rng)
+        strands = self._locks(which, rng)
         locks, lock = np.unique(self.scene.grooms[which].lock[strands], return_inverse=True)
         by_lock = [Material.random(rng)]
+        # From a generator of their own, so that motion does not depend on the number of locks.
+        others = np.random.default_rng([self.scene.seed, self.scene.held_out, index, 1])
         by_lock += [Material.random(others) for _ in locks[1:]]
         by_lock[lock[0]], by_lock[0] = by_lock[0], by_lock[lock[0]]
-        if paired:
-            strands, lock = np.tile(strands, 2), np.concatenate([lock, lock + len(locks)])
-            by_lock += [material.varied(others) for material in by_lock]
         shape = self._shape(rng)
-        return Draw(which, strands, lock, tuple(by_lock[i] for i in lock), shape, *self._motion(rng, shape))
+        return Draw(which, strands, tuple(by_lock[i] for i in lock), shape, *self._motion(rng, shape))
 
     def vectors(self, draw: Draw, spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
         """Boundary vectors (T, F) of a draw, and the anchor's (F,)."""
@@ -202,16 +187,16 @@ class RolloutMaker:
         log = draw.materials[0].log_ratios()
         return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
 
-    def _locks(self, which: int, count: int, rng) -> np.ndarray:
-        """Indices of whole locks, cut to so many strands; of locks beyond 8 strands a neighbourhood."""
+    def _locks(self, which: int, rng) -> np.ndarray:
+        """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood."""
         groom, usable = self.scene.grooms[which], self._usable[which]
         chosen: dict[int, None] = {}  # a set that keeps its order
-        while len(chosen) < min(count, len(usable)):
+        while len(chosen) < min(self.scene.strands, len(usable)):
             seed = usable[rng.integers(len(usable))]
             lock = usable[groom.lock[usable] == groom.lock[seed]]
             near = np.argsort(np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable")[:8]
             chosen.update(dict.fromkeys(lock[near].tolist()))
-        return np.array(sorted(list(chosen)[:count]))
+        return np.array(sorted(list(chosen)[: self.scene.strands]))
 
     def _shape(self, rng) -> np.ndarray:
         count = 0 if self.scene.character.body is None else len(self.scene.character.body.shapes)

@@ -10,7 +10,6 @@ from neuralocks_core import model
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.materials import RANGES
 from neuralocks_core.measures import body_measures
 from tests.core.rigs import person, straight_hair
 
@@ -48,26 +47,6 @@ def test_rollouts_start_at_rest_and_move(scene):
     assert np.abs(moved[3] - moved[0]).max() < 1e-3
     assert np.abs(rollout.vectors[0, scene.spec.slices["history"]]).max() < 1e-6
     assert np.abs(moved - moved[0]).max() > 1e-2
-
-
-def test_pairs_differ_in_one_constant_of_their_material(scene):
-    """And none is held out: a gauge counts each strand once."""
-    maker = RolloutMaker(replace(scene, pairs=1.0))
-    constants = set()
-    for index in range(12):
-        draw = maker.draw(index)
-        assert np.array_equal(draw.strands[:12], draw.strands[12:]) and len(draw.strands) == 24
-        assert not set(draw.lock[:12]) & set(draw.lock[12:])
-        assert np.array_equal(draw.lock[:12], draw.lock[12:] - draw.lock[12:].min() + draw.lock[:12].min())
-        for one, other in zip(draw.materials[:12], draw.materials[12:], strict=True):
-            (other_constant,) = [name for name in RANGES if getattr(one, name) != getattr(other, name)]
-            constants.add(other_constant)
-    assert constants == {*RANGES} - {"clumping"}
-    rollout = maker.make(3)
-    apart = np.abs(rollout.moved[:, :12] - rollout.moved[:, 12:]) * STEP
-    assert rollout.paired and apart[0].max() < 1e-3 < apart.max()
-    held = RolloutMaker(replace(scene, pairs=1.0, held_out=True)).draw(0)
-    assert len(set(held.strands)) == len(held.strands)
 
 
 def test_another_history_reads_the_same_simulation(scene):
