@@ -4,46 +4,23 @@
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.materials import Material
-from neuralocks_core.progress import Progress, silent
+from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import asked_notes, out_of_place
+from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
-from ..shot.stage import Shot, StageGroom, read_shot
+from ..shot.stage import StageGroom
 from .model_notes import model_notes
 from .posing import GroomPoser
-from .samples import write_samples
-
-
-@dataclass(frozen=True)
-class BakeResult:
-    """What a bake did.
-
-    Attributes:
-        path: the override layer.
-        frames: its time codes.
-        grooms: per groom: path, strands, points, joint, how the joint was found.
-        notes: what a user should know.
-        seconds: wall time.
-        resumed: frames taken over from an interrupted bake, counted for each groom.
-    """
-
-    path: Path
-    frames: list[float]
-    grooms: list[dict]
-    notes: list[str]
-    seconds: float
-    resumed: int
+from .procedure import BakeResult, known_notes, read_asked, write_told
 
 
 def bake(
@@ -100,9 +77,7 @@ def bake(
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
     cuts = given_cuts(cuts, loop)
-    (progress or silent)(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
-    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {"model": _digest(strand_model), "material": asdict(look)}
 
@@ -115,15 +90,8 @@ def bake(
         *known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins),
         *model_notes(strand_model, look, shot),
     ]
-    if tell:
-        tell(notes)
-    resumed = write_samples(
-        shot, out, codes, poser, inputs | options, facts, together=True, velocities=velocities, progress=progress
-    )
-    late = out_of_place(shot.stage, out)
-    if tell:
-        tell(late)
-    return BakeResult(out, codes, described(shot), notes + late, time.monotonic() - began, resumed)
+    how = {"together": True, "velocities": velocities, "progress": progress}
+    return write_told(shot, out, codes, poser, inputs | options, facts, notes, began=began, tell=tell, **how)
 
 
 def as_material(material) -> Material:
@@ -138,30 +106,6 @@ def as_material(material) -> Material:
             f"material: {material!r} is none; give a Material, words such as 'bend=2x', or a dict of them"
         )
     return Material.parse(words)
-
-
-def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:
-    """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
-    return [
-        *shot.notes,
-        *asked_notes(shot.stage, shot.rigs, codes),
-        *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
-        *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
-    ]
-
-
-def described(shot: Shot) -> list[dict]:
-    """Per groom, what a user is told."""
-    return [
-        {
-            "path": item.path,
-            "strands": item.groom.strand_count,
-            "points": item.point_count,
-            "joint": item.joint,
-            "how": item.attachment.how,
-        }
-        for item in shot.grooms
-    ]
 
 
 def _jobs(jobs: int | None) -> int:

@@ -14,18 +14,17 @@ from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import RUN_IN, simulated
 from neuralocks_core.files import as_path
-from neuralocks_core.progress import Progress, silent
+from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..border.time_codes import given_cuts, time_codes
-from ..shot.notes import out_of_place
+from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
-from ..shot.stage import Shot, StageGroom, read_shot
-from .bake import BakeResult, as_material, described, known_notes
+from ..shot.stage import StageGroom
+from .bake import as_material
 from .placing import GroomPlacer
-from .samples import write_samples
+from .procedure import BakeResult, known_notes, read_asked, write_told
 from .stencils import Stencils
 
 STRANDS = 2000
@@ -71,9 +70,7 @@ def simulate(
     check_number("--strands", count, 1, whole=True)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
     cuts = given_cuts(cuts, loop)
-    (progress or silent)(0, 1, "reading the shot")
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
-    codes = time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
     options = {"volume": float(volume), "loop": loop}
     inputs = {"strands": count, "material": asdict(look), "codes": codes, **options}
 
@@ -83,13 +80,7 @@ def simulate(
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
-    if tell:
-        tell(notes)
-    resumed = write_samples(shot, out, codes, poser, inputs, facts, progress=progress)
-    late = out_of_place(shot.stage, out)
-    if tell:
-        tell(late)
-    return BakeResult(out, codes, described(shot), notes + late, time.monotonic() - began, resumed)
+    return write_told(shot, out, codes, poser, inputs, facts, notes, began=began, tell=tell, progress=progress)
 
 
 class _SimulatedPoser:

@@ -11,7 +11,8 @@ from neuralocks_core.evaluation.report import Card
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.progress import Progress
 
-from ..baking.bake import BakeResult, bake
+from ..baking.bake import bake
+from ..baking.procedure import BakeResult
 from .baked import read_baked
 from .evaluate import evaluate
 from .picture import preview

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every way to make a bake begins and ends with, whatever moves its hair."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from neuralocks_core.progress import Progress, silent
+
+from ..border.time_codes import time_codes
+from ..shot.notes import asked_notes, out_of_place
+from ..shot.stage import Shot, StageGroom, read_shot
+from .samples import Poser, write_samples
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What a bake did.
+
+    Attributes:
+        path: the override layer.
+        frames: its time codes.
+        grooms: per groom: path, strands, points, joint, how the joint was found.
+        notes: what a user should know.
+        seconds: wall time.
+        resumed: frames taken over from an interrupted bake, counted for each groom.
+    """
+
+    path: Path
+    frames: list[float]
+    grooms: list[dict]
+    notes: list[str]
+    seconds: float
+    resumed: int
+
+
+def read_asked(
+    shot, grooms, skeleton, head, joints, cuts, frames, subframes: int, progress: Progress | None
+) -> tuple[Shot, list[float]]:
+    """The shot, read where it is not yet, and the time codes that are asked for; arguments as for `bake`."""
+    (progress or silent)(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
+    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
+    return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+
+
+def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:
+    """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
+    return [
+        *shot.notes,
+        *asked_notes(shot.stage, shot.rigs, codes),
+        *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
+        *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
+    ]
+
+
+def write_told(
+    shot: Shot,
+    out: Path,
+    codes: list[float],
+    poser: Callable[[list[StageGroom]], Poser],
+    inputs: dict,
+    facts: dict,
+    notes: list[str],
+    *,
+    began: float,
+    tell: Callable[[list[str]], None] | None,
+    **options,
+) -> BakeResult:
+    """Tell the notes, write the samples, then tell what is wrong with where they lie.
+
+    Args:
+        shot, out, codes, poser, inputs, facts, options: as for `write_samples`.
+        notes: known before.
+        began: on the clock of `time.monotonic`.
+        tell: as for `bake`.
+    """
+    say = tell or _unheard
+    say(notes)
+    resumed = write_samples(shot, out, codes, poser, inputs, facts, **options)
+    late = out_of_place(shot.stage, out)
+    say(late)
+    return BakeResult(out, codes, _described(shot), notes + late, time.monotonic() - began, resumed)
+
+
+def _unheard(notes: list[str]) -> None:
+    pass
+
+
+def _described(shot: Shot) -> list[dict]:
+    return [
+        {
+            "path": item.path,
+            "strands": item.groom.strand_count,
+            "points": item.point_count,
+            "joint": item.joint,
+            "how": item.attachment.how,
+        }
+        for item in shot.grooms
+    ]
