@@ -48,7 +48,7 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
     """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
     return [
         *shot.notes,
-        *asked_notes(shot.stage, shot.rigs, codes),
+        *asked_notes(shot.stage, shot.rigs, codes, loop),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
         *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
     ]

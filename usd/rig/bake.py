@@ -111,7 +111,7 @@ def bake_rig(
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]
     for one in bound:
         notes += one.notes(loop, find_cuts=cuts is None)
-        notes += asked_notes(stage, [one.hair.source], one.wanted)
+        notes += asked_notes(stage, [one.hair.source], one.wanted, loop)
     if strength != 1 and not model.dynamic:
         notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
     notes = list(dict.fromkeys(notes))

@@ -58,15 +58,16 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
     return notes
 
 
-def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float]) -> list[str]:
+def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float], loop: bool) -> list[str]:
     """The notes on what a bake was asked for.
 
     Args:
         stage: the shot.
         rigs: skeletons that carry what is baked.
         codes: the time codes, ascending.
+        loop: hair moves on outside of the animation, too, as `StageRig.loop_notes` tells.
     """
-    return _edited(stage) + [text for rig in rigs for text in out_of_range(rig, codes[0], codes[-1])]
+    return _edited(stage) + [text for rig in rigs if not loop for text in out_of_range(rig, codes[0], codes[-1])]
 
 
 def _edited(stage: Usd.Stage) -> list[str]:

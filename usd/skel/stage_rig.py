@@ -94,7 +94,8 @@ class StageRig:
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
                 "a loop ends with the pose that it begins with"
             )
-        if len(codes) and (codes[0] < start or codes[-1] > end):
+        # Subframes of the last frame lie past the end, too.
+        if len(codes) and (codes[0] < start or codes[-1] >= end + self.border.frame):
             notes.append(
                 f"{self.path}: its animation goes from {start:g} to {end:g}; outside of that its hair moves on as the loop "
                 "does while the body stands, so bake one round and repeat it"

@@ -121,8 +121,10 @@ def test_a_loop_is_seamless(tmp_path):
     assert not any("loop" in note for note in result.notes)
     first, last = hair_turns(tmp_path / "out.usda", [1, 25])
     assert np.abs(first - last).max() < 2e-4
+    assert bake_rig(shot, tmp_path / "blurred.usda", model, loop=True, subframes=3).notes == result.notes
     longer = bake_rig(shot, tmp_path / "longer.usda", model, loop=True, frames="1:60").notes
     assert sum("goes from 1 to 25; outside of that its hair moves on as the loop does" in note for note in longer) == 1
+    assert not any("held pose" in note for note in longer)
     bake_rig(shot, tmp_path / "open.usda", model)
     first, last = hair_turns(tmp_path / "open.usda", [1, 25])
     assert np.abs(first - last).max() > 1e-3
