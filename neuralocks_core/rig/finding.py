@@ -9,7 +9,7 @@ from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.hair_names import says_face, says_hair
+from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
 from neuralocks_core.rig.measuring import driving, measured_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
@@ -45,23 +45,33 @@ def find_chains(
         NoHairChains: there are none.
         NeuralocksError: a bone has no length, or a joint is mirrored or unevenly scaled.
     """
-    skeleton, head = character.skeleton, character.head
     tops = _by_pattern(character, patterns) if patterns else _by_itself(character, meshes)
     if not tops:
-        others = ", ".join(leaf(skeleton.names[j]) for j in skeleton.children[head][:8]) or "nothing"
-        remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
-        elsewhere = [j for j in np.flatnonzero(~skeleton.below(head)) if says_hair(skeleton.names[j])]
-        holder = skeleton.parents[elsewhere[0]] if elsewhere else -1
-        bare = [j for j in np.flatnonzero(skeleton.below(head)) if j != head and says_hair(skeleton.names[j])]
-        if meshes and bare:
-            remedy = f"'{leaf(skeleton.names[bare[0]])}' drives no vertex of a mesh: bind the hair's mesh to it"
-        if holder >= 0:
-            first, above = leaf(skeleton.names[elsewhere[0]]), leaf(skeleton.names[holder])
-            remedy = f"'{first}' hangs from '{above}': name that with --head {above}"
-        raise NoHairChains(
-            f"skeleton: no hair chains below '{leaf(skeleton.names[head])}' (it carries {others}); {remedy}"
-        )
+        raise _no_chains(character, meshes)
     return measured_chains(character, sorted(tops), meshes)
+
+
+def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHairChains:
+    """The error for a character without a chain, with the likely cause: hair that hangs from elsewhere, that has no skin, or
+    that no name tells.
+    """
+    skeleton, head = character.skeleton, character.head
+    names, below = skeleton.names, skeleton.below(head)
+    others = ", ".join(leaf(names[j]) for j in skeleton.children[head][:8]) or "nothing"
+    remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
+    # Elsewhere a tail is a tail.
+    elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(names[j])]
+    bare = [j for j in np.flatnonzero(below) if j != head and says_hair(names[j])]
+    unnamed = left_out(character, meshes or [])
+    if elsewhere and skeleton.parents[elsewhere[0]] >= 0:
+        first, above = leaf(names[elsewhere[0]]), leaf(names[skeleton.parents[elsewhere[0]]])
+        remedy = f"'{first}' hangs from '{above}': name that with --head {above}"
+    elif meshes and bare:
+        remedy = f"'{leaf(names[bare[0]])}' drives no vertex of a mesh: bind the hair's mesh to it"
+    elif unnamed:
+        first = leaf(names[unnamed[0]])
+        remedy = f"if '{first}' is hair, name all that is to move with --chains, as in --chains {first}"
+    return NoHairChains(f"skeleton: no hair chains below '{leaf(names[head])}' (it carries {others}); {remedy}")
 
 
 def left_out(

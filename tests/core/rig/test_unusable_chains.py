@@ -10,7 +10,7 @@ from neuralocks_core.anatomy.joint_names import prefixed_otherwise
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import HairChains, find_chains
-from tests.core.rig.builders import character, tail
+from tests.core.rig.builders import character, skin, tail
 
 
 @pytest.mark.parametrize(
@@ -112,3 +112,14 @@ def test_hair_that_hangs_from_the_neck_is_named_with_its_carrier():
     neck = next(j for j, name in enumerate(who.skeleton.names) if name.endswith("/neck"))
     carried = replace(who, humanoid=replace(who.humanoid, joints={**who.humanoid.joints, "head": neck}))
     assert find_chains(carried).names == ("ponytail_1", "ponytail_2")
+
+
+def test_chains_that_no_name_tells_come_before_a_tail_elsewhere():
+    """A creature's tail is no hair: with `--head hips` it would be trained as such, and the head's chains be left out."""
+    rows = [*tail("tail", 4, at=(0, 1, -0.1), parent="hips"), *tail("Bone", 4)]
+    who = character(rows)
+    body = skin(who, dict.fromkeys(["hips", *(name for name, *_ in rows)], np.eye(3) * 0.1 + [0, 1.6, -0.1]))
+    with pytest.raises(NeuralocksError, match="if 'Bone_1' is hair, name all that is to move with --chains"):
+        find_chains(who, [body])
+    with pytest.raises(NeuralocksError, match="name them with --chains PATTERN"):
+        find_chains(character(tail("tail", 4, at=(0, 1, -0.1), parent="hips")))
