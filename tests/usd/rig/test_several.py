@@ -18,14 +18,14 @@ from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
 @pytest.fixture
 def crowd(tmp_path):
-    """Two characters that move alike, a third whose head stands still, a fourth with other hair, and one without any."""
+    """Two characters that move alike, a third whose head stands still, a fourth with other hair, and one with a tail alone."""
     one, still = small_shot(tmp_path / "one.usda"), small_shot(tmp_path / "still.usda", head_moves=False)
     longer = small_shot(tmp_path / "longer.usda", step=0.11)
     stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1)
     for name, file in (("A", one), ("B", one), ("Still", still), ("Longer", longer)):
         stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(file))
-    UsdSkel.Skeleton.Define(stage, "/Prop").GetJointsAttr().Set(["lever"])
+    UsdSkel.Skeleton.Define(stage, "/Prop").GetJointsAttr().Set(["hips", "hips/tail_1"])
     stage.Save()
     model = model_for(read_rigged_hair(one))
     return tmp_path / "crowd.usda", model, bake_rig(one, tmp_path / "alone.usda", model).path
