@@ -80,10 +80,12 @@ class Baked(NamedTuple):
     Attributes:
         hair: file and prim path by object name.
         notes: what an artist should know, in the words of the panel.
+        prims: prim path by object name, of all that is in the shot.
     """
 
     hair: dict[str, tuple[str, str]]
     notes: list[str]
+    prims: dict[str, str]
 
 
 def bake_steps(context, armature, hairs, path: str, undrawn=()):
@@ -117,6 +119,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
     sampled = yield from sampling(context, named(character), share=0.5)
     notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}
+    written: dict[str, str] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):
             shot = shot_beside(out)
@@ -137,10 +140,11 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
             )
             result = yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
             baked |= {name: (str(out), prims[name]) for name in names}
+            written |= prims
             notes += [for_the_panel(with_objects(note, prims)) for note in result.notes]
     for out in outs:
         attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()})
-    return Baked(baked, list(dict.fromkeys(notes)))
+    return Baked(baked, list(dict.fromkeys(notes)), written)
 
 
 def _outs(path: Path, count: int) -> list[Path]:
@@ -162,7 +166,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
         path = self.filepath or context.scene.neuralocks.output
         hairs = hairs_of(armature, context.scene)
         undrawn = [hair.name_full for hair in hairs if not in_renders(hair, context.scene)]
-        baked, notes = yield from bake_steps(context, armature, hairs, path, undrawn)
+        baked, notes, _ = yield from bake_steps(context, armature, hairs, path, undrawn)
         left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
         more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""
         tell(self, f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}", notes)
@@ -189,7 +193,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
             return any(other != name for other in players) or is_anothers(out, character)
 
         path = untaken(path, label, taken)
-        baked, notes = yield from bake_steps(context, named(character), [named(name)], str(path))
+        baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path))
         hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name], context.scene)
@@ -228,8 +232,8 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         name = hair.name_full
         folder = tempfile.mkdtemp(prefix="neuralocks_")
         try:
-            baked, _ = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
-            session.cards[name] = yield from _card(baked[name][0])
+            baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
+            session.cards[name] = yield from _card(baked.hair[name][0], baked.prims)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         for line in session.cards[name]:
@@ -237,15 +241,15 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         return f"{name}: report card made"
 
 
-def _card(path: str):
-    """Steps of measuring a bake; returns the lines of its card."""
+def _card(path: str, prims: dict[str, str]):
+    """Steps of measuring a bake of the objects that are these prims, by name; returns the lines of its card."""
     from ..services.card import lines_of
 
     yield from loading("usd.review.evaluate")
     from usd.review.evaluate import evaluate
 
     measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
-    return lines_of((yield from measuring.steps()))
+    return [for_the_panel(with_objects(line, prims)) for line in lines_of((yield from measuring.steps()))]
 
 
 CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)

@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 
 from dcc_addon.scene import curves
 from dcc_addon.services.trainers import Trainers
+from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused
 
@@ -117,6 +118,10 @@ def told_of_a_bake(folder: Path) -> None:
     for begin, words in (("Hero: its head is put elsewhere at 13", "anew"), ("前髪: 1 of 20 strands", "rigidly")):
         assert any(line.startswith(begin) and words in line for line in told), told
     assert not any("/Character" in line or "--" in line for line in told), told
+    assert bpy.ops.neuralocks.report_card() == {"FINISHED"}
+    card = session.cards[strands.name_full]
+    assert any(line.startswith("前髪: 1 of 20 strands") for line in card), card
+    assert not any("/Character" in line or "--" in line for line in card), card
 
 
 def _told(operator, **options) -> list[str]:
