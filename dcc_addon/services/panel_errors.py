@@ -28,6 +28,8 @@ WORDS = (
     (" (--cuts says where)", ""),
     ("leave out --loop", "turn Loop off"),
     ("check the stage's metersPerUnit", "check the scene's Unit Scale"),
+    ("its skel binding puts its roots", "where its object stands in the rest pose, its roots are"),
+    ("check its unit and primvars:skel:geomBindTransform", "check the object's place and scale, and its parent's"),
     ("train one with random_materials=True, as the other ways of training do", "train one here"),
 )
 """What the command line says, and the panel; in this order."""
