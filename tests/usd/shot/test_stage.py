@@ -16,6 +16,7 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import resample
+from usd.border.time_codes import time_codes
 from usd.border.units import Border
 from usd.review.inspect import groom_facts, inspect
 from usd.shot.notes import groom_notes
@@ -168,6 +169,10 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     rig = read_shot(write_shot(tmp_path)).rigs[0]
     closed = replace(rig, clip=Clip(rig.clip.times[:3], rig.clip.joints[[0, 1, 0]]))
     assert not closed.loop_notes()
+    assert not closed.loop_notes(time_codes("1:9", 1, 9, subframes=64)), "one round, with the last frame's own samples"
+    for frames in ("0:9", "1:10"):
+        (note,) = closed.loop_notes(time_codes(frames, 1, 9))
+        assert "goes from 1 to 9" in note
     (note,) = rig.loop_notes()
     assert "/Hero/Rig" in note and "time codes 1 and 9" in note
     turned = rig.clip.joints[[0, 0]]
