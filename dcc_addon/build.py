@@ -11,6 +11,7 @@ import subprocess
 import sys
 import uuid
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -24,7 +25,7 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13")
 """Of Blender 4.2 to 5.0, and of 5.1 and later."""
 PINNED = ("onnxruntime", "usd-core")
-"""Packages that come along as `constraints.txt` has them. numpy is Blender's own."""
+"""Packages that come along as `constraints.txt` has them. numpy is Blender's own; see LEGACY_TOO."""
 HELD_BACK = {"scipy": "1.15.3"}
 """The newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons."""
 OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}, "windows-x64": {"onnxruntime": "1.20.1"}}
@@ -37,6 +38,8 @@ ENDED = {"macos-x64": ("3.13",)}
 """Pythons that no Blender of a platform has: the last for Intel Macs is 4.5 LTS."""
 LEGACY = ("linux-x64", "3.11")
 """What the zip for Blender before 4.2 is built for: Linux distributions, which still carry it."""
+LEGACY_TOO = ("numpy",)
+"""What that one has besides: Debian's Blender comes without numpy. Where there is one, that is found first."""
 NOT_SHIPPED = ("build.py", "__pycache__")
 
 
@@ -61,6 +64,7 @@ def main() -> int:
         print(extension(args.output, platform, wheels))
     if not args.no_legacy:
         platform, python = LEGACY
+        versions = compiled((*PINNED, *LEGACY_TOO))
         wheels = [own, *download(args.cache / platform / python, versions, platform, python)]
         print(legacy(args.output, wheels))
     return 0
@@ -73,11 +77,11 @@ def own_wheel(folder: Path) -> Path:
     return next(folder.glob("neuralocks-*.whl"))
 
 
-def compiled() -> dict[str, str]:
-    """Package -> version of what comes along."""
+def compiled(pinned: Sequence[str] = PINNED) -> dict[str, str]:
+    """Package -> version of what comes along, of the `pinned` as constraints have it."""
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pins = dict(line.split("==") for line in lines if "==" in line)
-    return {name: pins[name] for name in PINNED} | HELD_BACK
+    return {name: pins[name] for name in pinned} | HELD_BACK
 
 
 def download(folder: Path, versions: dict[str, str], platform: str, python: str) -> list[Path]:

@@ -48,6 +48,18 @@ def test_zips_hold_what_blender_expects(tmp_path):
     )
 
 
+def test_the_legacy_zip_brings_numpy(tmp_path, monkeypatch):
+    """Debian's Blender has none; to the others it is their own."""
+    made = {}
+    monkeypatch.setattr(build, "own_wheel", lambda _: "own")
+    monkeypatch.setattr(build, "download", lambda folder, versions, *_: list(versions))
+    monkeypatch.setattr(build, "extension", lambda *given: made.setdefault("extension", given[-1]))
+    monkeypatch.setattr(build, "legacy", lambda *given: made.setdefault("legacy", given[-1]))
+    monkeypatch.setattr("sys.argv", ["build.py", "--platform", "linux-x64", "-o", str(tmp_path / "out")])
+    assert build.main() == 0
+    assert set(made["legacy"]) - set(made["extension"]) == {"numpy"}
+
+
 def test_windows_gets_what_runs_beside_blenders_own_libraries(tmp_path, monkeypatch):
     """Blender's usd_ms.dll and C++ runtime are loaded before ours would be."""
 
