@@ -75,7 +75,9 @@ def _check_words(function, given: dict) -> None:
     for name, value in given.items():
         for word in value if isinstance(value, list) else [value]:
             if isinstance(word, str | Path) and not str(word).strip():
-                raise NeuralocksError(f"{_as_typed(function, name)}: is empty; give a value, or leave it out")
+                needed = inspect.signature(function).parameters[name].default is inspect.Parameter.empty
+                remedy = "give a value" if needed else "give a value, or leave it out"
+                raise NeuralocksError(f"{_as_typed(function, name)}: is empty; {remedy}")
             try:
                 str(word if isinstance(word, Path) else "").encode()
             except UnicodeEncodeError:
