@@ -41,9 +41,9 @@ def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
         return False
     placement = Placement(prim)
     for rig in rigs:
-        for mesh, tree in zip(rig.meshes, rig.skins, strict=True):
+        for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for way in ways(rig, mesh, placement):
-                if np.median(tree.query(transformed(roots, way), distance_upper_bound=2 * NEAR)[0]) <= NEAR:
+                if np.median(skin.query(transformed(roots, way), 2 * NEAR)[0]) <= NEAR:
                     return True
         if len(roots) > 1 and "head" in rig.character.humanoid:
             head = rig.character.canonical_to_bind[:3, 3]

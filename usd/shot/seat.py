@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pxr import Usd
-from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
+from ..skel.skin import Skin
 from ..skel.stage_rig import StageRig
 from ..skel.surface import StageMesh
 from .curve_ends import Beyond, beyond_ends, ends
@@ -48,7 +48,7 @@ class Seat:
         to_bind: its way to bind world, (4, 4).
         way: whether that way is unlikely, and its place among `ways`.
         roots: of some strands, in bind world [m], (n, 3).
-        tree: the mesh's points there.
+        skin: the mesh there.
     """
 
     distance: float
@@ -57,12 +57,12 @@ class Seat:
     to_bind: np.ndarray
     way: tuple[bool, int]
     roots: np.ndarray = field(repr=False)
-    tree: cKDTree = field(repr=False)
+    skin: Skin = field(repr=False)
 
     @property
     def points(self) -> np.ndarray:
         """The mesh's nearest point to each root (n,)."""
-        return self.tree.query(self.roots)[1]
+        return self.skin.query(self.roots)[1]
 
 
 def find_seat(
@@ -84,7 +84,7 @@ def begins_where_drawn(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray, beyon
 
 def off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
     """Distance of points (n, 3) of a prim from the nearest skin of a rig that has some, in the median [m]."""
-    far = [tree.query(transformed(points, to_bind))[0] for tree in rig.skins]
+    far = [skin.query(transformed(points, to_bind))[0] for skin in rig.skins]
     return float(np.median(np.min(far, axis=0)))
 
 
@@ -100,19 +100,19 @@ def _find_seat(
     best = None
     drifts = None if when is not None or not rig.meshes else _drifts(rig, placement)  # the same for all meshes
 
-    def nearest(best: Seat | None, mesh, tree, way: tuple[bool, int], to_bind) -> Seat | None:
+    def nearest(best: Seat | None, mesh, skin, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
         # In a crowd nearly all skins are far, and to find the nearest point of a far one takes a hundred times as long
         # as to find that none is near. Twice the bound, for what is nearer by another way must be so CLEARLY.
-        middle = float(np.median(tree.query(placed, distance_upper_bound=CLEARLY * within)[0]))
+        middle = float(np.median(skin.query(placed, CLEARLY * within)[0]))
         clear = CLEARLY if best is not None and way > best.way else 1
         better = np.isfinite(middle) and (best is None or clear * middle < best.distance - 1e-4)
-        return Seat(middle, rig, mesh, to_bind, way, placed, tree) if better else best
+        return Seat(middle, rig, mesh, to_bind, way, placed, skin) if better else best
 
     for likely in (True, False):
-        for mesh, tree in zip(rig.meshes, rig.skins, strict=True):
+        for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
-                best = nearest(best, mesh, tree, (not likely, place), to_bind)
+                best = nearest(best, mesh, skin, (not likely, place), to_bind)
         if best is not None and best.distance <= NEAR:
             break
     return best if best is not None and best.distance <= within else None
@@ -166,7 +166,7 @@ def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
         return []
     back = np.linalg.inv(seat.to_bind)
     places = [transformed(seat.roots, way @ back) for way in ways(seat.rig, seat.mesh, placement, drifts=drifts)]
-    near = [roots for roots in places if np.median(seat.tree.query(roots)[0]) <= NEAR]
+    near = [roots for roots in places if np.median(seat.skin.query(roots)[0]) <= NEAR]
     apart = max((float(np.median(np.linalg.norm(roots - seat.roots, axis=1))) for roots in near), default=0.0)
     if apart < APART:
         return []

@@ -5,18 +5,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP, Clip
-from neuralocks_core.rotation import angle_between, transformed
+from neuralocks_core.rotation import angle_between
 
 from ..border.units import Border
 from .joints import JointSource
 from .motion_sketch import motion_sketch
+from .skin import Skin
 from .surface import StageMesh
 
 
@@ -131,9 +131,9 @@ class StageRig:
         return ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
 
     @cached_property
-    def skins(self) -> list[cKDTree]:
-        """The points of each mesh in bind world [m], by nearness."""
-        return [cKDTree(transformed(mesh.points, self.to_bind @ mesh.geom_bind)) for mesh in self.meshes]
+    def skins(self) -> list[Skin]:
+        """Each mesh in bind world [m], by nearness."""
+        return [Skin(*mesh.in_bind(self.to_bind)) for mesh in self.meshes]
 
     @cached_property
     def surface(self) -> Collider | None:

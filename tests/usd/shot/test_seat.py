@@ -13,9 +13,9 @@ from usd.review.baked import read_baked
 from usd.shot import seat
 from usd.shot.seat import NEAR, find_seat
 from usd.shot.stage import read_rigs, read_shot
-from usd.skel import stage_rig, surface
+from usd.skel import skin, surface
 
-from ..shots import HEAD, Recipe, world_points, write_shot
+from ..shots import CENTRE, HEAD, Recipe, world_points, write_shot
 
 START = 4
 """Time code at which a character that turns its head from the first frame on is seen first."""
@@ -187,6 +187,34 @@ def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
         np.testing.assert_array_equal(bounded.points, seat.points)
 
 
+def test_hair_sits_in_the_middle_of_wide_faces(tmp_path):
+    """A large head or one of few vertices: hair far from every corner was taken to lie off the skin, and placed without it."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    mesh, curves = (UsdGeom.PointBased(stage.GetPrimAtPath(f"/Hero/{name}")) for name in ("Skin", "Hair"))
+    corners = CENTRE + 0.12 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(corners.astype(np.float32)))
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Set([4] * 6)
+    UsdGeom.Mesh(mesh).GetFaceVertexIndicesAttr().Set(np.ravel(sides).tolist())
+    # The lower corners hang on another joint: what hair rides on is asked of those near to it.
+    binding = UsdSkel.BindingAPI(mesh)
+    binding.GetJointIndicesPrimvar().Set([1, 1, HEAD, HEAD] * 2)
+    binding.GetJointWeightsPrimvar().Set([1.0] * 8)
+    across = np.array([(x, 0, z) for x in np.linspace(-0.05, 0.05, 8) for z in np.linspace(-0.05, 0.05, 5)])
+    points = CENTRE + across[:, None] + np.linspace(0.12, 0.3, 12)[:, None] * [0, 1, 0]
+    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    stage.Save()
+    shot = read_shot(path)
+    (item,) = shot.grooms
+    assert item.joint.endswith("/head") and "(binding of /Hero/Skin, on which it sits)" in item.attachment.how
+    assert not [note for note in shot.notes if "from the skin" in note]
+    (rig,) = read_rigs(path)
+    prim = stage.GetPrimAtPath("/Hero/Hair")
+    seat = find_seat(prim, rig, Placement(prim))
+    assert seat.distance < 0.02 and {*seat.points} == {2, 3, 6, 7}
+
+
 def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
     """Not once for each character or groom: reading 24 of 13,000 points took half a minute."""
     write_shot(tmp_path, Recipe(bound="mesh"), "asset")
@@ -198,7 +226,7 @@ def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
         UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(number, 0, 0))
     stage.Save()
     sorted_, tree = [], cKDTree
-    monkeypatch.setattr(stage_rig, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
+    monkeypatch.setattr(skin, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
     asked, bound = [], surface.bound_skeleton
     monkeypatch.setattr(surface, "bound_skeleton", lambda prim: asked.append(prim.GetPath()) or bound(prim))
     assert len(read_shot(stage.GetRootLayer().realPath).grooms) == 4
