@@ -156,7 +156,7 @@ def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     """The notes on a held pose and on poses that are held for some frames, on joints that were not recognized by name and on a
     head of an unlikely size.
     """
-    held = len(rig.time_codes) == 1
+    held = rig.source.animated and len(rig.time_codes) == 1
     notes = [f"{rig.path}: the animation has one sample, so the hair is that of a held pose"] if held else []
     return notes + on_twos(rig, joints) + unfound(rig, joints) + unlikely_head(rig)
 

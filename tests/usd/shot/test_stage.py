@@ -119,6 +119,9 @@ def test_rigs_are_read_without_grooms_or_animation(tmp_path):
     assert len(read_rigs(path)[0].clip.times) == 1
     with pytest.raises(NeuralocksError, match="no animation"):
         read_shot(path)
+    facts = inspect(path)
+    assert any("no animation" in text for text in facts["stops"])
+    assert not any("one sample" in text for text in facts["spoils"])
 
 
 def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
