@@ -16,7 +16,8 @@ ROOM = 0.03
 """How far around the head the grid reaches [m]."""
 EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
-MOST_NODES = 3_000_000
+MOST_NODES = 1_000_000
+"""At most: the cells of a head that is some times as large as life are larger, as its features are. Bakes wait for it."""
 SAME = 7
 """Digits after the point [m] to which a head is told from another, and made."""
 
