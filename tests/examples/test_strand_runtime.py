@@ -106,6 +106,26 @@ def test_it_has_it_too_on_a_character_that_is_shown_larger_and_whose_head_grows(
     assert differences(tmp_path / "onnx", shot, tmp_path / "hair.usdc", {}).max() < 1e-5
 
 
+def test_it_has_it_too_on_a_body_of_another_shape_than_it_was_groomed_on(tmp_path, shot):
+    stage = Usd.Stage.Open(str(shot))
+    skin = stage.GetPrimAtPath("/Hero/Skin")
+    larger = UsdSkel.BlendShape.Define(stage, "/Hero/Skin/Larger")
+    larger.CreateOffsetsAttr([Gf.Vec3f(0, 0.02, 0)] * len(skin.GetAttribute("points").Get()))
+    binding = UsdSkel.BindingAPI.Apply(skin)
+    binding.CreateBlendShapesAttr(["larger"])
+    binding.CreateBlendShapeTargetsRel().SetTargets([larger.GetPath()])
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    animation.CreateBlendShapesAttr(["larger"])
+    animation.CreateBlendShapeWeightsAttr([0.5])
+    stage.Save()
+    model = model_file.shipped("strands")
+    export_model(model, tmp_path / "onnx", shot)
+    for clumping in (60, 10):
+        baked = tmp_path / f"{clumping}.usdc"
+        bake(shot, baked, model, frames="1:40:13", resolve=False, material={"clumping": clumping})
+        assert differences(tmp_path / "onnx", shot, baked, {"clumping": clumping}).max() < 1e-5
+
+
 def test_every_array_of_a_groom_is_described(tmp_path, shot):
     export_model(model_file.shipped("strands"), tmp_path, shot)
     described = json.loads((tmp_path / "description.json").read_text())["grooms"]

@@ -11,6 +11,7 @@ import numpy as np
 
 from neuralocks_core import model as model_file
 from neuralocks_core.deformation.clumping import Locks
+from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
 from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.rotation import rotation_part, sizes
@@ -97,7 +98,8 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
     led.anchor(held)
     skeleton, joint = character.skeleton, character.carrying_joint
     arrays = {
-        "rest": strands.rest,
+        # What the network reads of a strand does not move with its root.
+        "rest": RootSkin(character, [strands], rig.clip).begun(strands).rest,
         "valid": strands.valid,
         "strand_part": session.strand_part,
         "anchor": session.anchor_offsets,
