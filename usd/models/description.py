@@ -57,7 +57,9 @@ _BLOWS = (
     f"{BoundarySampler.GRAVITY_LIMIT:g} * 9.81 max((t_i+1 - t_i-1) / 2, dt): it changes by one so long, "
     "and the path goes on from there as it would. A loop stays as it is."
 )
-_SPACES = "(3, 3) without scale; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
+_SPACES = "(3, 3), without scale: columns made of unit length, and of what then shears the nearest rotation; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
+_PLACE = "the place of the head joint"
+_STRAND_PLACE = _PLACE + " (on hair that a joint below it carries: of `canonical_to_head`'s origin)"
 
 STRAND_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), " + _SPACES,
@@ -102,7 +104,8 @@ SLIDERS = {
     "blend shapes": "roots and `shape` here are those of the clip's first sample. Where the animation changes blend shapes, a bake "
     "moves roots with the skin below them, and measures `shape` anew in each frame",
     "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
-    "goes on in a straight line and does not turn. A bake finds cuts, or is told them (`--cuts`)",
+    "goes on in a straight line and does not turn. The sample before it is the last of a clip of its own, after which the head "
+    "stands still. A bake finds cuts, or is told them (`--cuts`)",
     "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
 }
 """What an artist or a game changes, and what it does to what is above."""
@@ -116,20 +119,20 @@ def described(file: model_file.ModelFile) -> dict:
     result = {"units": UNITS, "graphs": _graphs(file)}
     if file.kind == "strands":
         result["boundary vector"] = {
-            **_input(spec, list(spec.slices), STRAND_INPUT),
+            **_input(spec, list(spec.slices), STRAND_INPUT, _STRAND_PLACE),
             "pose joints": spec.pose_joints,
             "shape": MEASURES,
         }
         result["sliders"] = SLIDERS
     else:
-        result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT)
+        result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT, _PLACE)
         result["features"]["how"]["history"] += (
             ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
         )
     return result | {"model": file.meta | {"training": training}}
 
 
-def _input(spec: BoundarySpec, parts: list[str], how: dict) -> dict:
+def _input(spec: BoundarySpec, parts: list[str], how: dict, place: str) -> dict:
     """Where those parts of the boundary vector lie that a network reads, one after another, and how they are made."""
     sizes = [spec.slices[name].stop - spec.slices[name].start for name in parts]
     ends = np.cumsum(sizes).tolist()
@@ -138,24 +141,25 @@ def _input(spec: BoundarySpec, parts: list[str], how: dict) -> dict:
         "parts": {name: [end - size, end] for name, size, end in zip(parts, sizes, ends, strict=True)},
         "steps": spec.steps,
         "bin weights": [float(weight) for weight in spec.bin_weights],
-        "how": how | {"history": _history(spec)},
+        "how": how | {"history": _history(spec, place)},
     }
 
 
-def _history(spec: BoundarySpec) -> str:
-    """How the history of such a boundary vector is made."""
+def _history(spec: BoundarySpec, place: str) -> str:
+    """How the history of such a boundary vector is made, of which place of the head."""
     linear = {"gravity": ["f_k"], "velocity": ["v_k"], "none": []}[spec.linear]
     steps = [*linear, "s_k", *["c_k"] * spec.chest]
     return (
-        f"step k = 0 ... steps - 1 is {', '.join(steps)}, three numbers each. With p the place of the head joint (on "
-        "hair that a joint below it carries: of `canonical_to_head`'s origin) and t_k = t - k dt: "
+        f"step k = 0 ... steps - 1 is {', '.join(steps)}, three numbers each. With p {place} and t_k = t - k dt: "
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
         "natural cubic spline through them, of the place and of the quaternion's components, signs continuous; `pose` and `gravity` are of the "
         f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} Of animation on twos to fours, in which poses are held for two to four samples each, the "
-        "samples that repeat a pose are left out, and at their times t is that of the pose's first; one that shows for longer than "
+        "samples that repeat a pose are left out, and at their times t is that of the pose's first (between two samples t goes evenly "
+        "from the one's to the other's, after the last one on with time); one that shows for longer than "
         f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row, which this only nears). Before the first sample "
-        "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still"
+        "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still. Of a loop (`--loop`) "
+        "t goes round instead, the head ahead by its way in each round, and the spline goes on over the seam on both sides"
     )
 
 

@@ -2,6 +2,7 @@
 """What is exported says how to feed it."""
 
 import json
+import re
 
 import numpy as np
 import onnxruntime
@@ -15,6 +16,8 @@ from neuralocks_core.rotation import from_vector
 from tests.strand_models import write_random_model
 from usd.models.export import export_model
 from usd.skel.clip_codes import CLOSE, STAND
+
+from ..shots import write_shot
 
 
 @pytest.mark.parametrize(
@@ -47,6 +50,17 @@ def test_the_history_told_is_that_of_the_model(tmp_path, linear, chest, told):
     assert f"is {told}, three numbers each" in history
     assert all((f"{step} =" in history) == (step in told) for step in ("f_k", "v_k", "s_k"))
     assert ("the same of the upper chest" in history) == chest
+
+
+@pytest.mark.parametrize(("kind", "entry"), [("strands", "boundary vector"), ("rig", "features")])
+def test_all_that_the_history_names_is_in_the_description(tmp_path, kind, entry):
+    """And what becomes of it where motion is held, ends, or goes round."""
+    export_model(model_file.shipped(kind), tmp_path, write_shot(tmp_path) if kind == "strands" else None)
+    text = (tmp_path / "description.json").read_text("utf-8")
+    history = json.loads(text)[entry]["how"]["history"]
+    named = set(re.findall("`(\\w[^`]*)`", history))
+    assert {name for name in named if f'"{name}":' not in text} == set()
+    assert all(word in history for word in ("between two samples t goes evenly", "`--loop`", "stands still"))
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
