@@ -106,7 +106,6 @@ def droop(form: Cosserat, turns: float, steps: int = 5) -> float:
     edges = rest.diff(dim=-2)
     turn = torch.zeros(1, 22, 3, dtype=torch.float64, requires_grad=True)
     down = torch.tensor([0.0, -9.81, 0.0], dtype=torch.float64)
-    optimiser = torch.optim.LBFGS([turn], max_iter=400, history_size=50, line_search_fn="strong_wolfe")
 
     def points() -> torch.Tensor:
         turned = torch.nn.functional.normalize(edges[:, 1:] / constants.length[:, 1:, None] + turn, dim=-1)
@@ -115,8 +114,18 @@ def droop(form: Cosserat, turns: float, steps: int = 5) -> float:
 
     # The weight grows in steps: all at once, the search may end with the curl wound another way.
     for part in range(1, steps + 1):
+        # Anew, for its memory is of other weights; torch's own tolerances end it short of the equilibrium.
+        optimiser = torch.optim.LBFGS(
+            [turn],
+            max_iter=4000,
+            max_eval=8000,
+            history_size=50,
+            tolerance_grad=1e-9,
+            tolerance_change=1e-14,
+            line_search_fn="strong_wolfe",
+        )
 
-        def closure(part=part) -> torch.Tensor:
+        def closure(part=part, optimiser=optimiser) -> torch.Tensor:
             optimiser.zero_grad()
             x = points()
             energy = (bend_twist(x, constants, 1e-2, form) + gravity(x, constants, down * part / steps)).sum()

@@ -6,6 +6,7 @@ import math
 import pytest
 import torch
 
+from benchmarks.bend_twist import droop
 from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
 from neuralocks_core.physics.rods import rods
 from neuralocks_core.physics.transport import conjugate, direct_frames, loop_frames, product, scan_frames
@@ -124,3 +125,9 @@ def _fold():
     x = straight()
     x[:, 12:] = 2 * x[:, 11:12] - x[:, 12:]
     return x
+
+
+def test_the_droop_that_the_docs_tell_is_an_equilibrium():
+    """Which does not depend on the steps in which the weight grew."""
+    for form, turns in ((Cosserat.DIRECT, 3), (Cosserat.CONSTANT, 3), (Cosserat.DIRECT, 0)):
+        assert droop(form, turns, steps=4) == pytest.approx(droop(form, turns, steps=10), abs=1e-5)
