@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the benchmarks of speed that need no Blender, one after the other: `make bench`."""
 
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ SCRIPTS = ("inference", "bake_speed", "bend_twist", "resolve", "reference_speed"
 
 def main() -> int:
     """The worst exit status."""
+    argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__, epilog=", ".join(SCRIPTS)).parse_args()
     worst = 0
     for name in SCRIPTS:
         print(f"\n== {name} ==", flush=True)
