@@ -11,6 +11,7 @@ from .scene import rotations
 from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
+from .unsampled import unsampled
 
 
 def live_armatures(scene) -> list:
@@ -30,8 +31,7 @@ def update(armature, scene, graph, moved: bool = False) -> None:
 def _update(armature, scene, graph, moved) -> None:
     sampled = session.rigs.get(armature.name_full)
     if sampled is None:
-        session.wanting = True
-        raise NeuralocksError(f"{armature.name_full}: its motion is not sampled yet; press Sample Motion")
+        raise unsampled(armature.name_full)
     before = session.chains.get(armature.name_full)
     bones, modes, _ = bound = bind(armature, sampled)
     if bound is not before:  # another model turned other bones, or a file remembers what nobody can have put aside

@@ -29,6 +29,7 @@ from .services.live import LiveHair
 from .services.motion import TOLERANCE
 from .services.sliders import MATERIAL, MOTION
 from .session import session
+from .unsampled import unsampled
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
 
@@ -67,11 +68,10 @@ def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
         raise NeuralocksError(f"{hair.name_full}: the hair is being edited; live goes on when you leave the mode")
     sampled = session.rigs.get(armature.name_full)
     if sampled is None:
-        session.wanting = True
-        raise NeuralocksError(f"{armature.name_full}: its motion is not sampled yet; press Sample Motion")
+        raise unsampled(armature.name_full)
     if hair.name_full not in sampled.motion.places:
-        sampled.stale = session.wanting = True
-        raise NeuralocksError(f"{armature.name_full}: its motion was sampled without this hair; press Sample Motion")
+        sampled.stale = True
+        raise unsampled(armature.name_full, "its motion was sampled without this hair")
     place = world(hair, graph)
     joined.settle(hair)
     edited.follow(hair, sampled, place)

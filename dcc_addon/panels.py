@@ -17,6 +17,7 @@ from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .services.sliders import SLIDERS
 from .session import session
+from .unsampled import FIRST
 
 STRETCHED = (
     "Time Stretching was changed since it was baked, and it plays the motion of before; press Bake and Attach again"
@@ -264,9 +265,9 @@ def findings(armature) -> tuple[list[str], str]:
 
 
 def message(layout, name: str) -> None:
-    """What went wrong with an object, if anything did."""
-    if session.messages.get(name):
-        words(layout, for_the_panel(session.messages[name]), "ERROR")
+    """What went wrong with an object, or what it waits for, if anything."""
+    if text := session.messages.get(name):
+        words(layout, for_the_panel(text), "TIME" if text.endswith(FIRST) else "ERROR")
 
 
 def hint(text: str) -> dict[str, str]:

@@ -2,12 +2,37 @@
 """The live view: the groomed hair is kept, what is rendered is as it is shown, two characters at a time."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import bpy
 import numpy as np
 
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, make_live, messages, points_at
+from tests.blender.panel import drawn
+
+
+def sampled_first(_folder: Path) -> None:
+    """In a window the first Live is told to wait, and is no error: the motion is sampled by itself, unless that has failed."""
+    from dcc_addon import live
+    from dcc_addon.session import session
+
+    def said(icon: str) -> bool:
+        return any("Rig: its motion" in line for line in drawn(icon))
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    with patch("dcc_addon.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
+        strands.neuralocks_hair.live = True
+        assert session.wanting and "sampled first" in messages()["Hair"], messages()
+        assert said("TIME") and not said("ERROR")
+        session.failed.add("Rig")
+        live.refresh(scene)
+        assert "press Sample Motion" in messages()["Hair"], messages()
+        assert said("ERROR") and not said("TIME")
 
 
 def rest_is_safe(folder: Path) -> None:

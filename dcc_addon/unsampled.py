@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live hair whose character's motion is unknown so far."""
+
+import bpy
+
+from neuralocks_core.errors import NeuralocksError
+
+from .session import session
+
+FIRST = "its motion is sampled first, as soon as nothing plays; then the hair moves"
+"""What an artist has to wait for, and need not see to."""
+
+
+def unsampled(name: str, why: str = "its motion is not sampled yet") -> NeuralocksError:
+    """The error that an armature's motion is unknown, which asks for it: with a window it is sampled in the background,
+    unless that has failed.
+    """
+    session.wanting = True
+    told = f"{why}; press Sample Motion" if bpy.app.background or name in session.failed else FIRST
+    return NeuralocksError(f"{name}: {told}")
