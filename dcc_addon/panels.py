@@ -155,6 +155,7 @@ def _training(layout, settings, kind: str) -> None:
         column.prop(settings, "train_minutes")
         if problem := known_problem():
             words(layout, problem, "INFO")
+            layout.operator("neuralocks.copy_install", icon="COPYDOWN")
         if session.trained is not None:
             text, well = session.trained
             words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")
@@ -289,7 +290,7 @@ def words(layout, text: str, icon: str) -> None:
     width = max(20, int((region.width / scale - 60) / 6)) if region else 40
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, width) or [""]):
+    for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False) or [""]):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 

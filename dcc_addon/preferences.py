@@ -27,6 +27,8 @@ class Preferences(bpy.types.AddonPreferences):
             column.label(text="Looking for what training needs", icon="TIME")
         else:
             words(column, problem or "Ready to train", "INFO" if problem else "CHECKMARK")
+        if problem:
+            column.operator("neuralocks.copy_install", icon="COPYDOWN")
 
 
 CLASSES = (Preferences,)

@@ -23,7 +23,7 @@ from ..services.names import file_label
 from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
-from ..services.training_job import TrainingJob, default_python
+from ..services.training_job import TrainingJob, default_python, installing
 from ..session import session
 from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
 
@@ -76,6 +76,18 @@ def await_answer() -> float | None:
         return 0.2
     redraw()
     return None
+
+
+class NEURALOCKS_OT_copy_install(Hardened, bpy.types.Operator):
+    """Copy the command that installs what training needs, to be pasted into a terminal"""
+
+    bl_idname = "neuralocks.copy_install"
+    bl_label = "Copy Install Command"
+    bl_options = {"REGISTER"}
+
+    def work(self, context):
+        context.window_manager.clipboard = installing()
+        return "The command is copied; paste it into a terminal"
 
 
 class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
@@ -234,4 +246,4 @@ def _out(name: str) -> str:
     return str(folder / f"{label}_{number}.neuralocks")
 
 
-CLASSES = (NEURALOCKS_OT_train, NEURALOCKS_OT_cancel_training)
+CLASSES = (NEURALOCKS_OT_copy_install, NEURALOCKS_OT_train, NEURALOCKS_OT_cancel_training)

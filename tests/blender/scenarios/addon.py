@@ -160,3 +160,15 @@ def remedy_in_full(_folder: Path) -> None:
         Preferences.draw(SimpleNamespace(layout=layout), None)
     lines = [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith(".label")]
     assert " ".join(lines) == said and max(map(len, lines)) <= 40, lines
+    assert [call.args[0] for call in layout.mock_calls if call[0].endswith(".operator")] == ["neuralocks.copy_install"]
+
+
+def command_is_copied(_folder: Path) -> None:
+    """Typed from the panel, where it is broken into lines, it would come out wrong."""
+    from dcc_addon.operators.training import NEURALOCKS_OT_copy_install
+    from dcc_addon.services.training_job import installing
+
+    context = MagicMock()
+    message = NEURALOCKS_OT_copy_install.work(SimpleNamespace(), context)
+    assert context.window_manager.clipboard == installing() and "terminal" in message
+    assert bpy.ops.neuralocks.copy_install() == {"FINISHED"}
