@@ -119,6 +119,18 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
 
 
+def named_head(names) -> str | None:
+    """Path of the joint that names and hierarchy alone say is the head, of joint paths (J) separated by `/`; None without one."""
+    place = {name: index for index, name in enumerate(names)}
+    if not place:
+        return None
+    try:
+        found = find_humanoid(names, [place.get(name.rpartition("/")[0], -1) for name in names])
+    except NoHead:
+        return None
+    return names[found["head"]]
+
+
 def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
     """What of a limb has no name, below its first joint."""
     for side in ("left", "right"):

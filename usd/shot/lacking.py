@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pxr import Usd, UsdGeom, UsdSkel
 
+from neuralocks_core.anatomy.humanoid import named_head
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.hair_names import says_hair, says_hair_alone
 
@@ -50,13 +51,14 @@ def has_hair_joints(prim: Usd.Prim) -> bool:
     """Whether joints of a Skeleton are named like hair."""
     joints = UsdSkel.Skeleton(prim).GetJointsAttr()
     with suppress(NeuralocksError):  # what is wrong with them is told where the skeleton is read
-        return any(map(_is_hair, as_names(joints, joints.Get())))
+        names = as_names(joints, joints.Get())
+        if any(map(says_hair_alone, names)):
+            return True
+        # A tail is hair below a head alone.
+        doubtful = [name for name in names if says_hair(name)]
+        head = named_head(names) if doubtful else None
+        return head is not None and any(name.startswith(f"{head}/") for name in doubtful)
     return False
-
-
-def _is_hair(path: str) -> bool:
-    """Whether a joint is named like hair where it hangs: a tail is hair below a head alone."""
-    return says_hair_alone(path) or says_hair(path) and "head" in path.rpartition("/")[0].lower()
 
 
 def _on_joints(stage: Usd.Stage) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdSkel
 from scipy.spatial import cKDTree
 
-from neuralocks_core.anatomy.humanoid import NoHead, find_humanoid
+from neuralocks_core.anatomy.humanoid import named_head
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
@@ -101,13 +101,8 @@ def _off(roots: np.ndarray, skins: list[cKDTree]) -> float:
 def _headless(prim: Usd.Prim) -> bool:
     joints = UsdSkel.Skeleton(prim).GetJointsAttr()
     try:
-        names = as_names(joints, joints.Get())
-        place = {name: index for index, name in enumerate(names)}
-        parents = [place.get(name.rpartition("/")[0], -1) for name in names]
         # Where they are is not asked: that may be just what is wrong.
-        return not names or "head" not in find_humanoid(names, parents)
-    except NoHead:
-        return True
+        return named_head(as_names(joints, joints.Get())) is None
     except NeuralocksError:  # of another type than names
         return True
 

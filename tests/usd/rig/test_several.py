@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
 from usd.rig.bake import bake_rig
 from usd.rig.stage import BAKED, read_rigged_hair
+from usd.shot.lacking import has_hair_joints
 
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 
@@ -99,3 +100,20 @@ def test_the_documents_show_how_python_turns_one_or_many():
         turns = model.evaluate(times)
         assert turns.shape == (len(times), 32, 4)
         np.testing.assert_allclose(names["turns"][: len(times)], turns, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joints", "hairy"),
+    [
+        (["hips", "hips/tail_1"], False),
+        (["hips", "hips/neck", "hips/neck/head", "hips/neck/head/tail_1"], True),
+        (["hips", "hips/neck", "hips/neck/kopf", "hips/neck/kopf/fringe_1"], True),
+        (["hips", "hips/chest", "hips/chest/fringe_1", "hips/chest/neck", "hips/chest/neck/kopf"], False),
+        (["hips", "hips/ponytail_1"], True),
+    ],
+)
+def test_what_hangs_from_the_head_is_hair_whatever_the_head_is_called(joints, hairy):
+    stage = Usd.Stage.CreateInMemory()
+    skeleton = UsdSkel.Skeleton.Define(stage, "/Rig")
+    skeleton.GetJointsAttr().Set(joints)
+    assert has_hair_joints(skeleton.GetPrim()) == hairy
