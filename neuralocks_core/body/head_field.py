@@ -17,7 +17,7 @@ ROOM = 0.03
 EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
 MOST_NODES = 1_000_000
-"""At most: the cells of a head that is some times as large as life are larger, as its features are. Bakes wait for it."""
+"""At most: a head several times as large as life has larger cells, as it has larger features. Bakes wait for the grid."""
 SAME = 7
 """Digits after the point [m] to which a head is told from another, and made."""
 

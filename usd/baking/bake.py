@@ -91,7 +91,7 @@ def bake(
         *model_notes(strand_model, look, shot),
     ]
     how = {"together": True, "velocities": velocities, "progress": progress}
-    return write_told(shot, out, codes, poser, inputs | options, facts, notes, began=began, tell=tell, **how)
+    return write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)
 
 
 def as_material(material) -> Material:

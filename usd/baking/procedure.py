@@ -10,8 +10,8 @@ from neuralocks_core.progress import Progress, silent
 
 from ..border.time_codes import time_codes
 from ..shot.notes import asked_notes, out_of_place
-from ..shot.stage import Shot, StageGroom, read_shot
-from .samples import Poser, write_samples
+from ..shot.stage import Shot, read_shot
+from .samples import write_samples
 
 
 @dataclass(frozen=True)
@@ -55,29 +55,19 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
 
 
 def write_told(
-    shot: Shot,
-    out: Path,
-    codes: list[float],
-    poser: Callable[[list[StageGroom]], Poser],
-    inputs: dict,
-    facts: dict,
-    notes: list[str],
-    *,
-    began: float,
-    tell: Callable[[list[str]], None] | None,
-    **options,
+    notes: list[str], tell: Callable[[list[str]], None] | None, began: float, shot: Shot, out: Path, codes, *what, **how
 ) -> BakeResult:
     """Tell the notes, write the samples, then tell what is wrong with where they lie.
 
     Args:
-        shot, out, codes, poser, inputs, facts, options: as for `write_samples`.
         notes: known before.
-        began: on the clock of `time.monotonic`.
         tell: as for `bake`.
+        began: on the clock of `time.monotonic`.
+        shot, out, codes, what, how: as for `write_samples`.
     """
     say = tell or _unheard
     say(notes)
-    resumed = write_samples(shot, out, codes, poser, inputs, facts, **options)
+    resumed = write_samples(shot, out, codes, *what, **how)
     late = out_of_place(shot.stage, out)
     say(late)
     return BakeResult(out, codes, _described(shot), notes + late, time.monotonic() - began, resumed)

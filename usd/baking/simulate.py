@@ -80,7 +80,7 @@ def simulate(
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
-    return write_told(shot, out, codes, poser, inputs, facts, notes, began=began, tell=tell, progress=progress)
+    return write_told(notes, tell, began, shot, out, codes, poser, inputs, facts, progress=progress)
 
 
 class _SimulatedPoser:

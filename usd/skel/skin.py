@@ -23,8 +23,7 @@ class Skin:
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
         more, corner = _on_wide(points, triangles)
-        self._count = len(points)
-        self._vertex = np.concatenate([np.arange(self._count), corner, [self._count]])
+        self._vertex = np.concatenate([np.arange(len(points)), corner, [len(points)]])
         self._tree = cKDTree(np.concatenate([points, more]))
 
     def query(self, points: np.ndarray, within: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
