@@ -14,14 +14,13 @@ import argparse
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
+from mesh_hair_shapes import Lock, at, cap, curve_of, tube
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.animation.puppet import Puppet
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.motion import Clip
 from usd.assets.animation import write_animation
 from usd.assets.prims import author_influences, bind_to
@@ -33,17 +32,6 @@ from usd.skel.source import read_rig
 
 HERE = Path(__file__).resolve().parent
 
-
-class Lock(NamedTuple):
-    """Where a lock leaves the head (degrees from the face, height above the head joint [m]) and its size [m]."""
-
-    degrees: float
-    height: float
-    length: float
-    half_width: float
-    half_thickness: float
-
-
 LOCKS = {
     "front_l": Lock(62, 0.045, 0.24, 0.019, 0.009),
     "front_r": Lock(-62, 0.045, 0.24, 0.019, 0.009),
@@ -54,9 +42,7 @@ LOCKS = {
     "nape_l": Lock(168, 0.040, 0.30, 0.030, 0.013),
     "nape_r": Lock(-168, 0.040, 0.30, 0.030, 0.013),
 }
-JOINTS, RINGS, SIDES = 4, 15, 10
-CLEARANCE = 0.008
-"""From the skin to the middle of a lock, over its half thickness [m]."""
+JOINTS = 4
 RATE, SECONDS = 24, 8.0
 """Of the shot."""
 
@@ -111,15 +97,17 @@ def _hair(body_stage, character) -> Hair:
     head = character.head
     head_at = character.skeleton.bind[head, :3, 3]
     collider = Collider(character.body.points - head_at, character.body.triangles)
-    hair = Hair([], [], [], *_cap(body_stage, character, head_at))
+    points, faces = cap(UsdGeom.Mesh(next(p for p in body_stage.Traverse() if p.IsA(UsdGeom.Mesh))), collider, head_at)
+    tied = np.full((len(points), 2), head), np.tile([1.0, 0.0], (len(points), 1))
+    hair = Hair([], [], [], points, faces, *tied)
     for name, lock in LOCKS.items():
-        curve, flats = _curve(collider, lock)
+        curve, flats = curve_of(collider, lock)
         first = len(character.skeleton.names) + len(hair.names)
         for i in range(JOINTS):
             hair.names.append(f"{hair.names[-1] if i else character.skeleton.names[head]}/hair_{name}_{i + 1}")
             hair.parents.append(first + i - 1 if i else head)
             hair.bind.append(_bone_frame(*_bone(curve, i), head_at))
-        ring_points, ring_faces, along = _tube(curve, flats, lock)
+        ring_points, ring_faces, along = tube(curve, flats, lock)
         hair.faces += [[f + len(hair.points) for f in face] for face in ring_faces]
         hair.points = np.concatenate([hair.points, ring_points])
         own, share = _influences(along, head, first)
@@ -200,50 +188,10 @@ def _layer_over(path: Path, below: Path) -> Usd.Stage:
     return stage
 
 
-def _curve(collider, lock: Lock):
-    """Middle of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
-    angle = np.radians(lock.degrees)
-    out = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    clearance = lock.half_thickness + CLEARANCE
-    # Down the skull on a slope, then free fall that keeps clear of neck and shoulders.
-    points, flats = [], []
-    place = np.array([0.0, 0.115, 0.015]) + 0.05 * out
-    step, travelled, falling = 0.004, 0.0, False
-    heading = out.copy()
-    while travelled < lock.length:
-        distance, normal = collider.distance(place[None], limit=0.1)
-        place = place + normal[0] * max(0.0, clearance - distance[0]) if distance[0] < clearance else place
-        if not falling and distance[0] > clearance + 0.002:
-            place = place - normal[0] * (distance[0] - clearance) * 0.5
-        points.append(place)
-        flats.append(normal[0] if distance[0] < 0.06 and not falling else out)
-        falling |= place[1] < lock.height
-        pull = np.array([0.0, -1.0, 0.0]) + (0.0 if falling else 0.6) * out
-        heading = heading + (0.25 if falling else 0.15) * (pull / np.linalg.norm(pull) - heading)
-        heading /= np.linalg.norm(heading)
-        place = place + step * heading
-        travelled += step if falling else 0.0
-    points, flats = np.array(points), np.array(flats)
-    for _ in range(60):  # smooth, then clear again
-        points[1:-1] += 0.5 * ((points[:-2] + points[2:]) / 2 - points[1:-1])
-        flats[1:-1] += 0.5 * ((flats[:-2] + flats[2:]) / 2 - flats[1:-1])
-    distance, normal = collider.distance(points, limit=0.1)
-    points = points + normal * np.maximum(0, clearance - distance)[:, None]
-    points[1:-1] = (points[:-2] + 2 * points[1:-1] + points[2:]) / 4
-    start = int(np.argmax(points[:, 1] < lock.height))
-    arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return (points, arc - arc[start]), flats / np.linalg.norm(flats, axis=1, keepdims=True)
-
-
-def _at(curve, arc):
-    points, arcs = curve
-    return np.stack([np.interp(arc, arcs, points[:, i]) for i in range(3)], axis=-1)
-
-
 def _bone(curve, i):
     """Begin and end of bone i; arc zero is where the lock leaves the head."""
     length = curve[1][-1]
-    return _at(curve, length * i / JOINTS), _at(curve, length * (i + 1) / JOINTS)
+    return at(curve, length * i / JOINTS), at(curve, length * (i + 1) / JOINTS)
 
 
 def _bone_frame(begin, end, head_at):
@@ -257,34 +205,6 @@ def _bone_frame(begin, end, head_at):
     return frame
 
 
-def _tube(curve, flats, lock: Lock):
-    """A flat tapered tube: points (n, 3), faces, and arc length over the chain's per point (n,)."""
-    arcs = np.concatenate([np.linspace(curve[1][0], 0, 4, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
-    middle = _at(curve, arcs)
-    tangent = np.gradient(middle, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    thick = np.stack([np.interp(arcs, curve[1], flats[:, i]) for i in range(3)], axis=-1)
-    thick -= (thick * tangent).sum(axis=1, keepdims=True) * tangent
-    thick /= np.linalg.norm(thick, axis=1, keepdims=True)
-    wide = np.cross(tangent, thick)
-    share = (arcs - arcs[0]) / (arcs[-1] - arcs[0])
-    size = np.minimum(1, 0.45 + 2.2 * share) * np.sqrt(np.clip(1 - share**3, 0, 1)) + 0.02
-    angle = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
-    rings = (
-        middle[:, None]
-        + (size * lock.half_width)[:, None, None] * np.cos(angle)[:, None] * wide[:, None]
-        + (size * lock.half_thickness)[:, None, None] * np.sin(angle)[:, None] * thick[:, None]
-    )
-    faces = []
-    for ring in range(len(arcs) - 1):
-        for i in range(SIDES):
-            a, b = ring * SIDES + i, ring * SIDES + (i + 1) % SIDES
-            faces.append([a, a + SIDES, b + SIDES, b])
-    faces.append(list(range(SIDES)))
-    faces.append([(len(arcs) - 1) * SIDES + i for i in reversed(range(SIDES))])
-    return rings.reshape(-1, 3), faces, np.repeat(np.clip(arcs / curve[1][-1], -1, 1), SIDES)
-
-
 def _influences(along, head, first):
     """Joints and weights (n, 2): each joint fades into the next over the third of a bone around their meeting."""
     place = along * JOINTS
@@ -293,23 +213,6 @@ def _influences(along, head, first):
     before = np.where(bone == 0, head, first + bone - 1)
     after = first + bone
     return np.stack([before, after], axis=1), np.stack([1 - second, second], axis=1)
-
-
-def _cap(stage, character, head_at):
-    """Points, faces, joints and weights of the scalp, a little larger, tied to the head."""
-    mesh = next(p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh))
-    subset = UsdGeom.Subset(next(p for p in mesh.GetChildren() if p.GetName() == "scalp"))
-    counts = np.asarray(UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Get())
-    corners = np.asarray(UsdGeom.Mesh(mesh).GetFaceVertexIndicesAttr().Get())
-    starts = np.cumsum(counts) - counts
-    faces = [corners[starts[f] : starts[f] + counts[f]] for f in subset.GetIndicesAttr().Get()]
-    used = np.unique(np.concatenate(faces))
-    place = {int(v): i for i, v in enumerate(used)}
-    normals = vertex_normals(character.body.points, character.body.triangles)[used]
-    points = character.body.points[used] - head_at + 0.009 * normals
-    count = len(points)
-    indices = np.stack([np.full(count, character.head), np.full(count, character.head)], axis=1)
-    return points, [[place[int(v)] for v in f] for f in faces], indices, np.tile([1.0, 0.0], (count, 1))
 
 
 if __name__ == "__main__":
