@@ -17,8 +17,11 @@ def rig_graph(model) -> bytes:
     """
     graph = OnnxGraph("rig")
     limits = np.asarray(model.limits, np.float32)
-    value = graph.node("Min", ["features", graph.constant("most", limits)], "capped")
-    value = graph.node("Max", [value, graph.constant("least", -limits)], "clipped")
+    # As the header has it: NaN, which is above nothing, counts as the least. Max and Min would hand it on.
+    least = graph.constant("least", -limits)
+    above = graph.node("Greater", ["features", least], "above")
+    value = graph.node("Where", [above, "features", least], "raised")
+    value = graph.node("Min", [value, graph.constant("most", limits)], "clipped")
     value = graph.node("Cast", [value], "wide", to=_DOUBLE)
     for index, (weight, bias) in enumerate(model.layers):
         if index == 0:  # as `RigModel` does, in double precision

@@ -102,7 +102,7 @@ class RigModel:
         """Turns of all hair joints, of one avatar (F,) or a batch (B, F).
 
         Args:
-            features: as `RigSampler.features` or the exported header give them; anything finite is allowed.
+            features: as `RigSampler.features` or the exported header give them; anything is allowed.
 
         Returns:
             unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind
@@ -126,7 +126,8 @@ class RigModel:
     def _raw(self, rows: np.ndarray) -> np.ndarray:
         (weight, bias), *others = self.layers
         # Over a hundred large terms: in single precision their order would show, and every library has its own.
-        value = np.clip(rows, -self.limits, self.limits).astype(float) @ weight.T.astype(float)
+        value = np.fmin(np.fmax(rows, -self.limits), self.limits)  # NaN counts as the least, as in the header
+        value = value.astype(float) @ weight.T.astype(float)
         value = (value + bias).astype(np.float32)
         for weight, bias in others:
             np.maximum(value, 0, out=value)

@@ -115,11 +115,12 @@ def test_the_example_is_built_by_the_line_that_it_gives(tmp_path):
 
 
 def test_anything_gives_a_bounded_unit_quaternion(tmp_path):
-    """Huge, tiny and even infinite numbers, in C and in numpy."""
+    """Huge, tiny, infinite numbers and none, in C and in numpy."""
     model = random_model()
     export_c(model, tmp_path / "hair.h")
     rng = np.random.default_rng(0)
-    wild = (rng.choice([0, 1e-38, 1, 1e10, 3.4e38], (500, 15)) * rng.choice([-1, 1], (500, 15))).astype(np.float32)
+    sizes = [0, 1e-38, 1, 1e10, 3.4e38, np.inf, np.nan]
+    wild = (rng.choice(sizes, (500, 15)) * rng.choice([-1, 1], (500, 15))).astype(np.float32)
     c = run_c(compiled(tmp_path, HARNESS), wild, 16 * 4).reshape(500, 16, 4)
     for turns in (c, model.evaluate(wild)):
         assert np.abs(np.linalg.norm(turns, axis=-1) - 1).max() < 1e-5

@@ -27,6 +27,30 @@ def test_onnx_agrees_with_numpy(kind):
     assert np.abs(np.linalg.norm(ours, axis=-1) - 1).max() < 1e-6
 
 
+@pytest.mark.parametrize("kind", ["static", "dynamic", "shipped"])
+@pytest.mark.parametrize("damage", [np.nan, np.inf, -np.inf])
+def test_a_damaged_avatar_stays_bounded_and_alone(kind, damage):
+    """NaN counts as the least that is read, as in the C header; no other row of the batch changes by a bit."""
+    ort = pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnx")
+    model = model_of(kind)
+    features = random_features(model, 9)
+    broken = features.copy()
+    broken[2, 3] = broken[5] = damage
+    stands_for = features.copy()
+    stands_for[2, 3] = stands_for[5] = 1e9 if damage > 0 else -1e9
+    graphs = [rig_graph(model)]
+    if kind == "shipped":  # what `export` hands out is what the file holds
+        graphs.append(model_file.read(model_file.shipped("rig")).graphs["rig.onnx"])
+    sessions = [ort.InferenceSession(graph, providers=["CPUExecutionProvider"]) for graph in graphs]
+    runs = [model.evaluate, *(lambda f, s=s: s.run(None, {"features": f})[0] for s in sessions)]
+    for run in runs:
+        turns = run(broken)
+        assert np.abs(np.linalg.norm(turns, axis=-1) - 1).max() < 1e-6
+        np.testing.assert_array_equal(np.delete(turns, [2, 5], axis=0), np.delete(run(features), [2, 5], axis=0))
+        np.testing.assert_array_equal(turns, run(stands_for))
+
+
 def test_batch_and_single_agree():
     """One avatar is a row of the batch."""
     model = random_model()
