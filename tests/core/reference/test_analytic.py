@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("warp", reason="the reference needs warp")
 from scipy.integrate import solve_bvp
+from scipy.linalg import eigh
 from scipy.special import j0, jn_zeros
 
 from neuralocks_core.reference import simulate
@@ -130,3 +131,66 @@ def test_error_halves_with_the_step():
     tips = [swing(1.0, substeps)[0] for substeps in (4, 8, 16)]
     coarse, fine = (np.abs(a - b).max() for a, b in zip(tips, tips[1:], strict=False))
     assert coarse / fine == pytest.approx(2.0, abs=0.4)
+
+
+def frequency(values, rate):
+    """Of a swing about zero [Hz]."""
+    cross = np.flatnonzero(np.diff(np.sign(values)))
+    at = cross + values[cross] / (values[cross] - values[cross + 1])
+    return rate / (2 * np.diff(at).mean())
+
+
+def test_free_vibration_of_a_cantilever():
+    """Euler and Bernoulli: omega = 1.875^2 sqrt(EI / (m L^4)); damping c slows it to sqrt(omega^2 - c^2 / 4)."""
+    bend, rate, beam = 0.05, 240, LENGTH - EDGE / 2
+    rest = straight([0, 0, 1])
+    start, along = rest.copy(), np.maximum(rest[0, :, 2] - EDGE / 2, 0) / beam
+    a, b = 1.8751041 * along, 0.7340955
+    start[0, 2:, 1] = 0.002 * (np.cosh(a) - np.cos(a) - b * (np.sinh(a) - np.sin(a)))[2:]
+    omega = 1.8751041**2 * np.sqrt(bend / beam**4)
+    for damping in (0.0, 6.0):
+        material = {"bend": bend, "damping": damping}
+        options = {"gravity": 1e-6, "dt": 1 / rate, "substeps": 4, "iterations": 30, "tolerance": 1e-8}
+        tip = simulate(rest, still(rate), material=material, start=start, **options).points[:, 0, -1, 1]
+        expected = np.sqrt(omega**2 - damping**2 / 4) / (2 * np.pi)
+        assert frequency(tip.astype(float), rate) == pytest.approx(expected, rel=0.005)
+
+
+@pytest.mark.parametrize("mode", [0, 1])
+def test_both_modes_of_a_double_pendulum(mode):
+    """A vertex weighs half of its edges: two free ones of masses l and l / 2, on two edges of length l."""
+    edge, rate = 0.15, 240
+    rest = np.zeros((1, 4, 3))
+    rest[0, :, 1] = -edge * np.arange(4)
+    mass = edge**3 * np.array([[1.5, 0.5], [0.5, 0.5]])
+    squares, shapes = eigh(G * edge**2 * np.diag([1.5, 0.5]), mass)
+    start = rest.copy()
+    for vertex, angle in zip((2, 3), 0.03 * shapes[:, mode] / np.abs(shapes[:, mode]).max(), strict=True):
+        start[0, vertex] = start[0, vertex - 1] + edge * np.array([np.sin(angle), -np.cos(angle), 0])
+    options = {"dt": 1 / rate, "substeps": 4, "iterations": 30, "tolerance": 1e-8}
+    result = simulate(rest, still(2 * rate), material={"bend": 0.0, "damping": 0.0}, start=start, **options)
+    tip = result.points[:, 0, -1, 0].astype(float)
+    assert frequency(tip, rate) == pytest.approx(np.sqrt(squares[mode]) / (2 * np.pi), rel=2e-3)
+
+
+def test_a_strand_whirls_as_a_chain_does():
+    """Hung beside the axis of a head that turns, steadily in the end: each edge points along what gravity and the centrifugal
+    force of all behind it add up to. Neither damping nor Coriolis' force acts on what rests in the head."""
+    spin, mass = 6.0, np.full(K, EDGE)
+    mass[-1] /= 2
+    rest = straight([0, -1, 0]) + [0.1, 0, 0]
+    chain = rest[0].copy()
+    for _ in range(300):
+        load = mass[:, None] * np.stack([spin**2 * chain[:, 0], np.full(K, -G), np.zeros(K)], axis=1)
+        pull = np.cumsum(load[::-1], axis=0)[::-1][2:]
+        edges = EDGE * pull / np.linalg.norm(pull, axis=1, keepdims=True)
+        chain[2:] = 0.5 * chain[2:] + 0.5 * (chain[1] + np.cumsum(edges, axis=0))
+    angle = spin * np.cumsum(np.minimum(np.arange(150) / 60, 1)) / 30
+    head = still(150)
+    head[:, 0, 0] = head[:, 2, 2] = np.cos(angle)
+    head[:, 0, 2], head[:, 2, 0] = np.sin(angle), -np.sin(angle)
+    settled = simulate(rest, head, material={"bend": 0.0, "damping": 12.0}, substeps=16, iterations=20).points[-1, 0]
+    np.testing.assert_allclose(settled[:, :2], chain[:, :2], atol=1e-3)
+    assert chain[-1, 0] - rest[0, -1, 0] > 0.1
+    # Implicit Euler asks where the axis is a step late, so that hair lags by about that.
+    assert np.abs(settled[:, 2]).max() < 3 * spin / 480 * chain[-1, 0]
