@@ -18,7 +18,7 @@ from neuralocks_core.rotation import from_quaternion, quaternion_between
 
 @dataclass(frozen=True)
 class SpringSettings:
-    """The specified parameters; their defaults are VRM's.
+    """The specified parameters; their defaults are those of UniVRM and three-vrm, where the schema's drag is 0.5.
 
     Attributes:
         stiffness: pull to the rest direction [m/s].
