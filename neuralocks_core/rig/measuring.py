@@ -16,9 +16,15 @@ NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 DRIVEN = 0.3
 """Skin that a joint moves with more than this share of its weight tells how far its bone reaches."""
+UNEVEN = 1.01
+"""Joints that are scaled so many times more along one axis than along another are refused."""
 SHORT, SHORT_AFTER = 0.01, 0.2
 """Skin that passes a last joint by less than this is no bone of its own: of a chain of one joint [m], of others in lengths of the
 bone before."""
+
+
+class UnevenJoint(NeuralocksError):
+    """A hair joint is scaled more along one axis than along another."""
 
 
 def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedMesh] | None) -> HairChains:
@@ -204,7 +210,7 @@ def _check_scale(skeleton: Skeleton, joints: np.ndarray) -> None:
             raise NeuralocksError(
                 f"hair joint '{name}': mirrored in bind pose (negative scale); apply the scale in the rig"
             )
-        if scale.min() < 1e-9 or scale.max() > 1.01 * scale.min():
-            raise NeuralocksError(
+        if scale.min() < 1e-9 or scale.max() > UNEVEN * scale.min():
+            raise UnevenJoint(
                 f"hair joint '{name}': unevenly scaled in bind pose {np.round(scale, 3)}; apply the scale in the rig"
             )

@@ -3,6 +3,8 @@
 the knots of splines.
 """
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from pxr import Usd, UsdGeom
 
@@ -20,15 +22,9 @@ class Placement:
     def __init__(self, prim: Usd.Prim):
         self.prim = prim
         self.samples: list[float] = []
-        walk = prim
-        while walk and not walk.IsPseudoRoot():
-            xformable = UsdGeom.Xformable(walk)
-            if xformable:
-                if xformable.TransformMightBeTimeVarying():
-                    self.samples += [*xformable.GetTimeSamples(), *_knots(xformable)]
-                if xformable.GetResetXformStack():
-                    break
-            walk = walk.GetParent()
+        for xformable in _upwards(prim):
+            if xformable.TransformMightBeTimeVarying():
+                self.samples += [*xformable.GetTimeSamples(), *_knots(xformable)]
         self.samples = sorted(set(self.samples))
         self._known: dict[float, np.ndarray] = {}
         # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
@@ -54,18 +50,50 @@ class Placement:
         """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample."""
         return self._still if self._still is not None else self.at(self.samples[0])
 
+    def whose(self, wrong: Callable[[np.ndarray], bool], time_code: float | None = None) -> str:
+        """Whose transform it is that is wrong here, in words: the prim's own, or that of one above.
+
+        Args:
+            wrong: tells it of a transform (4, 4).
+            time_code: when; at rest if left out.
+        """
+        code = self.samples[0] if time_code is None and self.samples else time_code
+        time = Usd.TimeCode.EarliestTime() if code is None else Usd.TimeCode(code)
+        for each in _upwards(self.prim):
+            if wrong(column_matrix(each.GetLocalTransformation(time))):
+                return "its transform" if each.GetPrim() == self.prim else f"the transform of {each.GetPath()} above it"
+        return "its transform with those above it"
+
     def _evaluate(self, time: Usd.TimeCode) -> np.ndarray:
         matrix = column_matrix(UsdGeom.XformCache(time).GetLocalToWorldTransform(self.prim))
-        when = "" if time.IsEarliestTime() else f" at time code {time.GetValue():g}"
-        if not np.isfinite(matrix).all():
-            raise NeuralocksError(
-                f"{self.prim.GetPath()}: its transform{when} holds NaN or infinity; repair it or a parent's"
-            )
-        if abs(np.linalg.det(matrix[:3, :3])) < 1e-18:
-            raise NeuralocksError(
-                f"{self.prim.GetPath()}: its transform{when} has zero scale; give it and its parents a scale above zero"
-            )
+        for fact, wrong, remedy in (
+            ("holds NaN or infinity", _broken, "repair it"),
+            ("has zero scale", _flat, "give it a scale above zero, or hide what is below by its visibility"),
+        ):
+            if wrong(matrix):
+                code = None if time.IsEarliestTime() else time.GetValue()
+                when = "" if code is None else f" at time code {code:g}"
+                whose = self.whose(wrong, code)
+                raise NeuralocksError(f"{self.prim.GetPath()}: {whose}{when} {fact}; {remedy}")
         return matrix
+
+
+def _upwards(prim: Usd.Prim) -> Iterator[UsdGeom.Xformable]:
+    """A prim and those above it that place it, as far as these have transforms."""
+    while prim and not prim.IsPseudoRoot():
+        if xformable := UsdGeom.Xformable(prim):
+            yield xformable
+            if xformable.GetResetXformStack():
+                return
+        prim = prim.GetParent()
+
+
+def _broken(matrix: np.ndarray) -> bool:
+    return not np.isfinite(matrix).all()
+
+
+def _flat(matrix: np.ndarray) -> bool:
+    return abs(np.linalg.det(matrix[:3, :3])) < 1e-18
 
 
 def _knots(xformable: UsdGeom.Xformable) -> list[float]:

@@ -24,6 +24,7 @@ from ..border.units import Border
 from ..rig.facing import facing_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
+from ..rig.uneven import names_uneven_prims
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
 from ..shot.curve_ends import groom_between, undrawn
@@ -149,7 +150,8 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
     """Hair joints of rigged mesh hair; where there are none, what may be some is told, less readily beside `strands`."""
     meshes = core_meshes(rig)
     try:
-        chains = assemble_rig(rig.character, meshes).chains
+        with names_uneven_prims(rig):
+            chains = assemble_rig(rig.character, meshes).chains
         check_orients(rig, chains)
     except NoHairChains:
         spoils += unnamed_notes(rig, meshes, strands)

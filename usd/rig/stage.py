@@ -30,6 +30,7 @@ from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins, rest_primvar
 from .facing import facing_notes
 from .outside import left_out_notes, outside_notes
+from .uneven import names_uneven_prims
 
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
@@ -135,8 +136,9 @@ def read_rigged_hairs(
         try:
             _check_authored(prim)
             source = read_rig(stage, prim, border, head, skins=skins, **given)
-            wanted = chains if model is None else _of_model(model, source.character)
-            rig = assemble_rig(source.character, core_meshes(source), wanted)
+            with names_uneven_prims(source):
+                wanted = chains if model is None else _of_model(model, source.character)
+                rig = assemble_rig(source.character, core_meshes(source), wanted)
             if model is not None:  # else it is checked of the one that is chosen
                 check_orients(source, rig.chains)
         except NeuralocksError as error:

@@ -67,12 +67,18 @@ def unevenly_scaled(rig: StageRig) -> list[str]:
     if ratio[frame] < UNEVEN:
         return []
     code = rig.time_codes[frame]
-    placed = _unevenness(rig.source.placement.at(code)) >= UNEVEN
-    what = "it or a prim above it" if placed else f"joint '{leaf(rig.source.names[rig.character.carrying_joint])}'"
+    placed, joint = rig.source.placement, leaf(rig.source.names[rig.character.carrying_joint])
+    what = placed.whose(uneven, code) if uneven(placed.at(code)) else f"joint '{joint}'"
     return [
         f"{rig.path}: {what} is scaled unevenly and stretches its hair, at time code {code:g} by {ratio[frame] - 1:.0%} more along "
         "one axis than along another: strands keep their lengths before that, not in the world; scale it evenly if that shows"
     ]
+
+
+def uneven(transform: np.ndarray, least: float = UNEVEN) -> bool:
+    """Whether a transform (4, 4) scales so many times more along one axis than along another."""
+    sizes = np.linalg.svd(transform[:3, :3], compute_uv=False)
+    return bool(sizes[0] >= least * sizes[2])
 
 
 def _unevenness(transforms: np.ndarray) -> np.ndarray:

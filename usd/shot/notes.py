@@ -248,8 +248,21 @@ def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
         ):
             if bad.any():
                 code = rig.time_codes[bad.argmax()]
-                found.append(f"{rig.path}: joint '{rig.source.names[joint]}' {fact} at time code {code:g}; {remedy}")
+                # Joints without a turn below a prim without one are that prim's.
+                placed = rig.source.placement
+                whose = (
+                    placed.whose(_turnless, code)
+                    if _turnless(placed.at(code))
+                    else f"joint '{rig.source.names[joint]}'"
+                )
+                found.append(f"{rig.path}: {whose} {fact} at time code {code:g}; {remedy}")
     return found
+
+
+def _turnless(transform: np.ndarray) -> bool:
+    """Whether a transform (4, 4) has an axis of no length, or is mirrored."""
+    linear = transform[:3, :3]
+    return bool(flat(linear) or np.linalg.det(linear) < 0)
 
 
 def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:

@@ -34,16 +34,17 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
         NeuralocksError: the character is mirrored, or its head has no size.
     """
     placed = source.placement.reference[:3, :3]
-    if np.linalg.det(placed) < 0:
-        raise NeuralocksError(
-            f"{source.path}: its root is mirrored (negative scale); apply or remove the negative scale"
-        )
+    if _mirrors(source.placement.reference):
+        raise NeuralocksError(_mirrored(source))
     head = humanoid.get("head", 0)
     shown = sizes_shown(posed[:, head], source.bind[head])
     if (shown < 0).any():
+        later = next((code for code in source.placement.samples if _mirrors(source.placement.at(code))), None)
         raise NeuralocksError(
             f"{source.path}: joint '{source.names[head]}' is mirrored by its animation; "
             "apply or remove the negative scale"
+            if later is None
+            else _mirrored(source, later)
         )
     if np.median(shown) < LEAST:
         raise NeuralocksError(_flat(source, posed[np.abs(sizes(posed[:, head])).argmin()], head))
@@ -54,6 +55,17 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
     result = np.eye(4)
     result[:3, :3] = standing(placed, source.bind[:, :3, 3], humanoid, up) * ratio
     return border.to_core @ result
+
+
+def _mirrors(transform: np.ndarray) -> bool:
+    """Whether a transform (4, 4) turns left into right."""
+    return np.linalg.det(transform[:3, :3]) < 0
+
+
+def _mirrored(source: JointSource, time_code: float | None = None) -> str:
+    when = "" if time_code is None else f" at time code {time_code:g}"
+    whose = source.placement.whose(_mirrors, time_code)
+    return f"{source.path}: {whose} is mirrored{when} (negative scale); apply or remove the negative scale"
 
 
 def _flat(source: JointSource, posed: np.ndarray, head: int) -> str:

@@ -189,7 +189,7 @@ def test_hair_that_is_scaled_unevenly_is_told(tmp_path, uneven):
         animation.GetScalesAttr().Set([Gf.Vec3h(1.2, 0.75, 1.2) if name == uneven else Gf.Vec3h(1) for name in names])
         stage.Save()
     words = {
-        "character": "it or a prim above it is scaled unevenly and stretches its hair, at time code 9 by 6% more",
+        "character": "the transform of /Hero above it is scaled unevenly and stretches its hair, at time code 9 by 6% more",
         "head": "joint 'head' is scaled unevenly and stretches its hair, at time code 1 by 60% more",
     }.get(uneven)
     said = _said(path, "along one axis")
