@@ -12,6 +12,8 @@ from .seat import CLEARLY, Seat, kinship
 
 SAME = 0.01
 """Joints of two skeletons at most so far apart [m] are one."""
+UPPER = ("head", "neck", "upper_chest", "chest")
+"""Joints by which one person is known."""
 
 
 def one_of_alike(prim: Usd.Prim, seats: list[Seat], notes: list[str]) -> Seat:
@@ -50,7 +52,7 @@ def one_person(rig: StageRig, other: StageRig) -> bool:
     """Whether a joint of the upper body is at the same place in both, when bound and as the first one's motion begins and ends."""
     mine, its = rig.character, other.character
     ends = rig.clip.times[[0, -1]]
-    for name in ("head", "neck", "upper_chest", "chest"):
+    for name in UPPER:
         if name not in mine.humanoid or name not in its.humanoid:
             continue
         a, b = mine.humanoid[name], its.humanoid[name]

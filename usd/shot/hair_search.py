@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which curves of a stage are hair, and what carries them: the same answer for a bake and for `inspect`."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,8 +16,9 @@ from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
 from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
-from .notes import another_carries, few, no_points, too_far, unusable_skeleton
+from .notes import another_binds, another_carries, far_from_named, few, no_points, too_far, unusable_skeleton
 from .other_curves import other_hair
+from .others import Others
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 from .seat_notes import coarsely_placed
 from .unusable import Unusable, find_unusable, lies_on
@@ -32,7 +32,7 @@ class HairSearch:
         head: the user's `--head`.
         notes: what a user should know is added here.
         named: the user named these curves: none is left out because it is empty or far away.
-        others: skeletons whose hair is not wanted.
+        others: skeletons whose hair is not wanted; None where there are none.
         forced: the user named the skeleton for these curves: that they are bound to another does not count.
 
     Attributes:
@@ -47,15 +47,16 @@ class HairSearch:
         notes: list[str],
         *,
         named: bool = False,
-        others: Sequence[StageRig] = (),
+        others: Others | None = None,
         forced: bool = False,
     ):
         self.rigs, self._head, self._notes = rigs, head, notes
-        self._named, self._others, self._forced = named, list(others), forced
+        self._named, self._others, self._forced = named, others or None, forced
         self._far: list[str] = []
         self._unusable: list[str] = []
         self._controls: list[str] = []
         self._off_head: list[str] = []
+        self._of_others: list[str] = []
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
@@ -66,6 +67,10 @@ class HairSearch:
     def off_heads(self) -> list[str]:
         """The notes on hair that is not on a head, where none on that hair names its joint."""
         return few(self._off_head, "grooms ride on other joints than the head")
+
+    def of_others(self) -> list[str]:
+        """The notes on hair of other skeletons than the named one."""
+        return few(self._of_others, "grooms are not its hair")
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others, and are not closed."""
@@ -83,13 +88,20 @@ class HairSearch:
             NeuralocksError: as `attach`; or the curves are named, and those of a skeleton that cannot be used.
         """
         path, bound = str(prim.GetPath()), bound_skeleton(prim)
-        if bound and not self._forced and all(rig.path != bound for rig in (*self.rigs, *self._others)):
+        if self._others and (why := self._clearly_of_another(prim, bound, placement)):
+            self._of_others.append(why)
+            return None
+        if bound and not self._forced and all(rig.path != bound for rig in self.rigs):
             # On another's head it would be skinned by its own skeleton once more.
             return self._without(path, bound, bound=True)
         if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
             return self._without(path, own.path, bound=False)
-        if self._others and (other := of_another(prim, self.rigs, self._others, placement, self._head)):
-            self._notes.append(another_carries(path, other))
+        if (
+            self._others
+            and not bound
+            and (other := of_another(prim, self.rigs, self._others.rigs, placement, self._head))
+        ):
+            self._of_others.append(another_carries(path, other))
             return None
         if not self._named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
@@ -112,6 +124,16 @@ class HairSearch:
             self.carriers.append(found.rig)
         return found
 
+    def _clearly_of_another(self, prim: Usd.Prim, bound: str | None, placement: Placement) -> str:
+        """Why curves are not the named skeleton's, where that is clear without a look at the others; '' if it is not."""
+        if bound:
+            return "" if any(rig.path == bound for rig in self.rigs) else another_binds(str(prim.GetPath()), bound)
+        try:
+            found = attach(prim, self.rigs, placement, self._head, [])
+        except NeuralocksError:  # told below, unless it is another's
+            return ""
+        return far_from_named(prim, found) if found.far else ""
+
     def _without(self, path: str, skeleton: str, bound: bool) -> None:
         """Leave out the curves of a skeleton that cannot be used.
 
@@ -127,14 +149,18 @@ class HairSearch:
         """The skeleton that cannot be used on whose character the curves lie."""
         if not self._unread:
             return None
-        rigs = [*self.rigs, *self._others]
+        rigs = self._every
         try:
             found = attach(prim, rigs, placement, self._head, [])
         except NeuralocksError:  # not clear, or none of them
             found = None
         return lies_on(prim, found, rigs, self._unread, placement)
 
+    @property
+    def _every(self) -> list[StageRig]:
+        return [*self.rigs, *(self._others.rigs if self._others else ())]
+
     @cached_property
     def _unread(self) -> list[Unusable]:
-        rigs = [*self.rigs, *self._others]
+        rigs = self._every
         return find_unusable(rigs[0].source.prim.GetStage(), {rig.path for rig in rigs})

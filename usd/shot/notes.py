@@ -132,6 +132,18 @@ def another_carries(path: str, rig: StageRig) -> str:
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
+def another_binds(path: str, own: str) -> str:
+    """The note on a groom that is bound to another skeleton than the one the user named."""
+    return f"{path}: is bound to {own}; left out, or name it with --groom"
+
+
+def far_from_named(prim: Usd.Prim, found: Attachment) -> str:
+    """The note on a groom that lies too far from the skeleton that the user named to be its hair."""
+    return (
+        f"{prim.GetPath()}: lies {found.far:.3g} m from the head of {found.rig.path}; left out, or name it with --groom"
+    )
+
+
 def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> str:
     """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it. Why it is
     refused, where its user named it.

@@ -36,6 +36,7 @@ from .notes import (
     stands_still,
     without_turn,
 )
+from .others import Others
 from .skeletons import read_each_rig
 
 
@@ -122,8 +123,11 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
-    every = rigs if skeleton is None or grooms else _rigs(stage, border, None, head, path, joints=joints)[0]
-    others = [rig for rig in every if skeleton and rig.path != skeleton]
+    others = None
+    if skeleton is not None and not grooms:
+        others = Others(
+            rigs, find_skeletons(stage), lambda prims: read_each_rig(stage, prims, border, head, joints=joints)[0]
+        )
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others, forced=bool(grooms and skeleton))
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
@@ -131,9 +135,10 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         raise NeuralocksError(
             (*no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
         )
-    notes += no_hair + search.off_heads()
+    notes += no_hair + search.off_heads() + search.of_others()
     if not grooms:
         found = _moving(found, notes)
+    every = rigs if others is None else [*rigs, *others.maybe_same()]
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
     for rig in used:
         _check_animated([rig])
