@@ -4,6 +4,7 @@ the knots of splines.
 """
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 
 import numpy as np
 from pxr import Usd, UsdGeom
@@ -27,8 +28,12 @@ class Placement:
                 self.samples += [*xformable.GetTimeSamples(), *_knots(xformable)]
         self.samples = sorted(set(self.samples))
         self._known: dict[float, np.ndarray] = {}
+
+    @cached_property
+    def _still(self) -> np.ndarray | None:
+        """The one place of what stands still; asked first where it matters, as that of what is left out may be none."""
         # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
-        self._still = None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
+        return None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
 
     def at(self, time_code: float) -> np.ndarray:
         """Transform (4, 4) at a time code; not to be written to.
@@ -49,6 +54,14 @@ class Placement:
     def reference(self) -> np.ndarray:
         """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample."""
         return self._still if self._still is not None else self.at(self.samples[0])
+
+    @property
+    def usable(self) -> bool:
+        """Whether the prim can be placed at rest."""
+        try:
+            return self.reference is not None
+        except NeuralocksError:
+            return False
 
     def whose(self, wrong: Callable[[np.ndarray], bool], time_code: float | None = None) -> str:
         """Whose transform it is that is wrong here, in words: the prim's own, or that of one above.

@@ -193,9 +193,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
     if facts["type"] == UsdGeom.Tokens.cubic:
         facts |= {"basis": str(curves.GetBasisAttr().Get()), "wrap": str(curves.GetWrapAttr().Get())}
-    found, to_bind, drawn, joint = None, border.to_core @ placement.reference, False, {}
-    # Without a character, counts and lengths are what is told, and where hair stands changes neither.
-    to_bind[:3, 3] = 0
+    found, to_bind, drawn, joint = None, None, False, {}
     if search is not None:
         try:
             found = search.attachment(prim, placement)
@@ -207,6 +205,10 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
             stops.append(str(error))
     else:
         spoils += undrawn(prim)
+    if to_bind is None:
+        to_bind = border.to_core @ placement.reference
+        # Without a character, counts and lengths are what is told, and where hair stands changes neither.
+        to_bind[:3, 3] = 0
     groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())

@@ -40,6 +40,8 @@ def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
     if not len(roots):
         return False
     placement = Placement(prim)
+    if not placement.usable:
+        return False
     for rig in rigs:
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for way in ways(rig, mesh, placement):

@@ -139,7 +139,7 @@ def ways(
     """
     groom = placement.reference
     still = []
-    if mesh is not None:
+    if mesh is not None and mesh.placement.usable:
         still.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
     still += [rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom, rig.to_bind @ groom]
     if not rig.source.animated:

@@ -75,13 +75,16 @@ def lies_on(
     if not unusable:
         return None
     carriers, border = [found.rig] if found else rigs, rigs[0].border
+    known = max(kinship(prim, rig.source.prim) for rig in carriers)
+    unusable = sorted(unusable, key=lambda each: -kinship(prim, each.prim))
+    if not placement.usable:  # a scale of zero that hides a character, say, hides its hair, too
+        return next((each for each in unusable if kinship(prim, each.prim) > known), None)
     sides = either_ends(prim)
     seated = np.inf
     if found and found.rig.skins:
         seated = min(off_skin(roots, found.rig, found.to_bind) for roots in sides)
     placed = [transformed(roots, border.to_core @ placement.reference) for roots in sides]
-    known = max(kinship(prim, rig.source.prim) for rig in carriers)
-    for each in sorted(unusable, key=lambda each: -kinship(prim, each.prim)):
+    for each in unusable:
         away, kin = min(_off(roots, each.skins) for roots in placed), kinship(prim, each.prim) > known
         if seated <= NEAR:  # on a skin that can be used, too
             its = away + ALIKE < seated or kin and away <= seated + ALIKE

@@ -68,7 +68,7 @@ def test_what_a_reset_stack_shuts_out_is_not_named():
     assert Placement(stage.GetPrimAtPath("/Top/Apart/Flat")).reference.trace() == 4
     _scaled("/Top/Apart/Flat", still=(1, 0, 1))(stage)
     with pytest.raises(NeuralocksError, match="^/Top/Apart/Flat: its transform has zero scale"):
-        Placement(stage.GetPrimAtPath("/Top/Apart/Flat"))
+        Placement(stage.GetPrimAtPath("/Top/Apart/Flat")).at(1.0)
 
 
 def test_an_uneven_scale_above_is_not_that_of_a_hair_joint(tmp_path):

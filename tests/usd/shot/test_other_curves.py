@@ -46,6 +46,13 @@ def test_hair_of_other_kinds_is_told(shot, kind):
     assert len(told(shot, "/Hero/Guide")) == len(told(shot, "/Hero/Aura")) == 1
 
 
+def test_what_a_scale_of_zero_hides_stops_no_bake(shot):
+    curves(shot, UsdGeom.NurbsCurves, "/Hero/Locks", strand_points(40, 12))
+    UsdGeom.Xformable(shot.GetPrimAtPath("/Hero/Locks")).AddScaleOp().Set((0, 0, 0))
+    shot.Save()
+    assert not told(shot, "/Hero/Locks")
+
+
 def test_what_is_no_hair_is_not(shot):
     """Cables of a set, a ring to pull at, and a line from the head to what it looks at."""
     cables = np.random.default_rng(0).uniform(4, 9, (9, 5, 3))

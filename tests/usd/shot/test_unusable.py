@@ -21,6 +21,12 @@ def _mirrored(layer: Sdf.Layer) -> None:
     UsdGeom.Xformable(stage.GetPrimAtPath("/bob")).AddScaleOp().Set((-1, 1, 1))
 
 
+def _hidden(layer: Sdf.Layer) -> None:
+    """A character that waits for its entrance at a scale of zero, and its hair with it."""
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/bob")).AddScaleOp().Set((0, 0, 0))
+
+
 def _not_finite(layer: Sdf.Layer) -> None:
     bind = list(layer.GetAttributeAtPath("/bob/Rig.bindTransforms").default)
     bind[2] = Gf.Matrix4d(float("nan"))
@@ -60,6 +66,16 @@ def test_hair_on_a_character_that_cannot_be_read_goes_to_no_other_head(tmp_path,
         read_shot(path, ["/bob/Hair"])
     (item,) = read_shot(path, ["/bob/Hair"], skeleton="/ann/Rig").grooms
     assert item.attachment.rig.path == "/ann/Rig"
+
+
+@pytest.mark.parametrize(("bound", "how"), [("own", "is bound to"), ("mesh", "lies on"), ("none", "lies on")])
+def test_hair_of_a_hidden_character_stops_no_others(tmp_path, bound, how):
+    path = _two(tmp_path, _hidden, bound).realPath
+    assert [item.path for item in read_shot(path).grooms] == ["/ann/Hair"]
+    facts = inspect(path)
+    assert [groom["path"] for groom in facts["grooms"]] == ["/ann/Hair"] and not facts["stops"]
+    with pytest.raises(NeuralocksError, match=f"/bob/Hair: {how} .*/bob/Rig, which cannot be used"):
+        read_shot(path, ["/bob/Hair"])
 
 
 @pytest.mark.parametrize("at_hand", ["/grooms/Hair", "/ann/Wig"])
