@@ -7,9 +7,10 @@ import struct
 
 import numpy as np
 
-from neuralocks_core.formats.raw import RawGroom, bad_file, floats
+from neuralocks_core.formats.raw import RawGroom, bad_file, big_endian, floats
 
 _SEGMENTS, _POINTS, _THICKNESS, _TRANSPARENCY, _COLOR = 1, 2, 4, 8, 16
+_KNOWN = _SEGMENTS | _POINTS | _THICKNESS | _TRANSPARENCY | _COLOR
 _HEADER = struct.Struct("<4sIIIIfffff88s")
 
 
@@ -26,6 +27,8 @@ def read(content: bytes, subject: str) -> RawGroom:
     if len(content) < _HEADER.size:
         raise bad_file(subject, f"has {len(content)} bytes but the header has {_HEADER.size}", "it is truncated")
     _, strands, total, flags, segments, thickness, transparency, *color, _ = _HEADER.unpack_from(content)
+    if flags != flags & _KNOWN and (swapped := int.from_bytes(content[12:16], "big")) == swapped & _KNOWN:
+        raise big_endian(subject)
     if strands == 0 or total == 0:
         raise bad_file(subject, f"holds {strands} strands and {total} points", "export one with hair in it")
     if not flags & _POINTS:

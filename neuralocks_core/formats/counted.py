@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neuralocks_core.formats.raw import RawGroom, bad_file
+from neuralocks_core.formats.raw import RawGroom, bad_file, big_endian
 
 
 def read_hairsalon(content: bytes, subject: str) -> RawGroom:
@@ -34,7 +34,7 @@ def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroo
         raise bad_file(subject, f"has {len(content)} bytes, fewer than its number of strands", "it is truncated")
     strands = int(words[0])
     if not 0 < strands < len(words) and _fits(words[:2].byteswap(), components, len(words)):
-        raise bad_file(subject, "is written big-endian, which the format is not", "export it little-endian")
+        raise big_endian(subject)
     if strands <= 0:
         raise bad_file(subject, f"says that it holds {strands} strands", "export one with hair in it")
     if strands >= len(words):

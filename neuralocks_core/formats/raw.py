@@ -39,6 +39,11 @@ def bad_file(subject: str, fact: str, remedy: str = "export it again") -> Neural
     return NeuralocksError(f"{subject}: {fact}; {remedy}")
 
 
+def big_endian(subject: str) -> NeuralocksError:
+    """The error for a file whose numbers have their bytes in the other order."""
+    return bad_file(subject, "is written big-endian, which the format is not", "export it little-endian")
+
+
 def floats(content: bytes, offset: int, count: int, subject: str, what: str) -> np.ndarray:
     """(count,) little-endian float32 at a byte offset, not copied; refused where the file is too short for them.
 

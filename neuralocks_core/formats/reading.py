@@ -21,6 +21,15 @@ EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
 LARGEST_FILE = 4 * 2**30
 """Bytes; a groom of a million strands of 100 vertices is a third of it."""
 
+PACKED = {
+    b"\x1f\x8b\x08": "gzip",
+    b"PK\x03\x04": "zip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+}
+"""How packed files begin, of which none is read."""
+
 SCALP = 0.16
 """Width of a narrow scalp [m]."""
 NARROW, WIDE = 0.1, 0.3
@@ -63,7 +72,7 @@ def read_with_look(
     wanted = None if unit is None else metres_per_unit(unit)
     wanted_axis = None if up is None else upward_axis(up)
     content = _content(path)
-    raw = _reader(path, content)(content, str(path))
+    raw = _raw(path, content)
     if not len(raw.points):
         raise bad_file(str(path), "holds no points", "export one with hair in it")
     notes = list(raw.notes)
@@ -120,6 +129,17 @@ def _content(path: Path) -> bytes:
         raise
     except (OSError, ValueError, MemoryError) as error:
         raise bad_file(str(path), f"cannot be read ({error})", "check the path and its permissions") from None
+
+
+def _raw(path: Path, content: bytes) -> RawGroom:
+    try:
+        return _reader(path, content)(content, str(path))
+    except NeuralocksError:
+        # Asked only now: a format whose files begin with a number may begin with any.
+        packed = next((name for begin, name in PACKED.items() if content.startswith(begin)), None)
+        if packed is None:
+            raise
+        raise bad_file(str(path), f"is packed ({packed})", "unpack it first") from None
 
 
 def _reader(path: Path, content: bytes):

@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from neuralocks_core.formats.raw import RawGroom, bad_file, floats
+from neuralocks_core.formats.raw import RawGroom, bad_file, big_endian, floats
 
 HEADERS = {3: 296, 4: 160}
 """Bytes of the header of each version."""
@@ -31,6 +31,8 @@ def read(content: bytes, subject: str) -> RawGroom:
         raise bad_file(subject, f"has {len(content)} bytes, fewer than a TressFX header", "it is truncated")
     version, strands, vertices = struct.unpack_from("<fII", content)
     if version not in HEADERS:
+        if struct.unpack_from(">f", content)[0] in HEADERS:
+            raise big_endian(subject)
         raise bad_file(subject, "is not TressFX text v2 or binary v3 or v4", "export it in one of these")
     header = HEADERS[int(version)]
     if len(content) < header:

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hostile groom files get one clear error, and no more memory than their size can justify."""
 
+import bz2
+import gzip
+import lzma
 import struct
 import tracemalloc
 
@@ -68,6 +71,23 @@ def test_hostile_files_get_one_line(folder, name):
 def test_big_endian_files_are_called_so(folder, name):
     content = np.frombuffer(FILES[name], "<i4").byteswap().tobytes()
     with pytest.raises(NeuralocksError, match="big-endian"):
+        formats.read(put(folder, name, content))
+
+
+@pytest.mark.parametrize("name", ["a.hair", "colors.hair", "v3.tfx", "v4.tfx"])
+def test_headers_of_the_other_byte_order_are_called_so(folder, name):
+    """Their numbers are four bytes each, up to what `.hair` files say of themselves in words."""
+    magic = 4 if name.endswith(".hair") else 0
+    words = np.frombuffer(FILES[name][magic:40], "<i4").byteswap().tobytes()
+    with pytest.raises(NeuralocksError, match="is written big-endian.*little-endian"):
+        formats.read(put(folder, name, FILES[name][:magic] + words + FILES[name][40:]))
+
+
+@pytest.mark.parametrize("name", [*FILES, "a.hair.gz", "groom"])
+@pytest.mark.parametrize("pack", [gzip.compress, bz2.compress, lzma.compress])
+def test_packed_files_are_called_so(folder, name, pack):
+    content = pack(FILES.get(name, FILES["a.hair"]))
+    with pytest.raises(NeuralocksError, match=r"is packed \((gzip|bzip2|xz)\); unpack it first"):
         formats.read(put(folder, name, content))
 
 
