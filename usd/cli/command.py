@@ -8,7 +8,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import typer
@@ -30,7 +30,7 @@ def command_of(app: typer.Typer):
             def run(*args, **kwargs):
                 try:
                     with stoppable():
-                        _check_words(function, kwargs)
+                        _check_words(function, kwargs, usd)
                         if usd:
                             _load_usd()
                         return function(*args, **kwargs)
@@ -68,7 +68,7 @@ def _paragraphs(text: str) -> str:
     return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
-def _check_words(function, given: dict) -> None:
+def _check_words(function, given: dict, usd: bool) -> None:
     """Refuse empty words, such as a script's variable that was never set leaves behind, and files whose names are no
     text: USD takes UTF-8 alone, whatever the disk allows.
     """
@@ -78,10 +78,20 @@ def _check_words(function, given: dict) -> None:
                 needed = inspect.signature(function).parameters[name].default is inspect.Parameter.empty
                 remedy = "give a value" if needed else "give a value, or leave it out"
                 raise NeuralocksError(f"{_as_typed(function, name)}: is empty; {remedy}")
-            try:
-                str(word if isinstance(word, Path) else "").encode()
-            except UnicodeEncodeError:
-                raise _unreadable(word) from None
+            for path in _paths(word, usd):
+                try:
+                    str(path).encode()
+                except UnicodeEncodeError:
+                    raise _unreadable(path) from None
+
+
+def _paths(word, usd: bool) -> list[Path]:
+    """A file as its user names it and, since USD asks for that, its whole path; nothing of what is no file."""
+    if not isinstance(word, Path):
+        return []
+    with suppress(OSError):  # the current folder may be gone
+        return [word, Path(os.path.abspath(word))] if usd else [word]
+    return [word]
 
 
 def _unreadable(path: Path) -> NeuralocksError:

@@ -41,6 +41,22 @@ def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys)
         assert captured.out == "" and captured.err.count("\n") == 1 and "not UTF-8" in captured.err, captured
 
 
+def test_a_folder_whose_name_is_no_text_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    """Of a file in the current folder, too, whose whole path USD asks for."""
+    odd = tmp_path / os.fsdecode(b"shots\xff")
+    try:
+        odd.mkdir()
+        write_shot(tmp_path).rename(odd / "shot.usda")
+        monkeypatch.chdir(odd)
+    except (OSError, UnicodeError):
+        pytest.skip("this disk takes only text")
+    for words in (("bake", "shot.usda", "-o", "a.usdc"), ("inspect", "shot.usda"), ("import", "a.tfx", "-o", "a.usda")):
+        assert status(*words) == 1
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1 and "not UTF-8" in captured.err, captured
+    assert status("rig", "export-c", "-o", "hair.h") == 0, "which needs no USD"
+
+
 def test_an_empty_word_is_refused(tmp_path, capsys):
     """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
     for words in (
