@@ -71,6 +71,7 @@ def evaluate(
     Raises:
         NeuralocksError: the file is no bake, or the reference is not installed.
     """
+    beside = _model_beside(model) if reference else None  # before minutes of work
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head, joints)
     say = progress or silent
@@ -90,10 +91,20 @@ def evaluate(
         curves[item.path] = {"times": own.times, "bake": metrics.tip_curves(subject.moved)}
         curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
         if reference and len(own.codes) >= 3:
-            rows, tips = subject.compared(look, model)
+            rows, tips = subject.compared(look, beside)
             compared[item.path] = rows
             curves[item.path] |= tips
     return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
+
+
+def _model_beside(given) -> StrandModel | None:
+    """The model whose held-pose answer is shown; the shipped one, if there is one, where none is given."""
+    try:
+        return given if isinstance(given, StrandModel) else StrandModel.load(given)
+    except NeuralocksError:
+        if given is not None:
+            raise
+        return None
 
 
 class _Subject:
@@ -247,7 +258,7 @@ class _Subject:
             "jitter_mm": max(metrics.jitter(self.moved[frames]) for frames in quiet) if quiet else float("nan"),
         }
 
-    def compared(self, material: Material, model) -> tuple[dict, dict]:
+    def compared(self, material: Material, model: StrandModel | None) -> tuple[dict, dict]:
         """Rows and tip curves beside the reference."""
         strands, times = self.strands, self.baked.times
         few = strands.whole_locks(REFERENCE_STRANDS)
@@ -266,13 +277,9 @@ class _Subject:
         tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}
         return rows, tips | {"reference": metrics.tip_curves(true)}
 
-    def _held(self, material: Material, model, few) -> np.ndarray | None:
+    def _held(self, material: Material, model: StrandModel | None, few) -> np.ndarray | None:
         """The model's answer for each pose as if it were held, if there is a model."""
-        try:
-            model = model if isinstance(model, StrandModel) else StrandModel.load(model)
-        except NeuralocksError:
-            if model is not None:
-                raise
+        if model is None:
             return None
         session = StrandSession(model, self.strands)
         sampler = model.sampler(self.character, self._clip)

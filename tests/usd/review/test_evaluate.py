@@ -226,6 +226,13 @@ def test_a_model_without_a_reference_is_refused(rigid, capsys):
     assert ended.value.code == 1 and "--reference" in capsys.readouterr().err
 
 
+def test_a_model_that_cannot_be_read_is_refused_before_anything_is_measured(rigid, tmp_path):
+    told = []
+    with pytest.raises(NeuralocksError, match="nope.neuralocks: no such model file"):
+        evaluate(rigid, reference=True, model=tmp_path / "nope.neuralocks", progress=lambda *said: told.append(said))
+    assert not told
+
+
 def test_of_very_many_vertices_distances_are_measured_of_some(tmp_path, still_model, monkeypatch):
     baked, shares = bake(write_shot(tmp_path), tmp_path / "a.usdc", still_model, frames="1").path, []
     for most in (100_000, 120):
