@@ -30,6 +30,8 @@ _LARGEST = 64 << 20
 """Bytes of one unpacked entry; a model has about one million, so a bomb is told from a model."""
 _LARGEST_FILE = 5 * _LARGEST
 """Bytes of a file: nothing else is looked through for the zip in it."""
+_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Other ways to pack a zip's entries have errors, and take memory, of their own."""
 
 
 @dataclass(frozen=True)
@@ -167,20 +169,18 @@ def _parsed(text: bytes):
 
 
 def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes:
-    if info.file_size > _LARGEST:
+    if info.file_size > _LARGEST:  # no more than it claims is ever unpacked
         raise NeuralocksError(
             f"{path}: {info.filename} claims {info.file_size} bytes, more than a model has; get another copy"
         )
+    if info.compress_type not in _PACKED:
+        raise NeuralocksError(f"{path}: {info.filename} is packed as in no model; get an undamaged copy")
     try:
-        with archive.open(info) as file:
-            data = file.read(_LARGEST + 1)
+        return archive.read(info)
     except zlib.error as error:
         raise NeuralocksError(
             f"{path}: {info.filename} is damaged ({_first_line(error)}); get an undamaged copy"
         ) from None
-    if len(data) > _LARGEST:
-        raise NeuralocksError(f"{path}: {info.filename} unpacks to more than a model has; get another copy")
-    return data
 
 
 def _check(meta, path: Path, kind: str | None) -> None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Strand models of random weights, for tests of what runs them."""
 
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,13 @@ def without_rest_points(graphs: dict[str, bytes]) -> dict[str, bytes]:
 def offsets_of(net, strands, frames):
     """What a network answers, (B, S, 24, 3), to strands (S, 142) or (B, S, 142) in frames (B, F)."""
     return net.tail(net.strand_part(strands), net.frame_part(frames)[:, None]).unflatten(-1, (24, 3))
+
+
+def rewritten(path: Path, target: Path, **changes) -> Path:
+    """A copy of a model file with entries replaced; None leaves one out."""
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            data = changes.get(name.replace(".", "_"), old.read(name))
+            if data is not None:
+                new.writestr(name, data)
+    return target

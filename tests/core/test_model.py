@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one-file model: what is written comes back, and what is no model is refused in one line."""
+
+import os
+import random
+import re
+import zipfile
+
+import pytest
+
+from neuralocks_core import model
+from neuralocks_core.errors import NeuralocksError
+from tests.strand_models import rewritten
+
+PATH = model.shipped("strands")
+
+
+def test_what_a_model_does_not_say_of_itself_is_empty(tmp_path):
+    file = model.read(PATH)
+    quiet = model.write(tmp_path / "quiet.neuralocks", {**file.meta, "training": None, "credits": None}, file.graphs)
+    assert [model.read(quiet).meta[name] for name in ("training", "credits")] == [{}, []]
+
+
+def test_truncated_missing_and_foreign_files_are_refused(tmp_path):
+    cut = tmp_path / "cut.neuralocks"
+    cut.write_bytes(PATH.read_bytes()[:-500])
+    for file in (cut, tmp_path / "missing.neuralocks", tmp_path):
+        with pytest.raises(NeuralocksError):
+            model.read(file)
+    with pytest.raises(NeuralocksError, match="strand hair, not for rigged"):
+        model.read(PATH, "rig")
+    with pytest.raises(NeuralocksError, match=f"^{re.escape(os.devnull)}: (is no file|no such)"):
+        model.read(os.devnull)
+    with open(cut, "ab") as file:
+        file.truncate(1 << 30)
+    with pytest.raises(NeuralocksError, match="more than a model has"):
+        model.read(cut)
+
+
+def test_what_unpacks_to_more_than_a_model_is_not_unpacked(tmp_path):
+    bomb = rewritten(PATH, tmp_path / "bomb.neuralocks", tail_onnx=None)
+    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive, archive.open("tail.onnx", "w") as entry:
+        for _ in range(65):
+            entry.write(bytes(1 << 20))
+    assert bomb.stat().st_size < 10 << 20
+    with pytest.raises(NeuralocksError, match=r"tail.onnx claims 68157440 bytes, more than a model has; get another"):
+        model.read(bomb)
+
+
+@pytest.mark.parametrize("packed", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damage_is_told_in_one_line_however_a_file_is_packed(tmp_path, packed):
+    """Each way to pack entries has errors of its own."""
+    with zipfile.ZipFile(PATH) as old, zipfile.ZipFile(tmp_path / "m.neuralocks", "w", packed) as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name))
+    whole, chance, refused = (tmp_path / "m.neuralocks").read_bytes(), random.Random(0), 0
+    for _ in range(30):
+        damaged = bytearray(whole)
+        damaged[chance.randrange(50, 3000)] ^= 1 << chance.randrange(8)
+        (tmp_path / "m.neuralocks").write_bytes(damaged)
+        try:
+            model.read(tmp_path / "m.neuralocks")
+        except NeuralocksError as error:
+            refused += 1
+            assert "\n" not in str(error) and str(error).startswith(f"{tmp_path / 'm.neuralocks'}: ")
+    assert refused > 25
+
+
+def test_writing_twice_gives_the_same_bytes(tmp_path):
+    file = model.read(PATH)
+    copies = [model.write(tmp_path / f"{i}.neuralocks", file.meta, file.graphs).read_bytes() for i in (1, 2)]
+    assert copies[0] == copies[1]
+    with pytest.raises(NeuralocksError, match="3.neuralocks: .* NaN .* --set rate"):
+        model.write(tmp_path / "3.neuralocks", {**file.meta, "report": {"loss": float("nan")}}, file.graphs)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["1.neuralocks", "2.neuralocks"]
