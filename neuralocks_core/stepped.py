@@ -14,8 +14,8 @@ LONGEST = 1 / 6 + 1e-3
 WINDOW, LEAST = 4, 3
 """Of so many poses in a row at least so many must be held: a frame that is repeated by itself, or a pause, is no step."""
 ROUNDING = 1e-6
-"""Transforms that differ by no more, in relation to the largest entry or to 1, are the same pose: USD interpolates in float32
-between keys that hold."""
+"""Turns, and places, that differ by no more, in relation to the largest of their entries or to 2, are the same pose: USD
+interpolates in float32 between keys that hold."""
 STEP = 10.0
 """Poses that differ by no more than so many times that are no steps, but slow motion."""
 
@@ -67,12 +67,15 @@ class Stepped:
 
 def _changes(joints: np.ndarray, read: list[int]) -> np.ndarray:
     """How much the joints that are read change from each sample to the next (T - 1,), 1 being what rounding may do."""
-    change, size = np.zeros(len(joints) - 1), 1.0
-    for joint in sorted(set(read)):
-        own = joints[:, joint, :3]
-        np.maximum(change, np.abs(np.diff(own, axis=0)).max(axis=(1, 2)), out=change)
-        size = max(size, np.abs(own).max())
-    return change / (ROUNDING * size)
+    changes = []
+    for part in (slice(3), slice(3, 4)):  # far from the origin places are rounded more, but turns are not
+        change, size = np.zeros(len(joints) - 1), 2.0
+        for joint in sorted(set(read)):
+            own = joints[:, joint, :3, part]
+            np.maximum(change, np.abs(np.diff(own, axis=0)).max(axis=(1, 2)), out=change)
+            size = max(size, np.abs(own).max())
+        changes.append(change / (ROUNDING * size))
+    return np.maximum(*changes)
 
 
 def _held(times: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -48,6 +48,14 @@ def test_hair_moves_as_through_the_distinct_poses_and_holds_with_them(held):
     assert np.median(error.max(axis=1)) < 0.15, error.max(axis=1)
 
 
+def test_far_from_the_origin_poses_are_told_apart_by_their_turns():
+    """Where places are rounded most, a nod of a few degrees is still none."""
+    clip = shown(FRAMES - FRAMES % 2, speed=0.0)
+    far = clip.joints.copy()
+    far[:, :, 0, 3] += 1e4
+    np.testing.assert_allclose(vectors(replace(clip, joints=far), FRAMES), vectors(clip, FRAMES), atol=1e-6)
+
+
 def test_between_frames_the_motion_goes_from_pose_to_pose_as_they_are_drawn():
     """USD draws the chord from a held frame to the next pose; so far hair is on its way."""
     first = FRAMES - FRAMES % 2

@@ -11,7 +11,7 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP, Clip
-from neuralocks_core.rotation import angle_between
+from neuralocks_core.rotation import angle_between, flat, polar
 
 from ..border.units import Border
 from .joints import JointSource
@@ -81,8 +81,8 @@ class StageRig:
             replaced: joints that a bake replaces; how these move does not matter.
         """
         ends = self.clip.joints[[0, -1], :, :3, :3]
-        first, last = ends / np.cbrt(np.linalg.det(ends))[..., None, None]
-        turn = np.degrees(angle_between(first, last))
+        turn = np.degrees(angle_between(*polar(ends)[0]))
+        turn[flat(ends).any(axis=0)] = 0  # what is scaled to nothing has no turn
         for joint in replaced:  # and what hangs from it
             turn[self.character.skeleton.below(joint)] = 0
         start, end = self.time_codes[[0, -1]]

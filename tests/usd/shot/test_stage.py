@@ -184,6 +184,9 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
     assert not replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes(replaced=[0])  # which carries all others
+    turned[:, -1, :3, :3] = 0  # a joint that hides what hangs from it
+    (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
+    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
 
 
 @given(st.floats(1e-4, 1e3), st.sampled_from(["Y", "Z"]), st.floats(1, 240))
