@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The motion of a skeleton as it is read: its times, where its samples come from, and whether it is a loop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import from_vector
+from neuralocks_core.runtime import StrandModel
+from usd.border.time_codes import time_codes
+from usd.shot.stage import read_rigs, read_shot
+
+from ..shots import Recipe, write_shot
+
+
+def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
+    shot = read_shot(write_shot(tmp_path, Recipe(rate=30, frames=31)))
+    assert np.isclose(shot.rigs[0].clip.end - shot.rigs[0].clip.start, 1.0)
+
+
+def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_path):
+    """A layer of 24 frames a second in a shot of 60, its first frame between two of the shot's."""
+    motion = write_shot(tmp_path, Recipe(frames=9), "motion")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.SetTimeCodesPerSecond(60)
+    stage.GetRootLayer().subLayerPaths.append("./motion.usda")
+    stage.GetRootLayer().subLayerOffsets[0] = Sdf.LayerOffset(0.3)
+    stage.GetRootLayer().Save()
+    own, seen = (read_rigs(path)[0].clip for path in (motion, tmp_path / "shot.usda"))
+    assert np.allclose(seen.times - seen.start, own.times - own.start)
+    # Far keys are joined by straight lines, as renderers do.
+    for attribute in stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttributes():
+        stage.SetEditTarget(stage.GetRootLayer())
+        values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()[::4]}
+        for code, value in values.items():
+            attribute.Set(value, code)
+    stage.GetRootLayer().Save()
+    assert len(read_rigs(tmp_path / "shot.usda")[0].clip.times) == 3 + 20
+
+
+@pytest.mark.parametrize("off", [1e-14, 1e-10, 1e-5, -1e-10])
+def test_samples_a_rounding_error_apart_are_one(tmp_path, off):
+    """As layer offsets and clocks in single precision leave them: over so little time, any difference is a blow."""
+    shot = write_shot(tmp_path, Recipe(frames=24))
+    one = read_rigs(shot)[0]
+    stage = Usd.Stage.Open(str(shot))
+    top = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp()
+    for code in range(1, 25):
+        top.Set(Gf.Vec3d(0, 1e-7 * (code % 2), 0), code + off)
+    stage.Save()
+    apart = read_rigs(shot)[0]
+    assert len(apart.time_codes) == len(one.time_codes) and not len(apart.clip.cuts)
+    vectors = [StrandModel.load().sampler(rig.character, rig.clip).vectors([0.7])[0] for rig in (one, apart)]
+    np.testing.assert_allclose(vectors[1], vectors[0], atol=0.02 * np.abs(vectors[0]).max())
+
+
+def test_a_loop_that_does_not_close_is_said(tmp_path):
+    rig = read_shot(write_shot(tmp_path)).rigs[0]
+    closed = replace(rig, clip=Clip(rig.clip.times[:3], rig.clip.joints[[0, 1, 0]]))
+    assert not closed.loop_notes()
+    assert not closed.loop_notes(time_codes("1:9", 1, 9, subframes=64)), "one round, with the last frame's own samples"
+    for frames in ("0:9", "1:10"):
+        (note,) = closed.loop_notes(time_codes(frames, 1, 9))
+        assert "goes from 1 to 9" in note
+    (note,) = rig.loop_notes()
+    assert "/Hero/Rig" in note and "time codes 1 and 9" in note
+    turned = rig.clip.joints[[0, 0]]
+    turned[1] = np.block([[from_vector(np.array([0, 1.0, 0])), np.zeros((3, 1))], [np.zeros(3), 1]]) @ turned[0]
+    turned[1, -1, :3, :3] = from_vector(np.array([0, 1e-4, 0])) @ turned[1, -1, :3, :3]
+    (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
+    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
+    assert not replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes(replaced=[0])  # which carries all others
+    turned[:, -1, :3, :3] = 0  # a joint that hides what hangs from it
+    (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
+    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
+
+
+def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
+    ts = pytest.importorskip("pxr.Ts")
+    rigs = []
+    for curved in (False, True):
+        path = write_shot(tmp_path, Recipe(frames=0), f"curved_{curved}")
+        stage = Usd.Stage.Open(str(path))
+        turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddRotateYOp().GetAttr()
+        spline = ts.Spline("float")
+        for code, angle in ((1, 0.0), (5, 80.0), (9, 20.0)):
+            knot = ts.Knot("float")
+            knot.SetTime(code)
+            knot.SetValue(angle)
+            knot.SetNextInterpolation(ts.InterpLinear)
+            spline.SetKnot(knot)
+            turn.Set(angle, code)
+        if curved:
+            turn.Clear()
+            turn.SetSpline(spline)
+        stage.GetRootLayer().Save()
+        rigs.append(read_rigs(path)[0])
+    assert rigs[1].source.animated
+    np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
+    assert len(rigs[1].time_codes) == 9
