@@ -58,7 +58,7 @@ def _jumps(clip: Clip, joint: int) -> tuple[np.ndarray, np.ndarray]:
     fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
     jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)
     found = np.flatnonzero(jumped)
-    crowded = (np.diff(found) == 1) | (np.diff(times[1:][found]) < APART)
+    crowded = np.diff(times[1:][found]) < APART
     alone = np.ones(len(found), bool)
     alone[1:] &= ~crowded
     alone[:-1] &= ~crowded

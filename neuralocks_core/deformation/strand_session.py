@@ -47,7 +47,6 @@ class StrandSession:
         vector, _ = self._without_clumping(vector)
         if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
             return
-        self.anchor_offsets[:] = 0
         self.anchor_offsets[:] = self._tail("offsets", self.model.frame(vector))
         self._anchored_at = vector
 

@@ -179,7 +179,7 @@ class Stepper:
         self._solve(dt, iterations, settling=0)
 
     def read(self, points: np.ndarray, planes: np.ndarray | None) -> tuple[float, float]:
-        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `rods.SimulatedHair` has them."""
+        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `solver.SimulatedHair` has them."""
         args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()

@@ -170,6 +170,45 @@ def test_a_loop_has_no_seam(sway):
     assert felt == pytest.approx(sway * np.pi**2 / 9.81, rel=0.02, abs=1e-5)
 
 
+def test_at_the_seam_of_a_loop_its_acceleration_is_that_of_the_motion_gone_on_with():
+    times, spans = np.linspace(0, 2, 49), np.linspace(-2, 4, 145)
+
+    def sway(t):
+        return np.stack([0.2 * np.cos(np.pi * t), 0.1 * np.cos(3 * np.pi * t), 0 * t], -1)
+
+    around = np.array([0.0, 0.02, 0.1, 1.95, 2.0])
+    loop, whole = (
+        BoundarySampler(SPEC, person(), each) for each in (moved(times, sway, loop=True), moved(spans, sway))
+    )
+    assert loop.vectors(around) == pytest.approx(whole.vectors(around), abs=1e-3)
+
+
+def test_a_cut_counts_from_its_own_sample_on_however_its_time_was_rounded():
+    times = np.arange(48) / 24
+
+    def leap(t):
+        return np.stack([0.1 * np.sin(5 * t) + 3.0 * (t > 0.99), 0 * t, 0 * t], -1)
+
+    whole = Clip(times, moved(times, leap).joints, cuts=[1.0])
+    after = Clip(times[24:], whole.joints[24:])
+    cut, alone = (BoundarySampler(SPEC, person(), clip) for clip in (whole, after))
+    at = [1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.2]
+    assert np.abs(history(cut.vectors(at))).max() < 1
+    assert cut.vectors(at) == pytest.approx(alone.vectors(at), abs=1e-6)
+
+
+@pytest.mark.parametrize(("linear", "limit"), [("gravity", "GRAVITY_LIMIT"), ("velocity", "SPEED_LIMIT")])
+def test_a_leap_within_a_loop_is_bounded(linear, limit):
+    """A loop has no cuts, and its path stays as it is, or its seam would not fit: what is felt of a leap is cut off."""
+    spec = BoundarySpec(bins=(1,) * 30, taper=0.0, linear=linear)
+    clip = moved(
+        np.arange(49) / 24, lambda t: np.stack([40.0 * np.exp(-400 * (t - 1) ** 2), 0 * t, 0 * t], -1), loop=True
+    )
+    assert softened(clip, person(), 6.0, SPEC.dt) is clip
+    felt = np.linalg.norm(history(BoundarySampler(spec, person(), clip).vectors([1.2]), spec)[0, :, :3], axis=-1)
+    assert felt.max() == pytest.approx(getattr(BoundarySampler, limit), rel=1e-5)
+
+
 def test_a_teleport_is_bounded():
     clip = moved(np.arange(60) / 30, lambda t: np.stack([100.0 * (t > 1), 0 * t, 0 * t], -1))
     values = history(BoundarySampler(SPEC, person(), clip).vectors(np.arange(60) / 30))

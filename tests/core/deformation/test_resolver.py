@@ -70,6 +70,45 @@ def test_the_grooms_of_a_head_share_its_grid():
     assert grid(1.0, [0, 1]) is grid(1.0, [5, 7]) is not grid(1.1, [5, 7])
 
 
+def test_skin_that_a_blend_shape_moves_in_the_clip_does_not_stand_still():
+    """A face that swells by 15 mm pushes the hair on it as far, though no joint moves."""
+    person, out = rigs.person(), HEAD.vertices / np.linalg.norm(HEAD.vertices, axis=1, keepdims=True)
+    on_head, origin = np.full((len(out), 1), rigs.HEAD), rigs.bind()[rigs.HEAD, :3, 3]
+    body = Body(HEAD.vertices + origin, HEAD.faces, on_head, np.ones((len(out), 1)), {"swollen": 0.015 * out})
+    points = strands(turn=0.5).reshape(-1, 3)
+    points *= 0.103 / np.linalg.norm(points, axis=1, keepdims=True)
+    hair = strand_set(Groom("Hair", points + origin, np.full(60, 24)), origin, np.zeros(3))
+    times = np.arange(3) / 24
+    clip = Clip(times, rigs.moved(times).joints, np.array([[0.0], [0.5], [1.0]]))
+    resolver = Resolver(Character(person.skeleton, body), hair, clip)
+    for row in range(3):
+        moved = np.zeros((60, 24, 3), np.float32)
+        resolver.apply(moved, clip.joints[row], clip.shape[row])
+        skin = resolver.collider(clip.joints[row], clip.shape[row])
+        assert (skin.distance(hair.rest)[0][:, 6:] < -0.002).any() == (row > 0)
+        assert skin.distance(hair.rest + moved)[0][:, 6:].min() > -1e-3
+
+
+def test_hair_that_rests_deep_sinks_no_deeper_where_nothing_is_known_of_the_body():
+    """Half a decimetre below skin that moves no vertex tells that it is inside, and those above lie as they rest."""
+    person, origin, count = rigs.person(), rigs.bind()[rigs.HEAD, :3, 3], len(HEAD.vertices)
+    body = Body(HEAD.vertices + origin, HEAD.faces, np.zeros((count, 1), int), np.ones((count, 1)))
+    around = np.linspace(0, 0.9, 12)
+    points = np.zeros((24, 3))
+    points[:12, 1] = np.linspace(0.1, 0.054, 12)
+    points[12:] = 0.05 * np.stack([np.sin(around), np.cos(around), 0 * around], axis=1)
+    hair = strand_set(Groom("Hair", points.astype(np.float32) + origin, [24]), origin, np.zeros(3))
+    clip = rigs.moved(np.arange(3) / 24, head_turn=lambda t: from_vector(np.outer(4 * t, [1, 0, 0])))
+    resolver = Resolver(Character(person.skeleton, body), hair, clip)
+    steps = np.diff(hair.rest[0], axis=0)
+    steps[15:] = np.linalg.norm(steps[15:], axis=1)[:, None] * [0, -1, 0]
+    moved = np.zeros((1, 24, 3), np.float32)
+    moved[0, 1:] = hair.rest[0, 0] + np.cumsum(steps, axis=0) - hair.rest[0, 1:]
+    sunk = -moved[0, -1, 1]
+    resolver.apply(moved, clip.joints[0])
+    assert sunk > 0.015 and -moved[0, -1, 1] < 0.2 * sunk
+
+
 def test_poses_and_displacements_of_others_are_refused():
     character, hair = rigs.person(), rigs.straight_hair(5)
     count = len(HEAD.vertices)

@@ -106,6 +106,16 @@ def test_planes_say_where_the_body_is():
     np.testing.assert_allclose(np.linalg.norm(result.planes[..., :3], axis=-1)[near], 1, atol=1e-5)
 
 
+def test_hair_that_lies_deep_in_the_body_is_known_to_be_there():
+    """Farther below the skin than outside of it hair is taken for free."""
+    points, faces = sphere()
+    head = shaken(6)
+    straight = np.linspace(0.09, 0.03, 24)[:, None] * [0, 1.0, 0]
+    result = simulate(straight[None], head, carried(head, points), faces, bind_body=points, planes=True)
+    gap = (result.planes[..., :3] * result.points).sum(-1) - result.planes[..., 3]
+    assert gap[:, 0, 20:] == pytest.approx(np.linalg.norm(result.points[:, 0, 20:], axis=-1) - 0.098, abs=4e-3)
+
+
 def test_ties_hold_neighbours_together():
     rest = groom(2, curl=0)
     rest[1] = rest[0] + [0.003, 0, 0]

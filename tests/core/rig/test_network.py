@@ -58,6 +58,15 @@ def test_batch_and_single_agree():
     np.testing.assert_allclose(model.evaluate(features)[7], model.evaluate(features[7]), atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["static", "dynamic"])
+def test_what_is_sent_beyond_the_limits_is_cut_off(kind):
+    """A damaged caller turns no joint farther than the largest motion that is read."""
+    model = model_of(kind)
+    far = 1e4 * random_features(model, 50)
+    np.testing.assert_array_equal(model.evaluate(far), model.evaluate(np.clip(far, -model.limits, model.limits)))
+    assert np.abs(model.evaluate(far) - model.evaluate(far / 1e4)).max() > 1e-3
+
+
 def test_a_report_that_ran_away_is_not_written(tmp_path):
     """What helps is an option of `rig train`: it has no --set."""
     pytest.importorskip("onnx")

@@ -27,6 +27,12 @@ def test_locks_are_compact_and_gapless():
     np.testing.assert_array_equal(lock, lock_of_roots(roots))
 
 
+def test_no_lock_is_a_few_strands_that_a_cell_of_the_lattice_grazes():
+    for seed in range(3):
+        size = np.bincount(lock_of_roots(scalp(20_000, seed)))
+        assert size.min() > 0.3 * size.mean()
+
+
 def test_lock_size_does_not_follow_the_strand_count():
     few, many = scalp(4000), scalp(60_000)
     assert spread(many, lock_of_roots(many)) == pytest.approx(spread(few, lock_of_roots(few)), rel=0.25)
