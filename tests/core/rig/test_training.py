@@ -16,7 +16,7 @@ from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, skin
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial, RodTree
-from neuralocks_core.rotation import from_quaternion
+from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import posed_distances, rest_distances
@@ -95,6 +95,20 @@ def test_a_loose_tail_swings_as_a_pendulum():
     crossings = np.flatnonzero(np.diff(np.sign(angle)) != 0)
     period = 2 * np.diff(crossings).mean() / rate
     assert period == pytest.approx(2 * np.pi * np.sqrt(0.3 / 9.81), rel=0.05)
+
+
+def test_turns_past_half_a_round_go_on_from_the_other_side():
+    """A loose tail that lies where it was while the head whirls about: quaternions of one sign, as networks give them."""
+    who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.6, -0.3))])
+    chains = find_chains(who)
+    material = RigMaterial(bend=1e-9, damping=0.0, weight=0.0)
+    solver = ChainSolver(chains, RodTree(chains, material), 0.0, weight=0.0)
+    heads = np.tile(np.eye(4), (1, 60, 1, 1))
+    heads[0, :, :3, :3] = from_vector(np.linspace(0, 5, 60)[:, None] * [0, 1.0, 0])
+    turns = solver.simulate(heads, 1 / 60)[0, :, 0].astype(float)
+    ahead = np.einsum("tij,tj->ti", heads[0, :, :3, :3] @ from_quaternion(turns), np.tile([0, 0, -1.0], (60, 1)))
+    assert np.abs(ahead - [0, 0, -1]).max() < 0.05
+    assert (turns[:, 0] >= 0).all() and turns[:, 0].min() < 0.05
 
 
 def test_spring_bones_rest_and_depend_on_the_frame_rate():

@@ -57,3 +57,14 @@ def test_a_head_that_moves_by_a_tenth_of_a_millimetre_takes_its_hair_along(tmp_p
     moved[:, 1, 3] += 1e-4
     here, there = (placer.points(1.0, pose, lambda strands: rest[strands]) for pose in (joints, moved))
     np.testing.assert_allclose(there - here, [[0, 1e-4, 0]] * len(here), atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.0007])
+def test_hair_that_stands_where_it_rests_has_its_own_points(tmp_path, unit):
+    """Up to a thousandth of a millimetre, however many units that is: a pose in single precision is no nearer."""
+    item = read_shot(write_shot(tmp_path, Recipe(unit=unit))).grooms[0]
+    joints = item.attachment.rig.joints_at(1.0)
+    assert unit == 1 or np.abs(item.attachment.character.carrying(joints) - np.eye(4)).max() > 1e-9
+    rest = np.zeros((item.groom.strand_count, 24, 3), np.float32)
+    placed = placing.GroomPlacer(item).points(1.0, joints, lambda strands: rest[strands])
+    np.testing.assert_array_equal(placed, np.asarray(UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get()))
