@@ -150,7 +150,9 @@ class TrainingJob:
             for line in lines:
                 try:
                     said = json.loads(line)
-                except json.JSONDecodeError:
+                except ValueError:
+                    continue
+                if not isinstance(said, dict):  # what a library prints may be JSON by chance
                     continue
                 if "error" in said:
                     self.error = str(said["error"])

@@ -17,7 +17,7 @@ if settings["out"] == "wait": time.sleep(60)
 if settings["out"] == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
 if settings["out"] == "odd":
-    for stream in (sys.stdout, sys.stderr): stream.buffer.write(b"\\xff\\x81\\n"); stream.flush()
+    for stream in (sys.stdout, sys.stderr): stream.buffer.write(b"\\xff\\x81\\n7\\n[1]\\n"); stream.flush()
     print(json.dumps({"done": 0.75}), flush=True); sys.exit("broken: K\xfcche")
 if settings["out"] == "crash": raise RuntimeError("boom")
 """
@@ -70,7 +70,9 @@ def test_training_says_why_it_failed(job, out, words):
     running = job(out)
     _wait(lambda: not running.running)
     assert not running.succeeded and running.failure() == words
-    assert running.done == (0.75 if out == "odd" else 0.5), "bytes that are no text end nobody who listens"
+    assert running.done == (0.75 if out == "odd" else 0.5), (
+        "bytes that are no text, or JSON of others, end nobody who listens"
+    )
 
 
 @pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
