@@ -34,6 +34,9 @@ SOME_ROOTS, SOME_TIMES = 1000, 16
 
 STEADY = 1e-4
 """A prim that drifts no more than this against something is moved by it."""
+ABOUT, ROUNDED = 10.0, 0.01
+"""Drifts are shares of how far from the origin a prim stands, but of no more than so many metres, or, as places there are
+rounded, than such a part of it."""
 APART = 5e-3
 """Places of a groom that are so far from each other [m] are not the same to the eye."""
 
@@ -213,11 +216,12 @@ def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
     """
     if not placement.samples or not rig.source.animated:
         return 0.0, 0.0
-    with_skeleton = _drift(placement, rig.source.placement.at)
+    about = ABOUT / rig.border.metres_per_unit
+    with_skeleton = _drift(placement, rig.source.placement.at, about)
     if with_skeleton <= STEADY:
         return with_skeleton, np.inf
     return with_skeleton, _drift(
-        placement, lambda time: rig.border.from_core @ rig.carrying_at(time) @ rig.border.to_core
+        placement, lambda time: rig.border.from_core @ rig.carrying_at(time) @ rig.border.to_core, about
     )
 
 
@@ -233,11 +237,14 @@ def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.nda
     return np.array(rows, int), np.array(places).reshape(-1, 4, 4)
 
 
-def _drift(placement: Placement, against: Callable[[float], np.ndarray]) -> float:
-    """How much a moving prim moves against something else in stage space, as a share: 0 if that is what moves it."""
+def _drift(placement: Placement, against: Callable[[float], np.ndarray], about: float) -> float:
+    """How much a moving prim moves against something else in stage space, as a share: 0 if that is what moves it; `about` is
+    ABOUT in units of the stage.
+    """
     times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
     places = np.stack([placement.at(time) for time in times])
     relative = np.linalg.inv(np.stack([against(time) for time in times])) @ places
     turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
-    reach = max(1.0, np.abs(places[..., 3]).max(), np.abs(relative[..., 3]).max())
+    far = np.abs(places[..., 3]).max()
+    reach = max(1.0, min(far, about), ROUNDED * far, np.abs(relative[..., 3]).max())
     return float(max(turned / np.abs(relative[0, :3, :3]).max(), moved / reach))

@@ -105,6 +105,25 @@ def test_hair_of_an_animated_set_in_which_the_character_walks_is_not_taken_from_
     assert "is neither that of /Train/Hero/Rig nor of the head" in note and "bind it" in note
 
 
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_hair_that_rises_with_the_head_is_taken_from_there_far_from_the_origin_too(tmp_path, away):
+    """A step aside is little beside ten kilometres, and still a step aside."""
+    place = np.eye(4)
+    place[0, 3] = away
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="none", place=place))))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    op, still = curves.AddTranslateOp(), np.asarray(motion.GetTranslationsAttr().Get(1))
+    for code in range(1, 10):
+        step = np.array([0.1, 0.02 * code, 0])
+        motion.GetRotationsAttr().Set(Vt.QuatfArray([Gf.Quatf(1)] * len(still)), code)
+        motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(np.float32([still[0] + step, *still[1:]])), code)
+        op.Set(Gf.Vec3d(*step), code)
+    stage.Save()
+    (item,) = read_shot(stage.GetRootLayer().realPath).grooms
+    np.testing.assert_allclose(item.groom.points, curves.GetPointsAttr().Get(), atol=1e-6)
+
+
 def test_hair_that_only_nearly_keeps_to_the_head_was_made_on_that(tmp_path):
     stage, head = _turned(tmp_path, "mesh")
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
