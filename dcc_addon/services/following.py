@@ -7,7 +7,12 @@ import numpy as np
 
 from neuralocks_core.rotation import transformed
 
-from .motion import TOLERANCE
+from .motion import KEPT_TO, TOLERANCE
+
+FAR = 200.0
+"""Up to so many units from the origin, what counts as no motion grows with the distance; a person in centimetres is as large."""
+ROUNDED = 16 * KEPT_TO
+"""Beyond that, it grows with how Blender's single precision rounds places there alone."""
 
 
 def on_joint(places: np.ndarray, objects: np.ndarray, joints: np.ndarray, bind: np.ndarray) -> np.ndarray | None:
@@ -55,5 +60,5 @@ def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
 
 def _still(places: np.ndarray, carriers: np.ndarray) -> bool:
     """Whether something (T, 4, 4) does not move against what carries it (T, 4, 4)."""
-    relative = np.linalg.inv(carriers) @ places
-    return bool(np.ptp(relative, axis=0).max() <= TOLERANCE * max(1.0, np.abs(places).max()))
+    relative, far = np.linalg.inv(carriers) @ places, float(np.abs(places).max())
+    return bool(np.ptp(relative, axis=0).max() <= TOLERANCE * max(1.0, min(far, FAR)) + ROUNDED * far)

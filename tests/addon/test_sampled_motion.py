@@ -152,9 +152,13 @@ def test_what_goes_with_the_head_alone_is_on_it():
     assert following.on_joint(still @ hat, still, turning, bind) is None
 
 
-def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along():
-    """The first joint below the head that it does not move against; what a scale of zero hides carries nothing."""
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along(away):
+    """The first joint below the head that it does not move against; what a scale of zero hides carries nothing. Far from the
+    origin too, where Blender rounds places.
+    """
     heads = np.tile(np.eye(4), (5, 1, 1))
+    heads[:, 0, 3] = away
     heads[:, :3, :3] = from_vector(np.outer(np.linspace(0, 1, 5), [0, 0, 1]))
     jaw, beard = heads.copy(), np.eye(4)
     jaw[:, :3, :3] = heads[:, :3, :3] @ from_vector(np.outer(np.linspace(0, 0.5, 5), [1, 0, 0]))
@@ -162,9 +166,13 @@ def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along():
     hidden = jaw.copy()
     hidden[2, :3, :3] = 0
     joints = {3: heads @ beard, 4: hidden, 5: jaw, 6: jaw @ beard}
-    assert following.carrier_below(jaw @ beard, heads, [3, 4, 5, 6], joints.__getitem__) == 5
-    assert following.carrier_below(heads @ beard, heads, [3, 4, 5, 6], joints.__getitem__) is None
-    assert following.carrier_below(np.tile(beard, (5, 1, 1)), heads, [3, 4, 5, 6], joints.__getitem__) is None
+
+    def carrier(places):
+        return following.carrier_below(places.astype(np.float32), heads, [3, 4, 5, 6], joints.__getitem__)
+
+    assert carrier(jaw @ beard) == 5
+    assert carrier(heads @ beard) is None
+    assert carrier(np.tile(beard, (5, 1, 1))) is None
 
 
 def test_a_motion_in_parts_is_the_whole():
