@@ -71,3 +71,23 @@ def test_live_hair_rides_on_skin_that_blend_shapes_move():
         assert [half - begun, end - begun] == [pytest.approx(way / 2, abs=1e-6), pytest.approx(way, abs=1e-6)]
         live.follow(Clip([0.0, 1.0], poses, np.zeros((2, 1))))
         assert live.points(1.0, poses[0], np.eye(4), resolve=resolve)[0] == pytest.approx(begun, abs=1e-6)
+
+
+def test_live_hair_that_follows_another_clip_is_as_if_it_had_followed_no_other():
+    """Of a body that is wider from the first frame on, whose held pose the network answers otherwise."""
+    who, ball = character(), trimesh.creation.icosphere(3, 0.1)
+    joints = np.full((len(ball.vertices), 1), who.head)
+    wider = {"wide": ball.vertices * [0.15, 0, 0.15]}
+    who = replace(who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), wider))
+    points = np.array([0.1, 1.68, 0]) + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])
+    hair, model = Groom("hair", points.astype(np.float32), np.array([24]), None), StrandModel.load()
+    poses, times = np.tile(who.skeleton.bind, (2, 1, 1, 1)), [0.0, 1.0]
+    plain, wide = (Clip(times, poses, np.full((2, 1), weight)) for weight in (0.0, 1.0))
+    shown = []
+    for clips in ((plain, wide), (wide,)):
+        live = LiveHair(hair, who, model)
+        for clip in clips:
+            live.follow(clip)
+            found = live.points(0.5, poses[0], np.eye(4)).copy()
+        shown.append(found)
+    np.testing.assert_array_equal(*shown)

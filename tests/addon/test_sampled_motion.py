@@ -46,6 +46,20 @@ def test_stored_channels_give_the_sampled_poses_back(scale):
     assert set(np.unique(motion.scale)) == {1.0}
 
 
+def test_rounding_does_not_add_up_along_a_chain():
+    """Each joint is stored relative to its parent as that is stored: a long spine ends where Blender has it."""
+    count, rng = 200, np.random.default_rng(2)
+    local = np.tile(np.eye(4), (3, count, 1, 1))
+    local[..., :3, :3] = from_vector(0.3 * rng.normal(size=(3, count, 3)))
+    local[:, 1:, 1, 3] = 0.37
+    world, parents = local.copy(), np.arange(count) - 1
+    for joint in range(1, count):
+        world[:, joint] = world[:, joint - 1] @ local[:, joint]
+    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)), {})
+    apart = np.abs(motion.world() - world)[..., :3, :].max(axis=(0, 2, 3))
+    assert apart[150:].max() < 3 * apart[:50].max()
+
+
 def test_stretched_bones_keep_place_and_rotation():
     """A stretched bone has no single scale; what hair reads of it stays."""
     bind, world = _motion(np.random.default_rng(1))

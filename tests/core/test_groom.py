@@ -37,6 +37,8 @@ def test_subset_takes_everything_along():
     np.testing.assert_array_equal(part.root_uv, [[4, 5], [0, 1]])
     np.testing.assert_array_equal(part.guides, [False, True])
     np.testing.assert_array_equal(part.group, [9, 7])
+    each = Groom("/hair", POINTS, [2, 0, 3], widths=[0.1, 0.2, 0.3]).subset([2, 0])
+    np.testing.assert_array_equal(each.widths, np.float32([0.3, 0.1]))
 
 
 @pytest.mark.parametrize(

@@ -187,6 +187,8 @@ def test_energies_of_known_shapes():
         stretch_energy(np.stack([edges, 1.1 * edges]), edges), [0, 0.5 * 1000 * 0.01], atol=1e-12
     )
     assert longer["gravity"][0] == pytest.approx(9.81 * 0.012)
+    heavy = energies(rest[None] * 1.1, rest, down, Material(weight=2.0))
+    assert heavy["gravity"][0] == pytest.approx(2 * longer["gravity"][0])
     bent = energies(arc(0.1)[None, None], rest, down, Material(bend=2e-3))
     assert bent["bend"][0] == pytest.approx(0.5 * 2e-3 * 10**2, rel=0.06)
 

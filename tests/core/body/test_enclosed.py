@@ -23,6 +23,14 @@ def test_a_ball_two_balls_and_an_open_one():
     assert (enclosed(points, ball.vertices, hole) == inside)[clear & (points[:, 2] > -0.08)].all()
 
 
+def test_an_open_bowl_encloses_what_it_goes_round_more_than_half():
+    ball = trimesh.creation.icosphere(4, 0.1)
+    bowl = ball.faces[ball.triangles_center[:, 1] < 0]
+    heights = np.array([-0.09, -0.05, -0.015, 0.015, 0.04, 0.2])
+    found = enclosed(heights[:, None] * [0, 1.0, 0], ball.vertices, bowl)
+    np.testing.assert_array_equal(found, heights < 0)
+
+
 def test_air_beside_a_crease_is_no_depth():
     """A sheet folded so far that it cuts through itself: past the fold the nearest face looks away from the air there."""
     box = trimesh.creation.box((0.2, 0.2, 0.2)).subdivide().subdivide()

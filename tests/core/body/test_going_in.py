@@ -64,3 +64,14 @@ def test_a_strand_does_not_depend_on_those_beside_it():
         np.testing.assert_array_equal(alone[:, 0], distance[:, i])
         np.testing.assert_array_equal(out[:, :, 0], way[:, :, i])
     assert np.isfinite(distance).sum() > np.isfinite(measured(points)[0]).sum()
+
+
+def test_of_two_planes_that_reach_a_vertex_the_nearer_is_its_way_out():
+    """Under a ridge, in by a gentle slope and out by a steep one: what lies right below the steep one leaves by that."""
+    points = strand([-0.02, -0.05, -0.05, -0.05, -0.02])
+    distance, way = np.full((5, 1), np.inf), np.zeros((5, 3, 1))
+    distance[0], distance[4] = -0.02, -0.02
+    way[0, 1], way[4, 0] = 1, 1
+    depths_along(points, distance, way)
+    np.testing.assert_allclose(distance[:, 0], [-0.02, -0.05, -0.04, -0.03, -0.02], atol=1e-12)
+    np.testing.assert_array_equal(way[1:4, :, 0], [[0, 1, 0], [1, 0, 0], [1, 0, 0]])

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from neuralocks_core.deformation.carrier import Carrier, Placing
 from neuralocks_core.deformation.lengths import keep_lengths_of_any
 from neuralocks_core.deformation.spans import LEFT_OVER, weights
+from neuralocks_core.deformation.turning import turned
 from neuralocks_core.groom import Groom
 from neuralocks_core.network_sizes import K
 from neuralocks_core.rotation import transformed
@@ -121,6 +122,17 @@ def test_a_bent_coil_stays_a_coil():
     # It still winds around the line that the network's vertices draw.
     ends = moved[:, -1] + ORIGIN
     assert np.linalg.norm(carried[:, -1] - ends, axis=1).max() < 0.02 * length.sum(axis=1).max()
+
+
+def test_what_lies_beside_the_line_is_not_torn_where_two_segments_meet():
+    """Own vertices right before and right behind a network vertex at which the line is bent by 60 degrees."""
+    edges = np.tile(np.float32([[0.01], [0], [0]]), (1, 2))[:, None]
+    displacement = np.zeros((1, 3, 3), np.float32)
+    displacement[0, 2] = 0.01 * np.array([np.cos(np.pi / 3) - 1, np.sin(np.pi / 3), 0])
+    beside = np.tile(np.float32([[0], [0.005], [0]]), (1, 4))
+    places = np.array([0, 0, 1, 1]), np.float32([0.5, 0.999, 0.001, 0.5])
+    moved = turned(edges, displacement, *places, beside)
+    assert np.abs(moved[:, 2] - moved[:, 1]).max() < 5e-5 < 1e-3 < np.abs(moved[:, 3] - moved[:, 0]).max()
 
 
 def test_any_strand_keeps_its_lengths_and_its_root():

@@ -107,6 +107,15 @@ def test_a_part_of_the_times_wanted_is_the_same():
     assert (whole[:6] == begun).all()
 
 
+def test_after_a_cut_hair_begins_where_the_part_does_whichever_times_are_wanted():
+    character, (times, joints) = person(HEAD.vertices + CENTRE, {}), pushed(30)
+    joints[12:, :, 2, 3] += 3
+    clip, strands = Clip(times, joints, cuts=times[[12]]), lying_strands(character)
+    whole, late = (simulated(character, strands, clip, times[rows]) for rows in (range(26), [0, 24, 25]))
+    np.testing.assert_allclose(late[1:], whole[24:], atol=1e-5)
+    assert np.abs(whole[24:]).max() > 1e-3
+
+
 def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
     """Also before a cut: the solver's clock goes on past the last sample."""
     character, times = person(HEAD.vertices + CENTRE, {}), np.arange(24) / 24

@@ -206,6 +206,16 @@ def test_a_last_joint_with_skin_moves():
     np.testing.assert_allclose(chains.bones[1], [0, -0.10, 0], atol=1e-12)
 
 
+@pytest.mark.parametrize(("beyond", "moves"), [(0.008, False), (0.03, True)])
+def test_a_last_joint_that_its_skin_hardly_passes_is_the_end_of_the_bone_before(beyond, moves):
+    who = character(tail("hair", 3))
+    places = {name: who.skeleton.bind[list(who.skeleton.names).index(name), :3, 3] for name in who.skeleton.names}
+    ends = {name.rsplit("/", 1)[-1]: place for name, place in places.items() if "hair" in name}
+    along = np.array([0, -0.06, -0.01]) / np.hypot(0.06, 0.01)
+    sheets = {name: [place + along * (0.05 if name != "hair_3" else beyond)] * 3 for name, place in ends.items()}
+    assert find_chains(who, [skin(who, sheets)]).names == ("hair_1", "hair_2", "hair_3")[: 3 if moves else 2]
+
+
 def test_skin_that_a_last_joint_hardly_moves_does_not_lengthen_its_bone():
     who = character(tail("hair", 2, step=(0, -0.06, 0)))
     mesh = skin(who, {"hair_1": [[0, 1.6, -0.1]] * 2 + [[0, 1.3, -0.1]], "hair_2": [[0, 1.44, -0.1]] * 3})

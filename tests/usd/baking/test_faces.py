@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel, Vt
 
+from tests.strand_models import write_random_model
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.review.evaluate import evaluate
@@ -61,6 +62,15 @@ def test_hair_lies_on_a_head_larger_than_it_was_groomed_on(tmp_path, still_model
     np.testing.assert_allclose(roots - CENTRE, 1.5 * was, atol=2e-3)  # of a ball of flat faces
     card = evaluate(out).grooms["/Hero/Hair"]
     assert card["penetration_percent"] < 1 and card["speed_cm_s"] == pytest.approx(0, abs=0.01)
+
+
+def test_hair_is_pushed_out_of_a_head_larger_than_it_was_groomed_on(tmp_path):
+    """From where it lies on that head: by its own points it would rest deep inside, and be left there."""
+    shot, lively, depths = face(tmp_path, {1: 1.0}), write_random_model(tmp_path / "lively.neuralocks", 25), []
+    for resolve in (False, True):
+        out = bake(shot, tmp_path / f"{resolve}.usdc", lively, resolve=resolve).path
+        depths.append(evaluate(out).grooms["/Hero/Hair"]["penetration_worst_mm"])
+    assert depths[0] > 10 and depths[1] < 0.4 * depths[0]
 
 
 def test_the_solver_and_the_report_card_see_the_same_skin(tmp_path):
