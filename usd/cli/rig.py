@@ -194,7 +194,8 @@ def inspect(
     as_json: AsJson = False,
 ) -> None:
     """List the hair chains of a rig with their lengths and joint counts."""
-    from ..rig.stage import chain_notes, check_patterns, describe_chains, read_rigged_hair, rigged_notes
+    from ..rig.notes import chain_notes, rigged_notes
+    from ..rig.stage import check_patterns, describe_chains, read_rigged_hair
 
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"))
     check_patterns(hair, chains)

@@ -22,8 +22,9 @@ from ..border.placement import Placement
 from ..border.stage_files import OTHERS, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
+from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
-from ..rig.stage import RIG_JOINTS, check_orients, core_meshes, describe_chains, mirrored_notes, weight_notes
+from ..rig.stage import check_orients, core_meshes, describe_chains
 from ..rig.uneven import names_uneven_prims
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body

@@ -16,7 +16,8 @@ from ..border.time_codes import time_codes
 from ..shot.notes import on_twos, without_turn
 from ..shot.stage import frame_range
 from .layer import kept_hair
-from .stage import RiggedHair, mirrored_notes, rigged_notes
+from .notes import mirrored_notes, rigged_notes
+from .stage import RiggedHair
 
 STILL = 1e-4
 """A rotation that differs by less from none is none."""

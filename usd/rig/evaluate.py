@@ -19,7 +19,8 @@ from neuralocks_core.runtime import cores
 
 from ..border.damage import names_damage
 from ..shot.notes import few
-from .stage import RiggedHair, chain_notes, check_patterns, core_meshes, read_rigged_hair, rigged_notes
+from .notes import chain_notes, rigged_notes
+from .stage import RiggedHair, check_patterns, core_meshes, read_rigged_hair
 
 VERTICES = 4000
 """Most vertices of the hair that are measured, evenly over its meshes."""

@@ -13,7 +13,8 @@ from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.extras import check_training
-from .stage import chain_notes, check_patterns, read_rigged_hair, rigged_notes
+from .notes import chain_notes, rigged_notes
+from .stage import check_patterns, read_rigged_hair
 
 
 def train_rig(

@@ -9,7 +9,8 @@ from pxr import Usd, UsdSkel, Vt
 
 from neuralocks_core.rig import RigModel
 from usd.review.inspect import inspect
-from usd.rig.stage import read_rigged_hair, rigged_notes
+from usd.rig.notes import rigged_notes
+from usd.rig.stage import read_rigged_hair
 from usd.rig.train import train_rig
 
 from ..rig_shots import EXAMPLE, model_for

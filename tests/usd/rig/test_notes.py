@@ -12,7 +12,8 @@ from neuralocks_core.rig.network import RigSampler
 from usd.assets.groom import import_groom
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.stage import check_patterns, read_rigged_hair, rigged_notes
+from usd.rig.notes import rigged_notes
+from usd.rig.stage import check_patterns, read_rigged_hair
 
 from ..rig_shots import model_for, small_shot
 

@@ -7,7 +7,8 @@ from pxr import Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.stage import chain_notes, read_rigged_hair, rigged_notes
+from usd.rig.notes import chain_notes, rigged_notes
+from usd.rig.stage import read_rigged_hair
 
 from ..rig_shots import model_for
 

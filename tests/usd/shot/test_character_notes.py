@@ -8,7 +8,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.review.inspect import inspect
-from usd.rig.stage import rigged_notes
+from usd.rig.notes import rigged_notes
 from usd.shot.stage import read_shot
 
 from ..shots import CENTRE, JOINTS, Recipe, add_curves, write_shot

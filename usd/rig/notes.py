@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a user should know about a character with hair on joints: its weights, which joints are found, which chains are taken."""
+
+import numpy as np
+from pxr import UsdSkel
+
+from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.network import rig_spec
+
+from ..shot.character_notes import lies_down
+from ..shot.notes import another_head, unfound, unlikely_head
+from ..skel.stage_rig import StageRig
+from ..skel.surface import rest_primvar
+from .facing import facing_notes
+from .outside import left_out_notes, outside_notes
+from .stage import RiggedHair, core_meshes
+
+RIG_JOINTS = rig_spec().pose_joints
+"""Semantic joints that rig models read beside the head."""
+
+
+def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
+    """What a user should know about a character with hair on joints.
+
+    Args:
+        source: the character.
+        pose_joints: semantic joints that the network reads beside the head.
+    """
+    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
+    frames = source.border.frame_notes(source.path)
+    return [*source.notes, *frames, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
+
+
+def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
+    """What a user should know about the choice of chains that was made for them; of their own, by patterns, they know."""
+    return [] if patterns else left_out_notes(hair.source, core_meshes(hair.source), hair.rig.chains)
+
+
+def weight_notes(source: StageRig) -> list[str]:
+    """What is wrong with authored weights: reading makes them sum to one, as renderers do."""
+    notes = []
+    for mesh in source.meshes:
+        primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
+        values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
+        size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
+        if len(values) % size or not len(values):
+            continue
+        path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
+        free, off = total < 1e-9, np.abs(total - 1) > 0.01
+        if free.any():
+            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
+            notes.append(
+                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights; read as if they were bound to the "
+                f"first joint that they name, such as '{first}', bind them in the rig"
+            )
+        if (off & ~free).any():
+            notes.append(
+                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one; "
+                "read as if they did, normalise them in the rig"
+            )
+    return notes
+
+
+def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:
+    """Which hair joint, or joint that carries one, the animation mirrors; what hangs from it is mirrored alike."""
+    joints = np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)]))
+    flipped = (np.linalg.det(source.clip.joints[:, joints, :3, :3]) < 0).any(axis=0)
+    if not flipped.any():
+        return []
+    name = leaf(source.source.names[joints[np.argmax(flipped)]])
+    return [f"{source.path}: hair joint '{name}' is mirrored by its animation; remove the negative scale"]
