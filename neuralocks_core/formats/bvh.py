@@ -208,11 +208,15 @@ def _rest(joints: list[_Joint]) -> np.ndarray:
 
 
 def _paths(joints: list[_Joint]) -> list[str]:
-    paths: list[str] = []
+    paths: dict[str, None] = {}
+    found: list[str] = []
     for i, joint in enumerate(joints):
-        path = joint.name if joint.parent < 0 else f"{paths[joint.parent]}/{joint.name}"
-        paths.append(path if path not in paths else f"{path}_{i}")
-    return paths
+        own = path = joint.name if joint.parent < 0 else f"{found[joint.parent]}/{joint.name}"
+        while path in paths:  # the numbered name may be another joint's, too
+            path, i = f"{own}_{i}", i + 1
+        paths[path] = None
+        found.append(path)
+    return found
 
 
 def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> np.ndarray:

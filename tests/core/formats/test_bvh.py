@@ -61,6 +61,13 @@ def test_channels_turn_in_the_order_in_which_they_stand(tmp_path):
     assert np.allclose(motion.clip.joints[1, 1, :3, 3], [0.1 - 0.8, 0.9, 0])
 
 
+def test_joints_of_one_name_get_others_that_no_joint_has(tmp_path):
+    text = TEXT.replace("JOINT foot", "JOINT head_3")
+    text = text.replace("}\nMOTION", "  JOINT head\n  {\n    OFFSET 1 0 0\n  }\n}\nMOTION")
+    names = read_bvh(written(tmp_path, text)).skeleton.names
+    assert names == ("hips", "hips/head", "hips/head_3", "hips/head_4")
+
+
 def test_a_joint_may_turn_about_one_axis_only(tmp_path):
     text = TEXT.replace("CHANNELS 3 Zrotation Xrotation Yrotation\n  }", "CHANNELS 1 Xrotation\n  }")
     turn = read_bvh(written(tmp_path, text.replace("  0 0 0\n", "  90\n"))).clip.joints[:, 2, :3, :3]
