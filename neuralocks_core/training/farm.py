@@ -143,6 +143,7 @@ def load(path: Path) -> Rollout:
                 **values,
                 "groom": int(values["groom"]),
                 "first": int(values["first"]),
+                "step": float(values["step"]),
                 "residual": float(values["residual"]),
             }
         )

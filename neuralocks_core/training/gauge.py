@@ -16,7 +16,6 @@ from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.metrics import swings
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.regression import RolloutBank, predicted
-from neuralocks_core.training.rollouts import STEP
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def measure(
     sums = {name: [] for name in ("position", "rigid", "static")}
     motion, motion_static, speeds, ways, wrong, deep = [], [], [], [], [], []
     for rollout in bank.rollouts:
-        target = rollout.moved[rollout.first :].astype(np.float32) * STEP
+        target = rollout.moved[rollout.first :].astype(np.float32) * rollout.step
         length = bank.lengths[rollout.groom][rollout.strands][:, None]
         answer = predicted(net, bank, rollout, output, anchored)[rollout.first :]
         held = rollout.vectors.copy()

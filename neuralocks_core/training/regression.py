@@ -24,7 +24,7 @@ from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_ve
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.regression_losses import regression_losses
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import STEP, Rollout, TrainingScene
+from neuralocks_core.training.rollouts import Rollout, TrainingScene
 
 
 class RolloutBank:
@@ -84,11 +84,11 @@ class RolloutBank:
             rows["rest"].append(rollout.rest[pick] * sides)
             rows["length"].append(self.lengths[rollout.groom][chosen])
             rows["frames"].append(frames)
-            rows["moved"].append(rollout.moved[moments[:, None], pick] * sides)
+            rows["moved"].append(rollout.moved[moments[:, None], pick] * (sides * np.float32(rollout.step)))
             rows["planes"].append(rollout.planes[moments[:, None], pick] * np.append(sides, 1))
         batch = {name: torch.from_numpy(np.stack(values)).to(options.device) for name, values in rows.items()}
-        batch["moved"] = batch["moved"].float() * STEP
-        batch["planes"] = batch["planes"].float()
+        for name in ("moved", "planes"):
+            batch[name] = batch[name].float()
         return batch
 
 

@@ -22,8 +22,8 @@ from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
-STEP = 2.0**-15
-"""[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes."""
+FINEST = 2.0**-15
+"""[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes; of longer hair, which they would not hold, of more."""
 SHAPES = 0.6
 """Weights of the body's blend shapes lie between minus and plus that."""
 FOLLOW = 0.04
@@ -70,7 +70,8 @@ class Rollout:
         first: first frame to learn from.
         vectors: boundary vectors (T, F) float32.
         bind: the anchor's vector (F,) float32.
-        moved: displacement in canonical space (T, n, 24, 3) int16, in units of STEP.
+        moved: displacement in canonical space (T, n, 24, 3) int16, in units of `step`.
+        step: that unit [m].
         planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest vertex.
         residual: of the solver, rms relative to weight.
         materials: log-ratios of each strand's material (n, 4) float32, the same within a lock; `vectors` and `bind`
@@ -84,6 +85,7 @@ class Rollout:
     vectors: np.ndarray
     bind: np.ndarray
     moved: np.ndarray
+    step: float
     planes: np.ndarray
     residual: float
     materials: np.ndarray
@@ -149,6 +151,7 @@ class RolloutMaker:
         planes = result.planes
         planes[..., 3] -= np.einsum("tnki,nki->tnk", planes[..., :3], rest)
         vectors, bind = self.vectors(draw, scene.spec)
+        moved, step = in_steps(moved)
         return Rollout(
             groom=draw.groom,
             strands=draw.strands,
@@ -156,7 +159,8 @@ class RolloutMaker:
             first=draw.first,
             vectors=vectors,
             bind=bind,
-            moved=np.clip(np.round(moved / STEP), -32767, 32767).astype(np.int16),
+            moved=moved,
+            step=step,
             planes=np.clip(planes, -1000, 1000).astype(np.float16),
             residual=float(np.median(result.residual)),
             materials=np.stack([m.log_ratios() for m in draw.materials]),
@@ -228,6 +232,12 @@ class RolloutMaker:
         distance, nearest = self._surface.query(rest)
         offset = sum(w * offsets[nearest] for w, offsets in zip(shape, body.shapes.values())) @ facing.T
         return rest + offset[:, :1] + np.exp(-distance / FOLLOW)[..., None] * (offset - offset[:, :1])
+
+
+def in_steps(moved: np.ndarray) -> tuple[np.ndarray, float]:
+    """Displacements [m] as int16, and the step [m] that they count: as fine as the largest of them allows."""
+    step = max(FINEST, 2.0 ** np.ceil(np.log2(np.abs(moved).max(initial=FINEST) / 32767)))
+    return np.round(moved / step).astype(np.int16), float(step)
 
 
 def learned_measures(character: Character) -> np.ndarray:

@@ -11,6 +11,7 @@ from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import body_measures
+from neuralocks_core.network_sizes import CODE
 from tests.core.rigs import person, straight_hair
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -21,8 +22,9 @@ from neuralocks_core.runtime import StrandModel
 from neuralocks_core.training import checkpoint, methods
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import STEP, RolloutMaker, TrainingScene, held_out_split
+from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene, held_out_split, in_steps
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import claimed
 
@@ -43,10 +45,23 @@ def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
 
 def test_rollouts_start_at_rest_and_move(scene):
     rollout = RolloutMaker(scene).make(5)
-    moved = rollout.moved * STEP
+    moved = rollout.moved * rollout.step
     assert np.abs(moved[3] - moved[0]).max() < 1e-3
     assert np.abs(rollout.vectors[0, scene.spec.slices["history"]]).max() < 1e-6
     assert np.abs(moved - moved[0]).max() > 1e-2
+
+
+def test_hair_that_moves_by_metres_is_learned_as_it_moved(scene):
+    rollout = RolloutMaker(scene).make(5)
+    far = 40.0 * rollout.moved.astype(np.float32) * rollout.step
+    assert np.abs(far).max() > 2.0
+    moved, step = in_steps(far)
+    bank = RolloutBank(scene, lambda strands: np.zeros((len(strands.rest), CODE), np.float32))
+    bank.rollouts = [replace(rollout, moved=moved, step=step)]
+    batch = bank.batch(np.random.default_rng(0), RegressionOptions(clips=60, moments=60, strands=64))
+    assert batch["moved"].abs().max().item() == pytest.approx(np.abs(far).max(), rel=0.05)
+    assert np.abs(moved * step - far).max() <= 0.51 * step
+    assert step <= np.abs(far).max() / 16000
 
 
 def test_another_history_reads_the_same_simulation(scene):
