@@ -21,7 +21,8 @@ LIVELY = 0.005
 SETTLED = 0.1
 """Hair has settled when its tips keep below this share of their largest speed."""
 HELD = 1e-5
-"""Transforms that change by less are of a held pose."""
+"""Transforms that change by less in HELD_TIME [s] are of a held pose."""
+HELD_TIME = 1 / 24
 
 
 def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -206,10 +207,21 @@ def tip_curves(displacement: np.ndarray) -> np.ndarray:
     return np.asarray(displacement[:, :, -1], float).mean(axis=1)
 
 
-def held(joints_relative: np.ndarray) -> np.ndarray:
-    """Which frames (T,) have the pose of the frame before: none of the given transforms (T, n, 4, 4) changes."""
-    same = np.abs(np.diff(joints_relative, axis=0)).max(axis=(1, 2, 3)) < HELD
-    return np.concatenate([[False], same])
+def held(joints: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Which samples (T,) have the pose of the one before: none of the given transforms (T, n, 4, 4) changes.
+
+    Nor may any in HELD_TIME before or after, times (T,) [s]: of many samples a frame, each changes little in slow motion, too.
+    """
+    rows = np.arange(len(times))
+    before = np.searchsorted(times, times - HELD_TIME + 1e-9, side="right") - 1
+    after = np.searchsorted(times, times + HELD_TIME - 1e-9)
+
+    def alike(first, second):
+        return np.abs(joints[second] - joints[first]).max(axis=(1, 2, 3)) < HELD
+
+    since = (before >= 0) & alike(np.maximum(before, 0), rows)
+    stays = (after < len(times)) & alike(rows, np.minimum(after, len(times) - 1))
+    return np.concatenate([[False], alike(rows[:-1], rows[1:]) & (stays[:-1] | since[1:])])
 
 
 def _swing(points: np.ndarray) -> np.ndarray:

@@ -119,6 +119,16 @@ def test_what_creeps_on_slower_than_still_has_settled():
     assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
 
 
+@pytest.mark.parametrize("rate", [12, 24, 384, 1536])
+def test_a_held_pose_is_the_same_however_often_it_is_sampled(rate):
+    """Breathing moves a head by some mm/s: 64 samples a frame of it are no stop, nor is what rounding does to a pose motion."""
+    times = np.arange(0, 2, 1 / rate)
+    joints = np.tile(np.eye(4), (len(times), 2, 1, 1))
+    joints[:, 1, 1, 3] = 5.0 + 0.003 * times * (times < 1)
+    joints = joints + np.random.default_rng(0).uniform(-2e-7, 2e-7, joints.shape)
+    assert (metrics.held(joints, times)[1:] == (times[:-1] >= 1 - 1e-9)).mean() > 1 - 2 / len(times)
+
+
 def test_echo_of_a_decaying_swing():
     """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; nothing that stands echoes."""
     points, _ = swinging(amplitude=0.2, frequency=4, decay=3)

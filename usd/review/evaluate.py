@@ -243,7 +243,7 @@ class _Subject:
     def _stops(self, joints) -> dict:
         """Settling after the longest stop, and what still moves once it should be over."""
         times = self.baked.times
-        still = metrics.held(joints)
+        still = metrics.held(joints, times)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
         runs = [(a - 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
         runs = [(a, b) for a, b in runs if times[b] - times[a] >= 0.5]

@@ -162,7 +162,7 @@ def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, d
     which distances to the body are measured. What is not asked for is not kept: long animation has gigabytes of it.
     """
     clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None
-    still = metrics.held(clip.joints[:, ~moving])
+    still = metrics.held(clip.joints[:, ~moving], clip.times)
     quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= SETTLED
     wanted = set(np.linspace(0, len(clip.times) - 1, min(len(clip.times), FRAMES)).round().astype(int).tolist())
     for row, both in enumerate(posed.each(say)):
