@@ -15,7 +15,7 @@ from neuralocks_core.motion import Clip
 from ..services import following
 from ..services import rig as rig_service
 from ..services.axes import to_core
-from ..services.hidden import unhidden
+from ..services.hidden import check_placed, unhidden
 from ..services.leaps import leaps_told
 from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
@@ -185,6 +185,7 @@ class _Recording:
         if not row:
             self.reader = armature_reader.PoseReader(armature, self._rig.bones)
             here = armature_reader.matrix(evaluated.matrix_world)
+            check_placed(here[None], self.frames, self.name)
             self._place = rig_service.stood_up(self._rig, here)
             self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
@@ -207,6 +208,7 @@ class _Recording:
     def _store(self, first: int, end: int) -> None:
         """Make channels of the poses of some rows."""
         rows, kept = slice(first, end), slice(end - first)
+        check_placed(self._places[""][rows], self.frames[rows], self.name)
         drawn = self.reader.posed(self._pose[kept], self._places[""][rows])
         joints = unhidden(drawn, self._rig, self._needed, self.frames[rows])
         part = Motion.from_world(

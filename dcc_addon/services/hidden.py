@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones that are hidden by a scale of zero, as props are, or mirrored by a negative one."""
+"""Bones that are hidden by a scale of zero, as props are, or mirrored by a negative one; and armatures that are."""
 
 import numpy as np
 
@@ -39,6 +39,28 @@ def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.nd
         size = np.cbrt(np.abs(np.linalg.det(above)))[:, None, None]
         result[rows, joint, :3, :3] = above * np.where(size > HIDDEN, HIDDEN / size, 1.0)
     return result
+
+
+def check_placed(places: np.ndarray, frames: np.ndarray, name: str) -> None:
+    """Refuse an armature that is scaled to nothing, or mirrored in some frames: all its bones are then, and none of them is to blame.
+
+    Args:
+        places: world transforms (T, 4, 4) of the armature.
+        frames: (T,), for the message.
+        name: the armature's.
+
+    Raises:
+        NeuralocksError: it is.
+    """
+    linear = places[:, :3, :3]
+    for fact, wrong, remedy in (
+        ("has zero scale", flat(linear, NONE), "give it, and what it hangs from, a scale above zero"),
+        ("is mirrored (negative scale)", volumes(linear) < 0, "apply its scale (Ctrl A in Object Mode)"),
+    ):
+        if wrong.any():
+            raise NeuralocksError(
+                f"{name}: it {fact} in frame {frames[wrong.argmax()]:g}, and its hair with it; {remedy}"
+            )
 
 
 def _check(wrong: np.ndarray, needed: set[int], what: str, rig: RigArrays, frames: np.ndarray) -> None:

@@ -228,3 +228,25 @@ def hidden_prop(folder: Path) -> None:
         head.keyframe_insert("scale", frame=frame)
     scene.frame_set(3)
     refused(bpy.ops.neuralocks.sample_motion, "bone 'head'", "zero scale in frame 6")
+
+
+def hidden_armature(folder: Path) -> None:
+    """A character that is hidden by the scale of its armature, or of what that hangs from, is told so, not of a bone."""
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    holder = bpy.data.objects.new("Holder", None)
+    scene.collection.objects.link(holder)
+    rig.parent = holder
+    for frame, size, said in (
+        (5, 1, ""),
+        (6, 0, "Rig: it has zero scale in frame 6"),
+        (1, 0, "Rig: it has zero scale in frame 1"),
+    ):
+        holder.scale = [size] * 3
+        holder.keyframe_insert("scale", frame=frame)
+        if said:
+            scene.frame_set(5)
+            refused(bpy.ops.neuralocks.sample_motion, said)
