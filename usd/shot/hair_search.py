@@ -96,6 +96,9 @@ class HairSearch:
             return self._without(path, bound, bound=True)
         if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
             return self._without(path, own.path, bound=False)
+        if not (bound or self._named) and (why := _nowhere(placement)):
+            self._far.append(why)
+            return None
         if (
             self._others
             and not bound
@@ -164,3 +167,12 @@ class HairSearch:
     def _unread(self) -> list[Unusable]:
         rigs = self._every
         return find_unusable(rigs[0].source.prim.GetStage(), {rig.path for rig in rigs})
+
+
+def _nowhere(placement: Placement) -> str:
+    """Why curves lie nowhere, such as those that a scale of zero hides; '' if they lie somewhere."""
+    try:
+        _ = placement.reference
+    except NeuralocksError as error:
+        return str(error).replace("; ", ", so it is not taken for hair; ", 1)
+    return ""

@@ -66,6 +66,20 @@ def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_p
         read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
 
 
+def test_curves_that_a_scale_of_zero_hides_stop_no_bake_of_others(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Grass")
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Grass")).AddScaleOp().Set((0, 0, 0))
+    stage.Save()
+    said = "/Grass: its transform has zero scale, so it is not taken for hair; give it a scale above zero"
+    shot, facts = read_shot(path), inspect(path)
+    assert [item.path for item in shot.grooms] == ["/Hero/Hair"] and not facts["stops"]
+    assert all(any(note.startswith(said) for note in notes) for notes in (shot.notes, facts["spoils"]))
+    with pytest.raises(NeuralocksError, match="^/Grass: its transform has zero scale; give it"):
+        read_shot(path, ["/Grass"])
+
+
 def test_hair_bound_to_a_skeleton_that_cannot_be_used_goes_to_no_other_head(tmp_path):
     write_shot(tmp_path, Recipe(), "hero")
     stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
