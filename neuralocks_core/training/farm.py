@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -17,6 +18,8 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import replace_npz
+from neuralocks_core.materials import RANGES
+from neuralocks_core.network_sizes import K
 from neuralocks_core.training.rollouts import Rollout, RolloutMaker, TrainingScene
 
 
@@ -129,16 +132,16 @@ def save(path: Path, rollout: Rollout) -> None:
     replace_npz(path, vars(rollout))
 
 
-def load(path: Path) -> Rollout:
-    """Read what `save` wrote.
+def load(path: Path, scene: TrainingScene | None = None) -> Rollout:
+    """Read what `save` wrote; of this scene, if one is given.
 
     Raises:
-        NeuralocksError: it is damaged, as after a full disk or a power cut.
+        NeuralocksError: it is damaged, as after a full disk or a power cut, or of something else.
     """
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
             values = {name: arrays[name] for name in arrays.files}
-        return Rollout(
+        rollout = Rollout(
             **{
                 **values,
                 "groom": int(values["groom"]),
@@ -147,10 +150,42 @@ def load(path: Path) -> Rollout:
                 "residual": float(values["residual"]),
             }
         )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile):
+        _check(rollout, scene)
+        return rollout
+    except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error):
         raise NeuralocksError(
             f"{path}: this simulation cannot be read; delete it, and go on with --resume: it is made again"
         ) from None
+
+
+def _check(rollout: Rollout, scene: TrainingScene | None) -> None:
+    """Refuse arrays that do not fit each other or the scene: training would break off in the middle of one.
+
+    Raises:
+        ValueError: they do not.
+    """
+    frames, strands = len(rollout.vectors), len(rollout.strands)
+    shapes = {
+        "strands": (strands,),
+        "rest": (strands, K, 3),
+        "vectors": (frames, len(rollout.bind)),
+        "bind": (len(rollout.bind),),
+        "moved": (frames, strands, K, 3),
+        "planes": (frames, strands, K, 4),
+        "materials": (strands, len(RANGES)),
+    }
+    for name, shape in shapes.items():
+        array = getattr(rollout, name)
+        if array.shape != shape or array.dtype.kind != ("i" if name in ("strands", "moved") else "f"):
+            raise ValueError(name)
+    if not (strands and 0 <= rollout.first < frames and frames > 1 and rollout.strands.min() >= 0):
+        raise ValueError("first, strands")
+    if scene and not (
+        0 <= rollout.groom < len(scene.grooms)
+        and rollout.strands.max() < len(scene.grooms[rollout.groom].rest)
+        and len(rollout.bind) == scene.spec.size
+    ):
+        raise ValueError("scene")
 
 
 def _path(folder: Path, index: int) -> Path:

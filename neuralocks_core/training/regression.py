@@ -53,7 +53,7 @@ class RolloutBank:
         for path in files:
             if path not in self._seen:
                 self._seen.add(path)
-                self.rollouts.append(load(path))
+                self.rollouts.append(load(path, self._scene))
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,9 @@ import pytest
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.network_sizes import K
 from neuralocks_core.training import checkpoint, farm, methods
+from neuralocks_core.training.rollouts import Rollout
 
 
 def farm_of(monkeypatch, folder, *processes):
@@ -88,6 +91,40 @@ def test_a_damaged_file_says_what_to_do(tmp_path, kept):
         farm.load(path)
     with pytest.raises(NeuralocksError, match="000000.npz: .* train without --resume"):
         checkpoint.load(path, {})
+
+
+def _rollout() -> Rollout:
+    numbers = np.random.default_rng(0)
+    planes, moved = numbers.normal(size=(5, 3, K, 4)).astype(np.float16), np.zeros((5, 3, K, 3), np.int16)
+    rest, vectors = np.zeros((3, K, 3), np.float32), np.zeros((5, 8), np.float32)
+    return Rollout(0, np.arange(3), rest, 1, vectors, vectors[0], moved, planes, 0.1, np.zeros((3, 4), np.float32))
+
+
+_OF = SimpleNamespace(grooms=(SimpleNamespace(rest=np.zeros((3, K, 3))),), spec=SimpleNamespace(size=8))
+
+
+@pytest.mark.parametrize(
+    "other",
+    (
+        {"rest": np.zeros((3, 2, 3), np.float32)},
+        {"strands": np.arange(3.0)},
+        {"strands": np.arange(3) - 1},
+        {"strands": np.arange(3) + 1},
+        {"groom": 1},
+        {"groom": -1},
+        {"first": 5},
+        {"vectors": np.zeros((5, 9), np.float32), "bind": np.zeros(9, np.float32)},
+        {"materials": np.zeros((3, 4), np.int16)},
+    ),
+)
+def test_a_simulation_of_something_else_says_what_to_do(tmp_path, other):
+    """Arrays that are whole, but do not fit each other or what is trained: else training breaks off over them."""
+    path = tmp_path / "000000.npz"
+    farm.save(path, _rollout())
+    assert np.array_equal(farm.load(path, _OF).planes, _rollout().planes)
+    farm.save(path, replace(_rollout(), **other))
+    with pytest.raises(NeuralocksError, match="000000.npz: this simulation cannot be read; delete it"):
+        farm.load(path, _OF)
 
 
 class _Scene:
