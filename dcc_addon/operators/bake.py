@@ -23,6 +23,7 @@ from ..scene.shown import in_renders
 from ..services.names import file_label
 from ..services.overwriting import check_ours, untaken
 from ..services.panel_errors import for_the_panel, with_objects
+from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
@@ -224,18 +225,12 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def steps(self, context):
-        import shutil
-        import tempfile
-
         armature = shown_armature(context)
         hair = shown_hair(context, armature)
         name = hair.name_full
-        folder = tempfile.mkdtemp(prefix="neuralocks_")
-        try:
+        with temporary_folder() as folder:
             baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
             session.cards[name] = yield from _card(baked.hair[name][0], baked.prims)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
         for line in session.cards[name]:
             self.report({"INFO"}, line)
         return f"{name}: report card made"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Training in the background: Blender stays usable, the panel shows how far it is."""
 
+import os
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
@@ -9,6 +10,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.training.work import folder_beside
 
 from ..live import refresh
 from ..models import SETTING
@@ -21,6 +23,7 @@ from ..scene.redraw import redraw
 from ..scene.save_as import named_here, set_path
 from ..services.names import file_label
 from ..services.panel_errors import for_the_panel, with_objects
+from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
 from ..services.training_job import TrainingJob, default_python, installing
@@ -57,7 +60,7 @@ def training_python() -> str:
     """The interpreter named in the preferences, or one found beside the packages."""
     addon = bpy.context.preferences.addons.get(__package__.rsplit(".", 1)[0])
     chosen = addon.preferences.python.strip() if addon is not None and addon.preferences else ""
-    return bpy.path.abspath(chosen) if chosen else default_python()
+    return os.path.expanduser(bpy.path.abspath(chosen)) if chosen else default_python()
 
 
 def known_problem() -> str | None:
@@ -121,18 +124,22 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         sampled = yield from sampling(context, named(name))
         armature, target = named(name), named(wanted)
         stop()
-        folder = tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)
-        character = Path(folder.name) / "character.usdc"
-        prims = write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
-        settings = {
-            "kind": self.kind,
-            "character": str(character),
-            "out": _out(target.name_full),
-            "minutes": scene.neuralocks.train_minutes,
-            "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
-            "head": sampled.character.skeleton.names[sampled.character.head],
-        }
-        _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder, prims))
+        folder = temporary_folder()
+        try:
+            character = Path(folder.name) / "character.usdc"
+            prims = write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
+            settings = {
+                "kind": self.kind,
+                "character": str(character),
+                "out": _out(target.name_full),
+                "minutes": scene.neuralocks.train_minutes,
+                "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
+                "head": sampled.character.skeleton.names[sampled.character.head],
+            }
+            _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder, prims))
+        except BaseException:
+            folder.cleanup()
+            raise
         session.trained, session.trained_notes = None, []
         bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
         return f"Training a model for {target.name_full} in the background"
@@ -241,9 +248,10 @@ def _out(name: str) -> str:
         else Path(bpy.utils.user_resource("DATAFILES", path="neuralocks", create=True))
     )
     number = 1
-    while (folder / f"{label}_{number}.neuralocks").exists():
+    # One of this name may be at work in another Blender, or kept to be resumed on the command line.
+    while (out := folder / f"{label}_{number}.neuralocks").exists() or folder_beside(out).exists():
         number += 1
-    return str(folder / f"{label}_{number}.neuralocks")
+    return str(out)
 
 
 CLASSES = (NEURALOCKS_OT_copy_install, NEURALOCKS_OT_train, NEURALOCKS_OT_cancel_training)

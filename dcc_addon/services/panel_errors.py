@@ -26,6 +26,7 @@ WORDS = (
     ("name it with --joint ", "name the bone "),
     ("=JOINT", ""),
     (" (--cuts says where)", ""),
+    ("go on with --resume", "try again"),
     ("leave out --loop", "turn Loop off"),
     ("check the stage's metersPerUnit", "check the scene's Unit Scale"),
     ("its skel binding puts its roots", "where its object stands in the rest pose, its roots are"),

@@ -11,10 +11,15 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.training.work import abandon
+
 CHILD = Path(__file__).with_name("training_child.py")
 ADDON = Path(__file__).resolve().parent.parent
 _NEW_GROUP, _NO_WINDOW = 0x00000200, 0x08000000
 """How Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console of its own."""
+_KILLED = 9
+"""The signal of a system that is short of memory."""
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
 """For a child's input and output. In a code page of Windows, a letter that it lacks would end the reader."""
 
@@ -29,7 +34,8 @@ def problem(python: str) -> str:
     if not python:
         return f"Training needs a Python with torch, which is too large to come with the add-on; {remedy}"
     if not os.path.isfile(python):
-        return f"{python}: no such file; {remedy}"
+        fact = "is a folder, where the program in it is needed" if os.path.isdir(python) else "no such file"
+        return f"{python}: {fact}; {remedy}"
     try:
         done = subprocess.run(
             [python, str(CHILD), "--check"],
@@ -89,17 +95,22 @@ class TrainingJob:
         self._began = time.monotonic()
         self._cancelled = False
         group = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP | _NO_WINDOW}
-        self._process = subprocess.Popen(
-            [python, str(CHILD)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=environment(),
-            **UTF8,
-            **group,
-        )
-        self._process.stdin.write(json.dumps(settings))
-        self._process.stdin.close()
+        try:
+            self._process = subprocess.Popen(
+                [python, str(CHILD)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env=environment(),
+                **UTF8,
+                **group,
+            )
+        except OSError as error:
+            raise NeuralocksError(
+                f"{python}: cannot be run ({error.strerror}); free some memory, and try again"
+            ) from None
+        with suppress(OSError), self._process.stdin as heard:  # one that has ended already says why
+            heard.write(json.dumps(settings))
         self._tail: list[str] = []
         self._threads = [threading.Thread(target=f, daemon=True) for f in (self._listen, self._drain)]
         for thread in self._threads:
@@ -122,13 +133,16 @@ class TrainingJob:
         return spent * (1 - self.done) / self.done if self.done > 0.01 else None
 
     def cancel(self) -> None:
-        """Stop it, with the processes that it started."""
+        """Stop it, with the processes that it started, and leave nothing of it; without effect on the model of one that has
+        ended well.
+        """
         self._cancelled = True
         for hard in (False, True):
             if self._process.poll() is None:
                 with suppress(OSError, subprocess.TimeoutExpired):
                     self._end(hard)
                     self._process.wait(5)
+        abandon(self.out)
 
     def _end(self, hard: bool) -> None:
         if os.name == "posix":
@@ -143,6 +157,8 @@ class TrainingJob:
         """Why it failed, in one line."""
         if self.error or self._cancelled or self.running or self._process.returncode == 0:
             return self.error
+        if self._process.returncode == -_KILLED:  # of what it said before, nothing tells why
+            return "its process was killed; free some memory, and try again"
         return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
 
     def _listen(self) -> None:
@@ -154,12 +170,17 @@ class TrainingJob:
                     continue
                 if not isinstance(said, dict):  # what a library prints may be JSON by chance
                     continue
+                if not isinstance(said, dict):  # a library has printed a number
+                    continue
                 if "error" in said:
                     self.error = str(said["error"])
                 elif "notes" in said:
                     self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
                 else:
                     self.done = float(said.get("done", self.done))
+                    # What is made before it learns takes as long whatever the minutes: it tells nothing of those left.
+                    if not self.done:
+                        self._began = time.monotonic()
                     self.message = str(said.get("message", self.message))
 
     def _drain(self) -> None:

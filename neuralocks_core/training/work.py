@@ -8,8 +8,9 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.lock_file import FolderLock
-from neuralocks_core.training.rollouts import TrainingScene
+
+if TYPE_CHECKING:  # what tidies up after a training needs no solver
+    from neuralocks_core.training.rollouts import TrainingScene
 
 BEGINNING = "begin.neuralocks"
 """In the work folder: the model that a training begins with."""
@@ -33,11 +36,25 @@ def work_folder(out: str | Path, resume: bool) -> Path:
     Raises:
         NeuralocksError: `out` is no name for a model, or there is nothing to resume.
     """
-    out = model.named(out)
-    work = out.with_name(out.name + ".training")
+    work = folder_beside(model.named(out))
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work
+
+
+def folder_beside(out: Path) -> Path:
+    """Where the training of this model works."""
+    return out.with_name(out.name + ".training")
+
+
+def abandon(out: str | Path) -> None:
+    """Remove what an ended training that nobody is to resume has left beside its model, which may be gigabytes; what another
+    training is at work in stays.
+    """
+    work = folder_beside(Path(out))
+    if work.exists():
+        with suppress(NeuralocksError, OSError), claimed(work):
+            discard(work)
 
 
 def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | None:
@@ -85,7 +102,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
         try:
             before = json.loads(file.read_text("utf-8"))
             changed = [name for name in now if before[name] != now[name]]
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
         if "seed" in changed:
             raise NeuralocksError(

@@ -1,19 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Training in a process of its own, as the panel starts and watches it."""
 
+import contextlib
+import importlib
+import json
+import os
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
-from dcc_addon.services import training_job
+from dcc_addon.services import training_child, training_job
+from neuralocks_core.errors import NeuralocksError
 
 CHILD = """
-import json, sys, time
+import json, os, sys, time
 settings = json.load(sys.stdin)
 print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
 for told in (["/Hair: a", "b"], ["b", "K\xfcche"]): print(json.dumps({"notes": told}), flush=True)
-if settings["out"] == "wait": time.sleep(60)
+if settings["out"].endswith("wait"): time.sleep(60)
+if settings["out"] == "number": print(5); print("null"); print(json.dumps({"done": 0.75, "message": "more"}))
+if settings["out"] == "killed": print("a warning", file=sys.stderr, flush=True); os.kill(os.getpid(), 9)
 if settings["out"] == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
 if settings["out"] == "odd":
@@ -51,6 +59,9 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
     _wait(lambda: not running.running)
     assert running.succeeded and running.message == "half" and running.done == 0.5
     assert running.notes == ["/Hair: a", "b", "K\xfcche"]
+    running = job("number")  # a library's own word
+    _wait(lambda: not running.running)
+    assert running.succeeded and running.message == "more"
 
 
 def test_training_is_cancelled_at_once(job):
@@ -62,9 +73,46 @@ def test_training_is_cancelled_at_once(job):
     assert not running.succeeded
 
 
+def test_what_a_cancelled_training_has_made_goes_with_it(job, tmp_path):
+    """Nothing goes on from there, and it may be gigabytes beside the artist's file."""
+    running = job(str(tmp_path / "wait"))
+    _wait(lambda: running.done == 0.5)
+    made = tmp_path / "wait.training" / "rollouts"
+    made.mkdir(parents=True)
+    (made / "000000.npz").touch()
+    running.cancel()
+    assert not made.parent.exists()
+
+
+def test_one_that_ends_before_it_has_heard_what_to_do_is_told_of(monkeypatch, tmp_path):
+    child = tmp_path / "child.py"
+    child.write_text("import os, sys; os.close(0); print('broken', file=sys.stderr, flush=True); os._exit(3)")
+    monkeypatch.setattr(training_job, "CHILD", child)
+    long = {"out": "x", "chains": ["*" * 1_000_000]}  # more than waits in a pipe until it is read
+    running = training_job.TrainingJob(sys.executable, long)
+    _wait(lambda: not running.running)
+    assert running.failure() == "broken"
+    with pytest.raises(NeuralocksError, match="cannot be run"):
+        training_job.TrainingJob(str(tmp_path), {"out": "x"})
+
+
+def test_what_is_made_before_it_learns_tells_nothing_of_the_time_left(monkeypatch):
+    clock, lines = [0.0], []
+    monkeypatch.setattr(training_job.time, "monotonic", lambda: clock[0])
+    running = object.__new__(training_job.TrainingJob)
+    running.done, running._began, running.message = 0.0, 0.0, ""
+    for seconds, done in ((1, 0.0), (60, 0.0), (63, 0.01), (66, 0.02)):
+        clock[0] = seconds
+        lines[:] = [json.dumps({"done": done, "message": ""})]
+        running._process = SimpleNamespace(stdout=contextlib.nullcontext(list(lines)))
+        running._listen()
+    assert running.seconds_left == pytest.approx(6 / 0.02 - 6)
+
+
 @pytest.mark.parametrize(
     ("out", "words"),
-    [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom"), ("odd", "broken: K\xfcche")],
+    [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom"), ("odd", "broken: K\xfcche")]
+    + [("killed", "its process was killed; free some memory, and try again")] * (os.name == "posix"),
 )
 def test_training_says_why_it_failed(job, out, words):
     running = job(out)
@@ -75,7 +123,14 @@ def test_training_says_why_it_failed(job, out, words):
     )
 
 
-@pytest.mark.parametrize(("python", "words"), [("", "needs a Python with torch"), ("/nowhere/python", "no such file")])
+_PROBLEMS = [
+    ("", "needs a Python with torch"),
+    ("/nowhere/python", "no such file"),
+    (os.path.sep, "is a folder, where"),
+]
+
+
+@pytest.mark.parametrize(("python", "words"), _PROBLEMS)
 def test_missing_trainer_comes_with_a_remedy(python, words):
     problem = training_job.problem(python)
     assert words in problem and f'pip install "{training_job.ADDON.parent}[train]"' in problem
@@ -87,3 +142,18 @@ def test_the_remedy_names_the_wheel_that_comes_along(tmp_path, monkeypatch):
     wheel.touch()
     monkeypatch.setattr(training_job, "ADDON", tmp_path)
     assert f'pip install "{wheel}[train]"' in training_job.problem("")
+
+
+def test_why_a_python_cannot_train(tmp_path, monkeypatch):
+    """What is too old, what is not there, and what is there and does not load."""
+    monkeypatch.syspath_prepend(tmp_path)
+    for package in ("torch", "warp"):
+        monkeypatch.delitem(sys.modules, package, raising=False)
+    torch = tmp_path / "torch.py"
+    torch.write_text("raise ImportError('libcudart.so.12: cannot open\\nshared object file')")
+    assert training_child._lacking() == "its 'torch' does not load (libcudart.so.12: cannot open shared object file)"
+    torch.write_text("import of_torch")
+    importlib.invalidate_caches()
+    assert training_child._lacking() == "it lacks 'of_torch'"
+    monkeypatch.setattr(training_child.sys, "version_info", (3, 9, 18))
+    assert training_child._lacking().endswith("and 3.11 or newer is needed")

@@ -57,6 +57,35 @@ def notes_of_a_training(folder: Path) -> None:
     assert not operator.notes() and _ended() == ("Hair: trained", True) and not session.trained_notes
 
 
+def training_leaves_nothing(folder: Path) -> None:
+    """Neither a cancelled nor a failed one leaves what it has made, and a full disk is a line, not a traceback. What lies
+    beside a model of the next name is another's.
+    """
+    from dcc_addon.operators import training as operator
+
+    made = "open(settings['out'] + '.training/checkpoint.npz', 'w')"
+    _in_training(folder, before=f"import os; os.mkdir(settings['out'] + '.training'); {made}; sys.exit('broken')")
+    assert _ended() == ("Hair: training failed: broken", False)
+    assert not list(folder.glob("*.training"))
+    theirs = folder / "Hair_1.neuralocks.training"
+    theirs.mkdir()
+    (theirs / "checkpoint.npz").touch()
+    _in_training(folder, before=f"import os; os.mkdir(settings['out'] + '.training'); {made}; time.sleep(60)")
+    ours, end = folder / "Hair_2.neuralocks.training", time.monotonic() + 60
+    while not (ours / "checkpoint.npz").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert bpy.ops.neuralocks.cancel_training() == {"FINISHED"}
+    assert not ours.exists() and (theirs / "checkpoint.npz").exists()
+
+    exported, tempfile.tempdir = tempfile.tempdir, str(folder / "nowhere")
+    try:
+        refused(bpy.ops.neuralocks.train, "nowhere", "cannot be written")
+        refused(bpy.ops.neuralocks.report_card, "nowhere", "cannot be written")
+    finally:
+        tempfile.tempdir = exported
+    assert operator.job() is None
+
+
 def training_meanwhile(folder: Path) -> None:
     """What is trained for may be renamed meanwhile, or deleted, and another file opened, whose hair of the same name gets
     nothing: then it is told where the model is. Names may be longer than those of files.
@@ -141,8 +170,8 @@ def _told(until) -> str:
     return said
 
 
-def _in_training(folder: Path, notes=()):
-    """Hair of a saved file for which a training of a second runs, which copies a model."""
+def _in_training(folder: Path, notes=(), before: str = ""):
+    """Hair of a saved file for which a training of a second runs, which copies a model, and does something before."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import training_job
 
@@ -154,6 +183,7 @@ def _in_training(folder: Path, notes=()):
         "    assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
         "    print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
         f"    print(json.dumps({{'notes': {list(notes)!r}}}), flush=True)\n"
+        f"    {before or 'pass'}\n"
         "    time.sleep(1)\n"
         f"    shutil.copy({MODEL!r}, settings['out'])\n"
     )

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The folder beside a model in which its training works."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.training import work
+
+
+def _kept(out):
+    """What a training that was killed leaves."""
+    folder = work.folder_beside(out)
+    (folder / "rollouts").mkdir(parents=True)
+    for name in ("lock", "inputs.json", "checkpoint.npz", "rollouts/000000.npz"):
+        (folder / name).touch()
+    return folder
+
+
+def test_what_nobody_resumes_is_removed_and_nothing_else(tmp_path):
+    """Not the model, not what another training is at work in, and not what somebody has put there."""
+    out = tmp_path / "hair.neuralocks"
+    out.touch()
+    work.abandon(out)
+    folder = _kept(out)
+    with work.claimed(folder):
+        work.abandon(out)
+        assert (folder / "rollouts/000000.npz").exists()
+    work.abandon(out)
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+    folder = _kept(out)
+    (folder / "notes.txt").touch()
+    work.abandon(out)
+    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("forged", ("[" * 100_000, "[]", '{"seed": 0}', "", "null"))
+def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
+    monkeypatch.setattr(work, "_inputs", lambda scene: {"seed": 0, "groom": "a"})
+    (tmp_path / work.INPUTS).write_text(forged)
+    with pytest.raises(NeuralocksError, match="inputs.json: cannot be read; train without --resume"):
+        work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
