@@ -50,6 +50,25 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         raise cannot_write(path, error) from None
 
 
+def check_writable(path: Path) -> None:
+    """Before minutes of work, not after them.
+
+    Raises:
+        NeuralocksError: it is a folder's name, or nothing can be written there; nothing is left of the attempt.
+    """
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; give a file name")
+    try:
+        made = make_way(path)
+        try:
+            with own_folder(path.parent):
+                pass
+        finally:
+            remove_empty(made)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
 def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Write arrays at once under the final name; what is killed over it leaves `<stem>.<process>.tmp` beside it.
 

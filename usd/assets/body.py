@@ -7,7 +7,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.body.statistical_body import StatisticalBody, statistical_body
-from neuralocks_core.files import as_path
+from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.rotation import relative_to_parents
 
 from ..border.arrays import integers, vectors
@@ -32,6 +32,7 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
     """
     path = as_path(path, "path")
     check_layer_name(path)
+    check_writable(path)
     body = statistical_body(phenotype) if body is None else body
     return write_stage(path, lambda stage: _author(stage, body))
 

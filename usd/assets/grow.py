@@ -10,13 +10,13 @@ import numpy as np
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import as_path
+from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
 from neuralocks_core.progress import Progress, silent, within
 
-from ..border.stage_files import check_not_input
+from ..border.stage_files import check_layer_name, check_not_input
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from .groom import write_groom
@@ -55,9 +55,11 @@ def grow(
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
     """
     out = as_path(out, "out")
+    check_layer_name(out)
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
     check_not_input(out, rig.source.prim.GetStage())
+    check_writable(out)
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
     say = progress or silent

@@ -2,12 +2,11 @@
 """`neuralocks rig train`: from a USD rig to a model file."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import as_path, cannot_write, make_way, own_folder, remove_empty
+from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.progress import Progress
 from neuralocks_core.shortcomings import shortcomings
 
@@ -66,7 +65,7 @@ def train_rig(
     from neuralocks_core.rig.rods import RigMaterial
 
     character, out = as_path(character, "character"), as_path(out, "out")
-    _check_writable(out)
+    check_writable(out)
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
     check_patterns(hair, chains)
     notes = rigged_notes(hair.source) + chain_notes(hair, chains)
@@ -128,16 +127,3 @@ def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict)
     ):
         if value is not None:
             check_number(f"--{name}", value, low, high, whole=whole)
-
-
-def _check_writable(out: Path) -> None:
-    """Before minutes of training, not after them."""
-    if out.is_dir():
-        raise NeuralocksError(f"{out}: is a folder; give a file name")
-    try:
-        made = make_way(out)
-        with own_folder(out.parent):
-            pass
-    except OSError as error:
-        raise cannot_write(out, error) from None
-    remove_empty(made)

@@ -70,7 +70,7 @@ def test_the_scalp_is_the_upper_head():
     assert abs(points[scalp, 0].mean()) < 0.002
 
 
-def test_a_body_is_written_whole_or_not_at_all(tmp_path):
+def test_a_body_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     points = np.array([[0, 1.8, 0], [0.1, 1.8, 0], [0.1, 1.7, 0], [0, 1.7, 0]], float)
     bind = np.tile(np.eye(4), (2, 1, 1))
     bind[:, 1, 3] = [1.0, 1.6]
@@ -84,6 +84,9 @@ def test_a_body_is_written_whole_or_not_at_all(tmp_path):
     assert np.allclose(again.skeleton.bind, bind) and np.allclose(again.body.points, points, atol=1e-6)
     with pytest.raises(NeuralocksError, match="end its name"):
         write_body(tmp_path / "body.fbx", body)
+    monkeypatch.setattr("usd.assets.body.statistical_body", None)  # which takes a minute
+    with pytest.raises(NeuralocksError, match="not a folder, on the way"):
+        write_body(path / "body.usda")
 
 
 @pytest.mark.parametrize(("name", "value"), [("size", 0.5), ("age", 2.0)])

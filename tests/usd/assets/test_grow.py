@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.assets.groom import import_groom
-from usd.assets.grow import grow
+from usd.assets.grow import Barber, grow
 from usd.models import training_scene as training_scene_module
 from usd.models.training_scene import training_scene
 from usd.shot.stage import read_rigs, read_shot
@@ -92,6 +92,18 @@ def test_what_is_read_is_not_written_over(tmp_path):
             with pytest.raises(NeuralocksError, match=f"{out.name}: is part of the shot itself"):
                 work(*words)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("x.txt", "end its name with .usd"), ("file/x.usda", "not a folder, on the way")]
+)
+def test_where_nothing_can_be_written_is_told_before_it_grows(tmp_path, monkeypatch, name, words):
+    """A full head takes a minute."""
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(Barber, "grow", None)
+    with pytest.raises(NeuralocksError, match=words):
+        grow("bob", BODY, tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_hair_grows_on_the_head_below_a_halo_as_without_it(tmp_path):
