@@ -10,10 +10,12 @@ def check_training() -> None:
     """Refuse to train without what learns, what writes the model, and what simulates.
 
     Raises:
-        NeuralocksError: names the package.
+        NeuralocksError: names the package that is missing, or that is there and does not load.
     """
     for name in ("torch", "onnx", "warp"):
         try:
             import_module(name)
-        except ImportError as error:
+        except ModuleNotFoundError as error:
             raise NeuralocksError(f'train: {error.name} is not installed; pip install "neuralocks[train]"') from None
+        except (ImportError, OSError) as error:  # a library that its compiled part asks for, say; on Windows an OSError
+            raise NeuralocksError(f"train: {name} does not load ({error}); install it anew") from None
