@@ -61,13 +61,16 @@ def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | N
     """The model that a training begins with, or that a resumed one began with.
 
     Raises:
-        NeuralocksError: the resumed one did not begin with `begin`.
+        NeuralocksError: the resumed one did not begin with `begin`, or what it had in place of a model is lost.
     """
     if not resume:
         return Path(begin) if begin else None
     kept = work / BEGINNING if (work / BEGINNING).exists() else None
     if begin and not (kept and Path(begin).is_file() and filecmp.cmp(kept, begin, shallow=False)):
         raise NeuralocksError(f"{begin}: the training in {work} did not begin with it; resume without --begin")
+    if kept is None and (work / "checkpoint.npz").exists() and not (work / CODES).exists():
+        # Its network would go on with codes of strands that mean something else to it.
+        raise NeuralocksError(f"{work}: lacks what its network reads strands with, {CODES}; train without --resume")
     return kept
 
 

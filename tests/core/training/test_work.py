@@ -41,3 +41,15 @@ def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
     (tmp_path / work.INPUTS).write_text(forged)
     with pytest.raises(NeuralocksError, match="inputs.json: cannot be read; train without --resume"):
         work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
+
+
+@pytest.mark.parametrize("learned_with", (work.CODES, work.BEGINNING))
+def test_a_network_does_not_go_on_without_what_it_learned_with(tmp_path, learned_with):
+    """New codes of the strands would mean something else to it, and the model would be wrong without a word."""
+    out = tmp_path / "hair.neuralocks"
+    folder = _kept(out)
+    with pytest.raises(NeuralocksError, match="lacks what .* codes.npz; train without --resume"):
+        work.beginning_of(folder, None, resume=True)
+    (folder / learned_with).touch()
+    kept = folder / learned_with if learned_with == work.BEGINNING else None
+    assert work.beginning_of(folder, None, resume=True) == kept
