@@ -31,18 +31,24 @@ WORDS = (
     ("check the stage's metersPerUnit", "check the scene's Unit Scale"),
     ("its skel binding puts its roots", "where its object stands in the rest pose, its roots are"),
     ("check its unit and primvars:skel:geomBindTransform", "check the object's place and scale, and its parent's"),
+    ("no joint found for ", "no bone found for "),
+    ("between time codes ", "between frames "),
+    ("at time code ", "at frame "),
     ("train one with random_materials=True, as the other ways of training do", "train one here"),
 )
 """What the command line says, and the panel; in this order."""
 _CUTS = re.compile(r", or name them all if they are \(--cuts [^)]*\)")
 """A remedy that the panel has not."""
 
+_JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
+"""A bone as it is written to a file, with all those that it hangs from."""
+
 
 def for_the_panel(text: str) -> str:
     """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
-    return _CUTS.sub("", text)
+    return _JOINT.sub(r"bone '\1'", _CUTS.sub("", text))
 
 
 def with_objects(text: str, prims: dict[str, str]) -> str:

@@ -43,4 +43,24 @@ def test_notes_name_what_the_panel_has(note):
     assert not any(
         word in said for word in ("--", "skel", "JOINT", "FIRST", "metersPerUnit", "random_materials", "()", " ;")
     ), said
-    assert said.startswith(note[:12])
+    assert said[:4] == note[:4], "the subject stays"
+
+
+@pytest.mark.parametrize(
+    ("note", "told"),
+    [
+        (
+            "Rig: joint 'hips/spine/head' is turned by 19 degrees between time codes 1 and 24; a loop ends with the pose that it "
+            "begins with",
+            "Rig: bone 'head' is turned by 19 degrees between frames 1 and 24; a loop ends with the pose that it begins with",
+        ),
+        ("Rig: its head joint 'head' does not move", "Rig: its head bone 'head' does not move"),
+        ("Hair: hair joint 'a/b' is mirrored", "Hair: hair bone 'b' is mirrored"),
+        (
+            "Rig: the chest is scaled unevenly, at time code 7 by 9%",
+            "Rig: the chest is scaled unevenly, at frame 7 by 9%",
+        ),
+    ],
+)
+def test_notes_speak_of_bones_and_frames(note, told):
+    assert for_the_panel(note) == told
