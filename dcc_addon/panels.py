@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab, in the order in which an artist works: character, strands, hair bones, bake."""
 
-import textwrap
-
 import bpy
 
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
+from .labels import words
 from .operators.training import job, known_problem, notes
 from .scene.actions import has_keys
 from .scene.attach import has_cache, stretched_since
 from .scene.muting import off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
+from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
 from .unsampled import FIRST
@@ -161,11 +161,10 @@ def _training(layout, settings, kind: str) -> None:
             words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")
         _notes(layout)
         return
-    left = running.seconds_left
     box = layout.box()
-    text = f"Training {100 * running.done:.0f} %" + ("" if left is None else f", {max(1, round(left / 60))} min left")
-    progress(box, running.done, text)
-    words(box, running.message, "NONE")
+    progress(box, running.done, f"Training {100 * running.done:.0f} %{in_words(running.seconds_left)}")
+    # What is below keeps its place when the numbers, and so perhaps the lines, change.
+    running.lines = max(running.lines, words(box, running.message, "NONE", running.lines))
     _notes(box)
     box.operator("neuralocks.cancel_training", icon="CANCEL")
 
@@ -282,16 +281,6 @@ def progress(layout, done: float, text: str) -> None:
         layout.progress(factor=done, text=text)
     else:
         layout.label(text=text, icon="TIME")
-
-
-def words(layout, text: str, icon: str) -> None:
-    """A text of any length, broken into lines that fit the region."""
-    region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale
-    width = max(20, int((region.width / scale - 60) / 6)) if region else 40
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False) or [""]):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 
 CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)

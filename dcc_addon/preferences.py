@@ -4,8 +4,8 @@
 import bpy
 from bpy.props import StringProperty
 
+from .labels import words
 from .operators.training import known_problem
-from .panels import words
 
 
 class Preferences(bpy.types.AddonPreferences):

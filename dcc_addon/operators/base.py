@@ -13,6 +13,7 @@ from .. import background
 from ..live import refresh
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
+from ..services.remaining import Remaining, in_words
 from ..session import session
 
 SLICE = 0.06
@@ -82,7 +83,7 @@ class Stepwise(Hardened):
         if session.working:
             self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
             return {"CANCELLED"}
-        self._steps = self.steps(context)
+        self._steps, self._remaining = self.steps(context), Remaining()
         session.working = self.bl_label
         _running[:] = [self]
         background.request()  # what is half sampled begins anew afterwards
@@ -124,8 +125,11 @@ class Stepwise(Hardened):
             done, total, message = next(self._steps)
             while time.perf_counter() < end:
                 done, total, message = next(self._steps)
-            context.window_manager.progress_update(1000 * done / max(total, 1))
-            context.workspace.status_text_set(f"{message}  {100 * done / max(total, 1):.0f} %   Esc: cancel")
+            share = done / max(total, 1)
+            self._remaining.told(share)
+            context.window_manager.progress_update(1000 * share)
+            left = in_words(self._remaining.seconds)
+            context.workspace.status_text_set(f"{message}  {100 * share:.0f} %{left}   Esc: cancel")
         except StopIteration as stop:
             self._done = True
             return stop.value

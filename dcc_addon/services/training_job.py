@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from contextlib import suppress
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.training.work import abandon
+
+from .remaining import Remaining
+from .training_child import AROUND, LEARNED
 
 CHILD = Path(__file__).with_name("training_child.py")
 ADDON = Path(__file__).resolve().parent.parent
@@ -86,13 +88,16 @@ class TrainingJob:
         done, message: progress from 0 to 1, and the latest line with the gauge.
         notes: what somebody should know of the character, and in the end of what was learned; each once.
         error: why it failed, in one line; empty otherwise.
+        lines: as many as the panel has needed for a message so far.
         out: the model file that it writes.
     """
 
     def __init__(self, python: str, settings: dict):
         self.done, self.message, self.error, self.out = 0.0, "Starting", "", settings["out"]
         self.notes: list[str] = []
-        self._began = time.monotonic()
+        self.lines = 1
+        least = LEARNED + AROUND if settings.get("kind") == "rig" else 0.0
+        self._remaining = Remaining(max(least, 60 * settings["minutes"]))
         self._cancelled = False
         group = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP | _NO_WINDOW}
         try:
@@ -127,10 +132,9 @@ class TrainingJob:
         return not self.running and not self._cancelled and self._process.returncode == 0
 
     @property
-    def seconds_left(self) -> float | None:
-        """Estimate from what is done so far."""
-        spent = time.monotonic() - self._began
-        return spent * (1 - self.done) / self.done if self.done > 0.01 else None
+    def seconds_left(self) -> float:
+        """Estimate from what is done so far; before anything is, from the time that it was given."""
+        return self._remaining.seconds
 
     def cancel(self) -> None:
         """Stop it, with the processes that it started, and leave nothing of it; without effect on the model of one that has
@@ -178,9 +182,7 @@ class TrainingJob:
                     self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
                 else:
                     self.done = float(said.get("done", self.done))
-                    # What is made before it learns takes as long whatever the minutes: it tells nothing of those left.
-                    if not self.done:
-                        self._began = time.monotonic()
+                    self._remaining.told(self.done)
                     self.message = str(said.get("message", self.message))
 
     def _drain(self) -> None:

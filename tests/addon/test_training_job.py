@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Training in a process of its own, as the panel starts and watches it."""
 
-import contextlib
 import importlib
-import json
 import os
 import sys
 import time
-from types import SimpleNamespace
 
 import pytest
 
-from dcc_addon.services import training_child, training_job
+from dcc_addon.services import remaining, training_child, training_job
 from neuralocks_core.errors import NeuralocksError
 
 CHILD = """
@@ -39,7 +36,7 @@ def job(tmp_path, monkeypatch):
     started = []
 
     def start(out):
-        started.append(training_job.TrainingJob(sys.executable, {"out": out}))
+        started.append(training_job.TrainingJob(sys.executable, {"out": out, "minutes": 15}))
         return started[-1]
 
     yield start
@@ -67,7 +64,7 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
 def test_training_is_cancelled_at_once(job):
     running = job("wait")
     _wait(lambda: running.done == 0.5)
-    assert running.running and running.seconds_left is not None
+    assert running.running and 0 < running.seconds_left <= 450
     running.cancel()
     _wait(lambda: not running.running)
     assert not running.succeeded
@@ -88,25 +85,25 @@ def test_one_that_ends_before_it_has_heard_what_to_do_is_told_of(monkeypatch, tm
     child = tmp_path / "child.py"
     child.write_text("import os, sys; os.close(0); print('broken', file=sys.stderr, flush=True); os._exit(3)")
     monkeypatch.setattr(training_job, "CHILD", child)
-    long = {"out": "x", "chains": ["*" * 1_000_000]}  # more than waits in a pipe until it is read
+    long = {"out": "x", "minutes": 1, "chains": ["*" * 1_000_000]}  # more than waits in a pipe until it is read
     running = training_job.TrainingJob(sys.executable, long)
     _wait(lambda: not running.running)
     assert running.failure() == "broken"
     with pytest.raises(NeuralocksError, match="cannot be run"):
-        training_job.TrainingJob(str(tmp_path), {"out": "x"})
+        training_job.TrainingJob(str(tmp_path), {"out": "x", "minutes": 1})
 
 
-def test_what_is_made_before_it_learns_tells_nothing_of_the_time_left(monkeypatch):
-    clock, lines = [0.0], []
-    monkeypatch.setattr(training_job.time, "monotonic", lambda: clock[0])
-    running = object.__new__(training_job.TrainingJob)
-    running.done, running._began, running.message = 0.0, 0.0, ""
-    for seconds, done in ((1, 0.0), (60, 0.0), (63, 0.01), (66, 0.02)):
-        clock[0] = seconds
-        lines[:] = [json.dumps({"done": done, "message": ""})]
-        running._process = SimpleNamespace(stdout=contextlib.nullcontext(list(lines)))
-        running._listen()
-    assert running.seconds_left == pytest.approx(6 / 0.02 - 6)
+def test_time_left_is_known_before_anything_is_learned(job, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(remaining.time, "monotonic", lambda: clock[0])
+    left = remaining.Remaining(900)
+    said = []
+    for now, done in [(0, 0.0), (60, 0.0), (65, 0.0), (74, 0.01), (110, 0.05), (515, 0.5)]:
+        clock[0] = now
+        left.told(done)
+        said.append(left.seconds)
+    assert said[:3] == [900, 900, 900], "the first simulations are no speed"
+    assert said[3:] == pytest.approx([891, 855, 450])
 
 
 @pytest.mark.parametrize(

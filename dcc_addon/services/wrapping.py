@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Text broken into lines by how wide its letters are drawn, for these differ by half, and more in other scripts."""
+
+import re
+from collections.abc import Callable
+
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|[cm]?m(?:/s)?|s|deg|degrees|J/kg)(?!\w))")
+"""The space between a number and its unit."""
+
+
+def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
+    """Lines of a text, one at least, none wider than `width` by what `measure` says of a line; broken at spaces, and where a
+    word is too wide, within it. A number keeps its unit.
+    """
+    lines, line = [], ""
+    for word in _UNIT.sub("\u00a0", text).split(" "):
+        if not word:
+            continue
+        if line and measure(f"{line} {word}") <= width:
+            line = f"{line} {word}"
+            continue
+        if line:
+            lines.append(line)
+        while len(word) > 1 and measure(word) > width:
+            fits = next((n for n in range(len(word) - 1, 1, -1) if measure(word[:n]) <= width), 1)
+            lines.append(word[:fits])
+            word = word[fits:]
+        line = word
+    return [*lines, line] if line or not lines else lines
