@@ -12,7 +12,7 @@ from .scene.layers import working_in
 from .scene.redraw import redraw
 from .scene.sampling import in_slices
 from .scene.up_to_date import notice
-from .scene.windows import layer_shown, scenes_shown
+from .scene.windows import drawing, layer_shown, scenes_shown
 from .session import session
 
 SLICE = 0.05
@@ -79,7 +79,8 @@ def look() -> float | None:
         _go_on()
     if not _work:
         session.sampling = None
-        refresh(scene)
+        for shown in drawing(scene):
+            refresh(shown)
     redraw()
     return 0.01
 

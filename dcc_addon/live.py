@@ -6,6 +6,7 @@ from dataclasses import replace
 import bpy
 
 from . import live_rig, live_strands
+from .scene.guests import guests
 from .scene.layers import elsewhere, graph_of, layer_of
 from .scene.lookup import find
 from .scene.sampling import key_of
@@ -75,6 +76,19 @@ def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
     for armature in live_rig.live_armatures(scene):
         if not elsewhere(armature, scene, graph):
             live_rig.update(armature, scene, graph, moved)
+    for thing, home in guests(scene):
+        _update_guest(thing, home, scene, graph, wait)
+
+
+def _update_guest(thing, home, scene, graph, wait: bool) -> None:
+    """The same of what is of the scene `home`, where this one's graph has it. Whether it is out of date is seen there alone."""
+    armature = thing if thing.type == "ARMATURE" else thing.neuralocks_hair.armature
+    if armature is None or not all(each.evaluated_get(graph).is_evaluated for each in (armature, thing)):
+        return
+    if thing == armature:
+        live_rig.update(armature, scene, graph)
+    else:
+        live_strands.update(thing, scene, graph, False, wait, home)
 
 
 def show_rest(scene) -> None:

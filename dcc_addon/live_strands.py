@@ -22,7 +22,7 @@ from .scene.muting import mute_deformers, unmute_deformers
 from .scene.placing import world
 from .scene.sampling import shown_frame
 from .scene.watched import evaluated_for_itself
-from .scene.windows import layer_shown
+from .scene.windows import drawing, layer_shown
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair
@@ -39,12 +39,13 @@ def live_hairs(scene) -> list:
     return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.live]
 
 
-def update(hair, scene, graph, moved: bool, wait: bool) -> None:
+def update(hair, scene, graph, moved: bool, wait: bool, home=None) -> None:
     """Write the points of a hair object for the pose that `graph` has evaluated; rest hair, with a message that says
-    why, where that cannot be, and rest hair while it is being prepared. The arguments are those of `live.update`.
+    why, where that cannot be, and rest hair while it is being prepared. The arguments are those of `live.update`; `home` is
+    the scene that the hair is in, where that is another one.
     """
     try:
-        _update(hair, scene, graph, moved, wait or at_once(graph))
+        _update(hair, scene, graph, moved, wait or at_once(graph), home or scene)
     except NeuralocksError as error:
         _give_up(hair, str(error))
     except ReferenceError:
@@ -56,9 +57,9 @@ def at_once(graph) -> bool:
     return bpy.app.background or graph.mode == "RENDER"
 
 
-def _update(hair, scene, graph, moved: bool, wait: bool) -> None:
+def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     armature = hair.neuralocks_hair.armature
-    if armature is None or armature.name not in scene.objects:
+    if armature is None or armature.name not in home.objects:
         raise NeuralocksError(
             f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
         )
@@ -200,9 +201,10 @@ def _arrived(name: str) -> None:
         return
     armature = hair.neuralocks_hair.armature
     shown = [scene for scene in hair.users_scene if any(layer.depsgraph for layer in scene.view_layers)]
-    for scene in sorted(shown, key=lambda scene: scene == bpy.context.scene):
+    drawn = {each: home for home in shown for each in drawing(home) if each not in shown}  # where it is a guest
+    for scene in sorted([*shown, *drawn], key=lambda scene: scene == bpy.context.scene):
         layer = layer_of(armature, scene) if armature is not None else None
-        update(hair, scene, graph_of(scene, layer or layer_shown(scene)), False, False)
+        update(hair, scene, graph_of(scene, layer or layer_shown(scene)), False, False, drawn.get(scene))
 
 
 def material(settings) -> np.ndarray:

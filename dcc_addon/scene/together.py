@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes that one render draws together."""
 
+from .guests import homes
+
 
 def drawn_with(scene) -> list:
-    """The scene and those whose layers its compositor takes in. Blender tells before it renders the scene strips of the
-    sequencer, of these it does not.
+    """The scene and those whose layers its compositor takes in, each after those whose characters it draws. Blender tells
+    before it renders the scene strips of the sequencer, of these it does not.
     """
     found = [scene]
     if scene.render.use_compositing:
         tree = getattr(scene, "compositing_node_group", None) or getattr(scene, "node_tree", None)
         found += [other for other in _layers(tree, set()) if other != scene]
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(drawn for each in found for drawn in (*homes(each), each)))
 
 
 def _layers(tree, seen: set) -> list:

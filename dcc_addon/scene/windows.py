@@ -3,11 +3,20 @@
 
 import bpy
 
+from .guests import homes
+
 
 def scenes_shown() -> list:
-    """The scene of the context, and those of all windows."""
+    """The scene of the context, and those of all windows; then those whose characters these draw."""
     windows = bpy.context.window_manager.windows
-    return list(dict.fromkeys([bpy.context.scene, *(window.scene for window in windows)]))
+    found = [bpy.context.scene, *(window.scene for window in windows)]
+    return list(dict.fromkeys([*found, *(home for scene in found for home in homes(scene))]))
+
+
+def drawing(scene) -> list:
+    """The scene, and those shown that draw a character of it; last the one in view."""
+    found = {scene, *(shown for shown in scenes_shown() if scene in homes(shown))}
+    return sorted(found, key=lambda each: each == bpy.context.scene)
 
 
 def layer_shown(scene):

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Characters that another scene draws, as its set or in an instance of their collection."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from tests.blender import scenes
+from tests.blender.checks import apart, make_live, messages, points_at
+from tests.blender.witness import ENGINE, film, witness
+
+
+def drawn_by_another_scene(folder: Path) -> None:
+    """Scrubbed and rendered in the scene that draws it, in a file just opened, too, live hair is what its own scene shows at
+    that frame, whichever is in view; within the shutter as well, and on hair bones that are live.
+    """
+    from dcc_addon.scene.layers import graph_of
+
+    scene, wanted = _own(folder), {}
+    for frame in (5, 9):
+        wanted[frame] = _seen(bpy.data.objects["Hair"], _shown(scene, frame))
+    scene.frame_set(3)
+    for way, show in (("instance", _instance), ("set", _set), ("nested", _nested)):
+        other = bpy.data.scenes.new(way)
+        show(other, scene)
+        film(other)
+        other.frame_start, other.frame_end = 5, 9
+        other.frame_step, other.render.filepath = 4, str(folder / "r_")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    got = {}
+
+    def look(_engine, graph):
+        got[graph.scene.frame_current] = _seen(bpy.data.objects["Hair"], graph)
+
+    def same(now, frame):
+        return all(apart(a, b) < 1e-6 for a, b in zip(now, wanted[frame], strict=True))
+
+    with witness(look):
+        for way in ("instance", "set", "nested"):
+            for in_view in (way, "Scene"):
+                bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+                other = bpy.data.scenes[way]
+                bpy.context.window.scene, other.render.engine = bpy.data.scenes[in_view], ENGINE
+                got.clear()
+                bpy.ops.render.render(animation=True, scene=way)
+                assert sorted(got) == [5, 9] and not messages(), (way, got, messages())
+                assert all(same(got[frame], frame) for frame in got), (way, in_view)
+                other.frame_current = 5
+                bpy.ops.render.render(scene=way)
+                assert same(got[5], 5) and bpy.data.scenes["Scene"].frame_current == 3, (way, in_view)
+                assert not bpy.data.objects["Hair"].modifiers
+            bpy.context.window.scene = other
+            for frame in (9, 5):
+                other.frame_set(frame)
+                assert same(_seen(bpy.data.objects["Hair"], graph_of(other, other.view_layers[0])), frame), way
+
+
+def not_drawn_by_another_scene(_folder: Path) -> None:
+    """A scene that shows nothing of a character leaves its hair alone, and so does one that has it in a collection that it
+    excludes.
+    """
+    from dcc_addon.scene import curves
+    from dcc_addon.scene.guests import guests
+
+    scene = _own(None)
+    strands = bpy.data.objects["Hair"]
+    shown = points_at(strands, 9)
+    other = bpy.data.scenes.new("Other")
+    bpy.context.window.scene = other
+    other.frame_set(5)
+    assert not guests(other)
+    _instance(other, scene)
+    other.collection.children.link(bpy.data.collections.new("Off"))
+    empty = other.collection.objects[0]
+    bpy.data.collections["Off"].objects.link(empty)
+    other.collection.objects.unlink(empty)
+    other.view_layers[0].layer_collection.children["Off"].exclude = True
+    assert {thing.name for thing, _ in guests(other)} == {"Hair"}
+    written = curves.shown(strands.data).copy()
+    other.frame_set(6)
+    assert apart(curves.shown(strands.data), written) == 0 and not messages(), messages()
+    bpy.context.window.scene = scene
+    assert apart(points_at(strands, 9), shown) < 1e-6
+
+
+def _own(folder):
+    """A scene with a character in a collection of its own, whose hair is live, and with a folder hair bones too."""
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    scenes.collect("Character")
+    make_live(rig, strands)
+    if folder is not None:
+        rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+        rig.neuralocks_character.rig_live = True
+    return scene
+
+
+def _shown(scene, frame):
+    scene.frame_set(frame)
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def _seen(strands, graph) -> tuple:
+    """Points of the hair and matrices of the bones as a depsgraph has them."""
+    rig = strands.neuralocks_hair.armature.evaluated_get(graph)
+    return scenes.points(strands, graph), np.array([np.array(bone.matrix) for bone in rig.pose.bones])
+
+
+def _instance(other, _scene) -> None:
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Character"]
+    other.collection.objects.link(empty)
+
+
+def _set(other, scene) -> None:
+    other.background_set = scene
+
+
+def _nested(other, scene) -> None:
+    """An instance of a collection in which there is an instance."""
+    crowd = bpy.data.collections.new("Crowd")
+    empty = bpy.data.objects.new("Within", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Character"]
+    crowd.objects.link(empty)
+    outer = bpy.data.objects.new("Outer", None)
+    outer.instance_type, outer.instance_collection = "COLLECTION", crowd
+    other.collection.objects.link(outer)
