@@ -206,9 +206,9 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         taking = row.row(align=True)
         taking.enabled = has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
-        row = layout.row(align=True)
-        row.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
-        row.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
+        column = layout.column(align=True)  # side by side, a sidebar as wide as it opens would cut them
+        column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
+        column.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
 
 
 class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
