@@ -67,7 +67,15 @@ def _tell(notes) -> None:
 
 
 def _train_strands(settings: dict, say) -> None:
+    from neuralocks_core.training.train import THOUSANDTHS
     from usd.models.train import train
+
+    def told(done: int, total: int, message: str) -> None:
+        if total == THOUSANDTHS:
+            say(done, total, message)
+        else:  # of what comes before the time that it was given
+            say(0, 1, message)
+            print(json.dumps({"before": done / max(total, 1)}), flush=True)
 
     say(0, 1, "Reading the character")
     character, minutes = settings["character"], settings["minutes"]
@@ -82,7 +90,7 @@ def _train_strands(settings: dict, say) -> None:
         head=settings.get("head"),
         rollouts=rollouts,
         tell=_tell,
-        progress=say,
+        progress=told,
     )
 
 

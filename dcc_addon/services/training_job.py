@@ -97,6 +97,7 @@ class TrainingJob:
         self.notes: list[str] = []
         self.lines = 1
         least = LEARNED + AROUND if settings.get("kind") == "rig" else 0.0
+        self._before = Remaining()
         self._remaining = Remaining(max(least, 60 * settings["minutes"]))
         self._cancelled = False
         group = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP | _NO_WINDOW}
@@ -133,8 +134,9 @@ class TrainingJob:
 
     @property
     def seconds_left(self) -> float:
-        """Estimate from what is done so far; before anything is, from the time that it was given."""
-        return self._remaining.seconds
+        """Estimate from what is done so far; before anything is, from the time that it was given, and what comes before."""
+        before = 0.0 if self.done else self._before.seconds or 0.0
+        return before + self._remaining.seconds
 
     def cancel(self) -> None:
         """Stop it, with the processes that it started, and leave nothing of it; without effect on the model of one that has
@@ -180,6 +182,8 @@ class TrainingJob:
                     self.error = str(said["error"])
                 elif "notes" in said:
                     self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
+                elif "before" in said:
+                    self._before.told(float(said["before"]))
                 else:
                     self.done = float(said.get("done", self.done))
                     self._remaining.told(self.done)

@@ -33,7 +33,7 @@ def method_of(
     codes: Callable[[StrandSet], np.ndarray],
     options: RegressionOptions | SelfSupervisedOptions,
     farm: RolloutFarm,
-    report: Callable[[float, str], None],
+    report: Callable[..., None],
 ) -> RolloutMethod | MomentMethod:
     """The method that the kind of options asks for; `codes` as for `RolloutBank`, else see `train.train_strands`."""
     kind = MomentMethod if isinstance(options, SelfSupervisedOptions) else RolloutMethod
@@ -50,7 +50,7 @@ class RolloutMethod:
         self.bank = RolloutBank(scene, codes)
         self.inputs = self.bank.inputs
         self._report = report
-        wait(farm, min(FIRST, farm.count), lambda count: report(0.0, f"first simulations: {count}"))
+        wait(farm, min(FIRST, farm.count), self._first)
         self.bank.add(self._at_step(0) if options.steps else farm.files())
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
@@ -61,13 +61,18 @@ class RolloutMethod:
         """See `regression.regress`."""
         return regress(self.bank, net, self.options, optimisers, self.farm.files, at_step=self._at_step, **since)
 
+    def _first(self, there: int, count: int) -> None:
+        """Waiting has a pace of its own, which is not that of the training after it."""
+        self._report(there / count, f"first simulations: {there} of {count}", count)
+
     def _at_step(self, step: int) -> list[Path]:
         """What a run of so many steps learns from at one of them, however fast the farm is; waits for it."""
         count, farm = min(FIRST + step // STEPS_EACH, self.farm.count), self.farm
         if count == len(self.bank.rollouts):
             return []
         done = step / self.options.steps
-        wait(farm, count, lambda there: self._report(done, f"{step} steps, simulations: {there}"), numbered=True)
+        says = f"{step} steps, simulations: "
+        wait(farm, count, lambda there, count: self._report(done, f"{says}{there} of {count}"), numbered=True)
         return farm.files(count)
 
     def material(self) -> str:
@@ -130,8 +135,8 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
     return strands, np.concatenate(frames)
 
 
-def wait(farm: RolloutFarm, count: int, say: Callable[[str], None], numbered: bool = False) -> None:
-    """Until a farm has made `count` rollouts, or if `numbered` the first `count`; `say` is told how many there are.
+def wait(farm: RolloutFarm, count: int, say: Callable[[int, int], None], numbered: bool = False) -> None:
+    """Until a farm has made `count` rollouts, or if `numbered` the first `count`; `say` is told how many there are, and `count`.
 
     Raises:
         NeuralocksError: a process of it failed.
@@ -142,5 +147,5 @@ def wait(farm: RolloutFarm, count: int, say: Callable[[str], None], numbered: bo
             return
         if farm.failed() or not alive:
             raise farm.failure("try again")
-        say(f"{there} of {count}")
+        say(there, count)
         time.sleep(0.2)

@@ -47,6 +47,8 @@ HELD_OUT = 16
 """Rollouts that the gauge measures on."""
 SAVE_EVERY = 45.0
 """[s] between checkpoints: a kill loses no more than that."""
+THOUSANDTHS = 1000
+"""Parts of the budget in which progress is told."""
 
 
 def train_strands(
@@ -83,7 +85,8 @@ def train_strands(
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
         tell: called with notes for the user on a resumed training.
-        progress: called with done, total (thousandths of the budget) and a message with the gauge.
+        progress: called with done, total and a message: of the first simulations, then thousandths of the budget with the
+            gauge.
 
     Raises:
         NeuralocksError: an option out of bounds, nothing to train on, a model or a checkpoint that does not fit, or a
@@ -236,7 +239,7 @@ class _Run:
 
     @staticmethod
     def _wait(held_farm: RolloutFarm, report) -> None:
-        wait(held_farm, HELD_OUT, lambda count: report(1.0, f"held-out simulations: {count}"))
+        wait(held_farm, HELD_OUT, lambda there, count: report(1.0, f"held-out simulations: {there} of {count}"))
 
     def _measured(self, held_farm: RolloutFarm) -> Gauge | None:
         """The gauge on the held-out rollouts that there are by now, None before the first."""
@@ -253,14 +256,14 @@ class _Run:
 
 
 class _Reporter:
-    """Thousandths of the budget; silent where nobody listens."""
+    """Thousandths of the budget, or a step of so many parts that comes before; silent where nobody listens."""
 
     def __init__(self, progress):
         self._progress = progress
 
-    def __call__(self, done: float, message: str) -> None:
+    def __call__(self, done: float, message: str, parts: int = THOUSANDTHS) -> None:
         if self._progress:
-            self._progress(int(1000 * done), 1000, message)
+            self._progress(int(parts * done + 1e-6), parts, message)
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:

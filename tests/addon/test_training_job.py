@@ -19,6 +19,10 @@ for told in (["/Hair: a", "b"], ["b", "K\xfcche"]): print(json.dumps({"notes": t
 if settings["out"].endswith("wait"): time.sleep(60)
 if settings["out"] == "number": print(5); print("null"); print(json.dumps({"done": 0.75, "message": "more"}))
 if settings["out"] == "killed": print("a warning", file=sys.stderr, flush=True); os.kill(os.getpid(), 9)
+if settings["out"] == "early":
+    print(json.dumps({"done": 0, "message": "first"}), flush=True)
+    for before in (0.0, 0.5): time.sleep(0.4); print(json.dumps({"before": before}), flush=True)
+    time.sleep(60)
 if settings["out"] == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
 if settings["out"] == "odd":
@@ -59,6 +63,15 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
     running = job("number")  # a library's own word
     _wait(lambda: not running.running)
     assert running.succeeded and running.message == "more"
+
+
+def test_what_comes_before_the_training_counts_too(job, monkeypatch):
+    monkeypatch.setattr(remaining, "KNOWN", 0.0)
+    running = job("early")
+    _wait(lambda: running.message == "first")
+    assert running.seconds_left == 900
+    _wait(lambda: running.seconds_left > 900)
+    assert 900.2 < running.seconds_left < 960
 
 
 def test_training_is_cancelled_at_once(job):

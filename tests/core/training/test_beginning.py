@@ -218,6 +218,7 @@ def test_a_training_goes_on_where_the_model_was(tmp_path):
 
     def kill(done, total, message):
         if "first simulations" in message:
+            assert total == 4 and message.endswith(f": {done} of 4")
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
