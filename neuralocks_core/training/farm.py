@@ -180,6 +180,8 @@ def _check(rollout: Rollout, scene: TrainingScene | None) -> None:
             raise ValueError(name)
     if not (strands and 0 <= rollout.first < frames and frames > 1 and rollout.strands.min() >= 0):
         raise ValueError("first, strands")
+    if not 0 < rollout.step < np.inf:
+        raise ValueError("step")
     if scene and not (
         0 <= rollout.groom < len(scene.grooms)
         and rollout.strands.max() < len(scene.grooms[rollout.groom].rest)

@@ -200,6 +200,7 @@ def posed_without_a_key(_folder: Path) -> None:
 def _begun(steps):
     """The work of an operator, begun as in a window."""
     from dcc_addon.operators import base
+    from dcc_addon.services.remaining import Remaining
     from dcc_addon.session import session
 
     class Work(base.Stepwise):
@@ -210,6 +211,7 @@ def _begun(steps):
 
     work, manager = Work(), bpy.context.window_manager
     work._timer, work._steps = manager.event_timer_add(0.01, window=bpy.context.window), steps
+    work._remaining = Remaining()
     session.working = work.bl_label
     base._running[:] = [work]
     while next(steps)[2] == "Loading USD":

@@ -76,7 +76,7 @@ class _Farm:
 
 
 def test_the_last_rollout_is_waited_for_though_its_process_has_ended():
-    methods.wait(_Farm(), 1, lambda text: None)
+    methods.wait(_Farm(), 1, lambda there, count: None)
 
 
 @pytest.mark.parametrize("kept", [0, 10, 1000])
@@ -97,7 +97,9 @@ def _rollout() -> Rollout:
     numbers = np.random.default_rng(0)
     planes, moved = numbers.normal(size=(5, 3, K, 4)).astype(np.float16), np.zeros((5, 3, K, 3), np.int16)
     rest, vectors = np.zeros((3, K, 3), np.float32), np.zeros((5, 8), np.float32)
-    return Rollout(0, np.arange(3), rest, 1, vectors, vectors[0], moved, planes, 0.1, np.zeros((3, 4), np.float32))
+    return Rollout(
+        0, np.arange(3), rest, 1, vectors, vectors[0], moved, 1e-4, planes, 0.1, np.zeros((3, 4), np.float32)
+    )
 
 
 _OF = SimpleNamespace(grooms=(SimpleNamespace(rest=np.zeros((3, K, 3))),), spec=SimpleNamespace(size=8))
@@ -113,6 +115,8 @@ _OF = SimpleNamespace(grooms=(SimpleNamespace(rest=np.zeros((3, K, 3))),), spec=
         {"groom": 1},
         {"groom": -1},
         {"first": 5},
+        {"step": float("nan")},
+        {"step": -1e-4},
         {"vectors": np.zeros((5, 9), np.float32), "bind": np.zeros(9, np.float32)},
         {"materials": np.zeros((3, 4), np.int16)},
     ),
