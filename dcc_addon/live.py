@@ -8,6 +8,7 @@ import bpy
 from . import live_rig, live_strands
 from .scene.guests import guests
 from .scene.layers import elsewhere, graph_of, layer_of
+from .scene.lively import lively
 from .scene.lookup import find
 from .scene.sampling import key_of
 from .session import session
@@ -70,13 +71,14 @@ def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
     """
     if session.paused:
         return
-    for hair in live_strands.live_hairs(scene):
+    own = lively(scene.objects)
+    for hair in own.hairs:
         if not elsewhere(hair.neuralocks_hair.armature, scene, graph):
             live_strands.update(hair, scene, graph, moved, wait)
-    for armature in live_rig.live_armatures(scene):
+    for armature in own.armatures:
         if not elsewhere(armature, scene, graph):
             live_rig.update(armature, scene, graph, moved)
-    for thing, home in guests(scene):
+    for thing, home in guests(scene, own):
         _update_guest(thing, home, scene, graph, wait)
 
 
@@ -108,8 +110,8 @@ def forget_gone() -> None:
 
 def carriers(scene) -> list:
     """Armatures of the scene with something live on them, by name."""
-    wanted = {h.neuralocks_hair.armature for h in live_strands.live_hairs(scene)}
-    wanted |= set(live_rig.live_armatures(scene))
+    own = lively(scene.objects)
+    wanted = {*(hair.neuralocks_hair.armature for hair in own.hairs), *own.armatures}
     return sorted((a for a in wanted if a is not None and a.name in scene.objects), key=lambda a: a.name_full)
 
 

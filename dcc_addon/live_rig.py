@@ -8,6 +8,7 @@ from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
 from .scene import rotations
+from .scene.lively import lively
 from .scene.sampling import shown_frame
 from .services.bones import LiveBones
 from .session import session
@@ -16,7 +17,7 @@ from .unsampled import unsampled
 
 def live_armatures(scene) -> list:
     """Armatures of the scene whose hair bones are live."""
-    return [o for o in scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_live]
+    return lively(scene.objects).armatures
 
 
 def update(armature, scene, graph, moved: bool = False) -> None:

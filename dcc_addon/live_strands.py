@@ -17,6 +17,7 @@ from .models import load_model, model_path, stamp
 from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
+from .scene.lively import lively
 from .scene.lookup import find, identity
 from .scene.muting import mute_deformers, unmute_deformers
 from .scene.placing import world
@@ -36,7 +37,7 @@ EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
 
 def live_hairs(scene) -> list:
     """Hair objects of the scene that are live."""
-    return [o for o in scene.objects if o.type == "CURVES" and o.neuralocks_hair.live]
+    return lively(scene.objects).hairs
 
 
 def update(hair, scene, graph, moved: bool, wait: bool, home=None) -> None:

@@ -2,6 +2,7 @@
 """Characters that another scene draws, as its set or in an instance of their collection."""
 
 from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -82,6 +83,31 @@ def not_drawn_by_another_scene(_folder: Path) -> None:
     assert apart(curves.shown(strands.data), written) == 0 and not messages(), messages()
     bpy.context.window.scene = scene
     assert apart(points_at(strands, 9), shown) < 1e-6
+
+
+def named_as_another(folder: Path) -> None:
+    """A set out of a library moves beside objects of the same names; and no scene's objects are gone through twice a frame, for
+    there may be ten thousand.
+    """
+    from dcc_addon import live
+    from dcc_addon.scene import guests, lively
+
+    _own(None)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "set.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(folder / "set.blend"), link=True) as (_, linked):
+        linked.scenes = ["Scene"]
+    scene, behind = bpy.context.scene, linked.scenes[0]
+    assert behind.library
+    for name in ("Hair", "Rig"):
+        scene.collection.objects.link(bpy.data.objects.new(name, None))
+    for drawn, passes in ((None, 1), (behind, 2)):
+        scene.background_set = drawn
+        graph = bpy.context.evaluated_depsgraph_get()
+        with patch.object(live, "lively", wraps=lively.lively) as looks, patch.object(guests, "lively", looks):
+            live.update(scene, graph)
+            assert looks.call_count == passes
+    assert [(thing.name, home) for thing, home in guests.guests(scene)] == [("Hair", behind)]
 
 
 def _own(folder):

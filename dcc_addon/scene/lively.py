@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What among objects is live, or draws what is: seen in one pass, for every frame asks and a scene may have ten thousand."""
+
+from typing import NamedTuple
+
+_KINDS = frozenset(("CURVES", "ARMATURE", "EMPTY"))
+
+
+class Lively(NamedTuple):
+    """Hair objects that are live, armatures whose hair bones are, and collections of which some of the objects are instances."""
+
+    hairs: list
+    armatures: list
+    instanced: list
+
+
+def lively(things) -> Lively:
+    """Those of some objects."""
+    found = Lively([], [], [])
+    for thing in [thing for thing in things if thing.type in _KINDS]:
+        if thing.type == "CURVES":
+            if thing.neuralocks_hair.live:
+                found.hairs.append(thing)
+        elif thing.type == "ARMATURE":
+            if thing.neuralocks_character.rig_live:
+                found.armatures.append(thing)
+        elif thing.instance_type == "COLLECTION" and thing.instance_collection:
+            found.instanced.append(thing.instance_collection)
+    return found
