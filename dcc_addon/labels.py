@@ -8,6 +8,8 @@ from .services.wrapping import wrapped
 
 MARGINS, ICON = 70, 25
 """Width of the sidebar's tabs with the margins of a panel and of a box in it, and of an icon with its space, at scale 1."""
+LEAST = 90
+"""The narrowest line, at scale 1: in a sidebar drawn narrower, lines are cut rather than a letter each."""
 
 
 def words(layout, text: str, icon: str, lines: int = 0) -> int:
@@ -29,4 +31,5 @@ def _room(icon: str) -> tuple:
     if not region or not scale:
         return 40, len
     blf.size(0, preferences.ui_styles[0].widget_label.points * scale)
-    return region.width - scale * (MARGINS + (ICON if icon != "NONE" else 0)), lambda line: blf.dimensions(0, line)[0]
+    room = region.width - scale * (MARGINS + (ICON if icon != "NONE" else 0))
+    return max(room, scale * LEAST), lambda line: blf.dimensions(0, line)[0]

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|[cm]?m(?:/s)?|s|deg|degrees|J/kg)(?!\w))")
 """The space between a number and its unit."""
+_SPACE = re.compile(r"[ \t\n\r\f\v]+")
+"""What lines may be broken at: an error of somebody else's may have lines of its own, which a label does not draw."""
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
@@ -13,7 +15,7 @@ def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[st
     word is too wide, within it. A number keeps its unit.
     """
     lines, line = [], ""
-    for word in _UNIT.sub("\u00a0", text).split(" "):
+    for word in _SPACE.split(_UNIT.sub("\u00a0", text)):
         if not word:
             continue
         if line and measure(f"{line} {word}") <= width:

@@ -18,6 +18,7 @@ def measure(text: str) -> float:
         ("hair", ["hair"]),
         ("illi illi illi illi", ["illi illi illi illi"]),
         ("hhhh hhhh hhhh", ["hhhh hhhh", "hhhh"]),
+        ("hhhh\n\n  hhhh\thhhh\n", ["hhhh hhhh", "hhhh"]),
         ("inside: 0.0095 %", ["inside:", "0.0095\u00a0%"]),
         ("stretched 5e-06 cm", ["stretched", "5e-06\u00a0cm"]),
         ("gives 10 mmmm", ["gives 10", "mmmm"]),
