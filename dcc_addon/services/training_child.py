@@ -3,24 +3,16 @@
 a line.
 """
 
-import importlib
 import json
 import os
 import sys
 
-PYTHON = (3, 11)
-"""The oldest that the packages run with."""
 LEARNED, AROUND = 30.0, 100.0
 """Seconds that the bones' network learns at least, and that the simulations before and the report after it take."""
 
 
 def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
-    if "--check" in sys.argv:
-        fact = _lacking()
-        if fact:
-            print(fact, file=sys.stderr)
-        return 1 if fact else 0
     settings = json.load(sys.stdin)
     say = _printer(sys.stdout)
     from neuralocks_core.errors import NeuralocksError
@@ -34,20 +26,6 @@ def main() -> int:
     finally:
         abandon(settings["out"])  # also where Blender is gone: its next training does not go on from there
     return 0
-
-
-def _lacking() -> str:
-    """Why this Python cannot train, empty where it can."""
-    if sys.version_info[:2] < PYTHON:
-        return f"it is Python {sys.version.split()[0]}, and {'.'.join(map(str, PYTHON))} or newer is needed"
-    for needed in ("torch", "warp", "onnx", "usd.models.train"):
-        try:
-            importlib.import_module(needed)
-        except ModuleNotFoundError as error:
-            return f"it lacks '{error.name}'"
-        except Exception as error:  # a library that its compiled part asks for is missing, say
-            return f"its '{needed}' does not load ({' '.join(str(error).split()) or type(error).__name__})"
-    return ""
 
 
 def _printer(stream):

@@ -14,9 +14,11 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.training.work import abandon
 
 from .remaining import Remaining
+from .training_check import CAN
 from .training_child import AROUND, LEARNED
 
 CHILD = Path(__file__).with_name("training_child.py")
+CHECK = Path(__file__).with_name("training_check.py")
 ADDON = Path(__file__).resolve().parent.parent
 _NEW_GROUP, _NO_WINDOW = 0x00000200, 0x08000000
 """How Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console of its own."""
@@ -40,7 +42,7 @@ def problem(python: str) -> str:
         return f"{python}: {fact}; {remedy}"
     try:
         done = subprocess.run(
-            [python, str(CHILD), "--check"],
+            [python, str(CHECK)],
             env=environment(),
             capture_output=True,
             **UTF8,
@@ -53,6 +55,8 @@ def problem(python: str) -> str:
     if done.returncode:
         lines = [line for line in done.stderr.strip().splitlines() if line]
         return f"{python}: {lines[-1] if lines else 'does not run'}; {remedy}"
+    if CAN not in done.stdout.splitlines():
+        return f"{python}: is no Python; {remedy}"
     return ""
 
 
@@ -129,8 +133,9 @@ class TrainingJob:
 
     @property
     def succeeded(self) -> bool:
-        """Whether it ended well."""
-        return not self.running and not self._cancelled and self._process.returncode == 0
+        """Whether it ended well, and with a model."""
+        ended = not self.running and not self._cancelled and self._process.returncode == 0
+        return ended and os.path.isfile(self.out)
 
     @property
     def seconds_left(self) -> float:
@@ -161,8 +166,10 @@ class TrainingJob:
 
     def failure(self) -> str:
         """Why it failed, in one line."""
-        if self.error or self._cancelled or self.running or self._process.returncode == 0:
+        if self.error or self._cancelled or self.running or self.succeeded:
             return self.error
+        if self._process.returncode == 0:
+            return f"it ended without {self.out}; try again"
         if self._process.returncode == -_KILLED:  # of what it said before, nothing tells why
             return "its process was killed; free some memory, and try again"
         return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
@@ -175,8 +182,6 @@ class TrainingJob:
                 except ValueError:
                     continue
                 if not isinstance(said, dict):  # what a library prints may be JSON by chance
-                    continue
-                if not isinstance(said, dict):  # a library has printed a number
                     continue
                 if "error" in said:
                     self.error = str(said["error"])

@@ -1,34 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Training in a process of its own, as the panel starts and watches it."""
 
+import ast
 import importlib
 import os
+import shutil
 import sys
 import time
 
 import pytest
 
-from dcc_addon.services import remaining, training_child, training_job
+from dcc_addon.services import remaining, training_check, training_job
 from neuralocks_core.errors import NeuralocksError
 
 CHILD = """
 import json, os, sys, time
 settings = json.load(sys.stdin)
+mode = os.path.basename(settings["out"])
 print(json.dumps({"done": 0.5, "message": "half"}), flush=True)
 for told in (["/Hair: a", "b"], ["b", "K\xfcche"]): print(json.dumps({"notes": told}), flush=True)
-if settings["out"].endswith("wait"): time.sleep(60)
-if settings["out"] == "number": print(5); print("null"); print(json.dumps({"done": 0.75, "message": "more"}))
-if settings["out"] == "killed": print("a warning", file=sys.stderr, flush=True); os.kill(os.getpid(), 9)
-if settings["out"] == "early":
+if mode == "wait": time.sleep(60)
+if mode == "number": print(5); print("null"); print(json.dumps({"done": 0.75, "message": "more"}))
+if mode == "killed": print("a warning", file=sys.stderr, flush=True); os.kill(os.getpid(), 9)
+if mode == "early":
     print(json.dumps({"done": 0, "message": "first"}), flush=True)
     for before in (0.0, 0.5): time.sleep(0.4); print(json.dumps({"before": before}), flush=True)
     time.sleep(60)
-if settings["out"] == "fail":
+if mode == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
-if settings["out"] == "odd":
+if mode == "odd":
     for stream in (sys.stdout, sys.stderr): stream.buffer.write(b"\\xff\\x81\\n7\\n[1]\\n"); stream.flush()
     print(json.dumps({"done": 0.75}), flush=True); sys.exit("broken: K\xfcche")
-if settings["out"] == "crash": raise RuntimeError("boom")
+if mode == "crash": raise RuntimeError("boom")
+if mode != "none": open(settings["out"], "w").close()
 """
 
 
@@ -40,7 +44,7 @@ def job(tmp_path, monkeypatch):
     started = []
 
     def start(out):
-        started.append(training_job.TrainingJob(sys.executable, {"out": out, "minutes": 15}))
+        started.append(training_job.TrainingJob(sys.executable, {"out": str(tmp_path / out), "minutes": 15}))
         return started[-1]
 
     yield start
@@ -85,7 +89,7 @@ def test_training_is_cancelled_at_once(job):
 
 def test_what_a_cancelled_training_has_made_goes_with_it(job, tmp_path):
     """Nothing goes on from there, and it may be gigabytes beside the artist's file."""
-    running = job(str(tmp_path / "wait"))
+    running = job("wait")
     _wait(lambda: running.done == 0.5)
     made = tmp_path / "wait.training" / "rollouts"
     made.mkdir(parents=True)
@@ -122,12 +126,13 @@ def test_time_left_is_known_before_anything_is_learned(job, monkeypatch):
 @pytest.mark.parametrize(
     ("out", "words"),
     [("fail", "/Hair: no hair; add some"), ("crash", "RuntimeError: boom"), ("odd", "broken: K\xfcche")]
+    + [("none", "without {out}; try again")]
     + [("killed", "its process was killed; free some memory, and try again")] * (os.name == "posix"),
 )
 def test_training_says_why_it_failed(job, out, words):
     running = job(out)
     _wait(lambda: not running.running)
-    assert not running.succeeded and running.failure() == words
+    assert not running.succeeded and running.failure().endswith(words.format(out=running.out))
     assert running.done == (0.75 if out == "odd" else 0.5), (
         "bytes that are no text, or JSON of others, end nobody who listens"
     )
@@ -138,6 +143,31 @@ _PROBLEMS = [
     ("/nowhere/python", "no such file"),
     (os.path.sep, "is a folder, where"),
 ]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="of a program that only there comes with the system")
+def test_a_program_that_is_no_python_cannot_train():
+    assert f"{shutil.which('true')}: is no Python; in a Python of" in training_job.problem(shutil.which("true"))
+
+
+def test_a_python_that_can_train_says_so(tmp_path, monkeypatch):
+    """Whatever libraries print as they load."""
+    modules = ("torch", "warp", "onnx", "usd", "usd.models", "usd.models.train")
+    check = tmp_path / "check.py"
+    given = f"import sys; sys.modules.update(dict.fromkeys({modules!r}, sys)); print('loading')\n"
+    check.write_text(given + training_job.CHECK.read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.setattr(training_job, "CHECK", check)
+    assert training_job.problem(sys.executable) == ""
+
+
+def test_what_is_too_old_can_read_that_it_is():
+    """Python 2.7 has no f-strings, annotations or bytes beyond ASCII, and would tell of a syntax error."""
+    source = training_job.CHECK.read_bytes().decode("ascii")
+    for node in ast.walk(ast.parse(source)):
+        assert not isinstance(node, (ast.JoinedStr, ast.AnnAssign, ast.NamedExpr, ast.AsyncFunctionDef, ast.Nonlocal))
+        assert not (isinstance(node, ast.arg) and node.annotation or isinstance(node, ast.FunctionDef) and node.returns)
+        assert not (isinstance(node, ast.arguments) and (node.kwonlyargs or node.posonlyargs))
+        assert not (isinstance(node, ast.Raise) and node.cause)
 
 
 @pytest.mark.parametrize(("python", "words"), _PROBLEMS)
@@ -161,9 +191,9 @@ def test_why_a_python_cannot_train(tmp_path, monkeypatch):
         monkeypatch.delitem(sys.modules, package, raising=False)
     torch = tmp_path / "torch.py"
     torch.write_text("raise ImportError('libcudart.so.12: cannot open\\nshared object file')")
-    assert training_child._lacking() == "its 'torch' does not load (libcudart.so.12: cannot open shared object file)"
+    assert training_check.lacking() == "its 'torch' does not load (libcudart.so.12: cannot open shared object file)"
     torch.write_text("import of_torch")
     importlib.invalidate_caches()
-    assert training_child._lacking() == "it lacks 'of_torch'"
-    monkeypatch.setattr(training_child.sys, "version_info", (3, 9, 18))
-    assert training_child._lacking().endswith("and 3.11 or newer is needed")
+    assert training_check.lacking() == "it lacks 'of_torch'"
+    monkeypatch.setattr(training_check.sys, "version_info", (3, 9, 18))
+    assert training_check.lacking().endswith("and 3.11 or newer is needed")

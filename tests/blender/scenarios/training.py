@@ -178,16 +178,17 @@ def _in_training(folder: Path, notes=(), before: str = ""):
     child = folder / "child.py"
     child.write_text(
         "import json, shutil, sys, time\n"
-        "if '--check' not in sys.argv:\n"
-        "    settings = json.load(sys.stdin)\n"
-        "    assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
-        "    print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
-        f"    print(json.dumps({{'notes': {list(notes)!r}}}), flush=True)\n"
-        f"    {before or 'pass'}\n"
-        "    time.sleep(1)\n"
-        f"    shutil.copy({MODEL!r}, settings['out'])\n"
+        "settings = json.load(sys.stdin)\n"
+        "assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
+        "print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
+        f"print(json.dumps({{'notes': {list(notes)!r}}}), flush=True)\n"
+        f"{before or 'pass'}\n"
+        "time.sleep(1)\n"
+        f"shutil.copy({MODEL!r}, settings['out'])\n"
     )
-    training_job.CHILD = child
+    check = folder / "check.py"
+    check.write_text(f"print({training_job.CAN!r})")
+    training_job.CHILD, training_job.CHECK = child, check
     operator.training_python = lambda: shutil.which("python3") or sys.executable
     scenes.empty()
     rig = scenes.armature()

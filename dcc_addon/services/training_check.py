@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run by a Python to say whether it can train; written so that the oldest reads it too, which is to say that it is too old."""
+
+import importlib
+import sys
+
+PYTHON = (3, 11)
+"""The oldest that the packages run with."""
+CAN = "this Python can train"
+"""What no other program says that ends well."""
+
+
+def lacking():
+    """Why this Python cannot train, empty where it can."""
+    if tuple(sys.version_info[:2]) < PYTHON:
+        return "it is Python " + sys.version.split()[0] + ", and " + ".".join(map(str, PYTHON)) + " or newer is needed"
+    for needed in ("torch", "warp", "onnx", "usd.models.train"):
+        try:
+            importlib.import_module(needed)
+        except ModuleNotFoundError as error:
+            return "it lacks '" + str(error.name) + "'"
+        except Exception as error:  # a library that its compiled part asks for is missing, say
+            return "its '" + needed + "' does not load (" + (" ".join(str(error).split()) or type(error).__name__) + ")"
+    return ""
+
+
+def main():
+    """Say so: the fact to standard error, with exit status 1, or `CAN`."""
+    fact = lacking()
+    (sys.stderr if fact else sys.stdout).write((fact or CAN) + "\n")
+    return 1 if fact else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
