@@ -5,13 +5,34 @@ import math
 
 from neuralocks_core.evaluation.report import LABELS, Card
 
+SHOWN = (
+    "stretch_percent_max",
+    "penetration_percent",
+    "penetration_3mm_percent",
+    "penetration_worst_mm",
+    "inside_at_rest_percent",
+    "droop_cm",
+    "speed_cm_s",
+    "swing_percent",
+    "settling_s",
+    "jitter_mm",
+)
+"""What an artist can see in the hair and do something about; energies, say, are for who compares solvers."""
+
 
 def lines_of(card: Card) -> list[str]:
     """One line a measure, without those that could not be measured; then the notes."""
     lines = []
     for values in card.grooms.values():
-        for key, (label, unit, _) in LABELS.items():
+        for key in SHOWN:
+            label, unit, _ = LABELS[key]
             value = values.get(key)
             if isinstance(value, (int, float)) and math.isfinite(value):
-                lines.append(f"{label}: {value:.3g} {unit}".rstrip())
+                lines.append(f"{label}: {_plain(value)} {unit}".rstrip())
     return [*lines, *card.notes]
+
+
+def _plain(value: float) -> str:
+    """A number to three digits, of which two at most are after the point; what is less than these is 0."""
+    places = 2 if abs(value) < 10 else 1 if abs(value) < 100 else 0
+    return f"{round(value, places) + 0.0:.{places}f}".rstrip("0").rstrip(".") if places else f"{value:.0f}"

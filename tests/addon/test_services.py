@@ -150,3 +150,26 @@ def test_card_fits_a_sidebar():
         Card("t", {"/Hair": {"droop_cm": 1.234, "settling_s": float("nan"), "strands": 7}}, notes=("n",))
     )
     assert lines == ["droop: 1.23 cm", "n"]
+
+
+def test_card_of_the_panel_has_plain_numbers_that_an_artist_can_use():
+    measured = {
+        "stretch_cm": 5.39e-06,
+        "energy_stretch": 5.01e-09,
+        "stretch_percent_max": 1.2e-05,
+        "penetration_percent": 0.05,
+        "penetration_worst_mm": 1234.5,
+        "droop_cm": -0.0001,
+        "speed_cm_s": 31.42,
+        "swing_percent": 12,
+        "jitter_mm": 100.0,
+    }
+    assert card.lines_of(Card("t", {"/Hair": measured})) == [
+        "length error, largest: 0 %",
+        "vertices in the body: 0.05 %",
+        "worst depth: 1234 mm",
+        "droop: 0 cm",
+        "speed against the head: 31.4 cm/s",
+        "swing of the tips: 12 %",
+        "jitter in a held pose: 100 mm",
+    ]
