@@ -10,7 +10,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.training.work import folder_beside
+from neuralocks_core.training.work import abandon, reserve
 
 from ..live import refresh
 from ..models import SETTING
@@ -124,14 +124,15 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         sampled = yield from sampling(context, named(name))
         armature, target = named(name), named(wanted)
         stop()
-        folder = temporary_folder()
+        folder, out = temporary_folder(), None
         try:
             character = Path(folder.name) / "character.usdc"
             prims = write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
+            out = _reserved(target.name_full)
             settings = {
                 "kind": self.kind,
                 "character": str(character),
-                "out": _out(target.name_full),
+                "out": out,
                 "minutes": scene.neuralocks.train_minutes,
                 "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
                 "head": sampled.character.skeleton.names[sampled.character.head],
@@ -139,6 +140,8 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder, prims))
         except BaseException:
             folder.cleanup()
+            if out is not None:
+                abandon(out)
             raise
         session.trained, session.trained_notes = None, []
         bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
@@ -239,8 +242,10 @@ def watch() -> float | None:
     return 0.5
 
 
-def _out(name: str) -> str:
-    """A new model file beside the .blend, or in the user's own folder while that is not saved."""
+def _reserved(name: str) -> str:
+    """A new model file beside the .blend, or in the user's own folder while that is not saved; reserved, for another Blender may
+    train for a character of the same name, or one may be kept to be resumed on the command line.
+    """
     label = file_label(name)
     folder = (
         Path(bpy.data.filepath).parent
@@ -248,8 +253,7 @@ def _out(name: str) -> str:
         else Path(bpy.utils.user_resource("DATAFILES", path="neuralocks", create=True))
     )
     number = 1
-    # One of this name may be at work in another Blender, or kept to be resumed on the command line.
-    while (out := folder / f"{label}_{number}.neuralocks").exists() or folder_beside(out).exists():
+    while not reserve(out := folder / f"{label}_{number}.neuralocks"):
         number += 1
     return str(out)
 

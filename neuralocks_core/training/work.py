@@ -16,7 +16,7 @@ import numpy as np
 
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import atomic_write, cannot_write
 from neuralocks_core.lock_file import FolderLock
 
 if TYPE_CHECKING:  # what tidies up after a training needs no solver
@@ -47,14 +47,35 @@ def folder_beside(out: Path) -> Path:
     return out.with_name(out.name + ".training")
 
 
+def reserve(out: Path) -> bool:
+    """Make this folder for a training that begins soon, which is to write a new model: no other one chooses its name then. It
+    goes with `abandon`, or as the training ends. False where the name is taken.
+
+    Raises:
+        NeuralocksError: it cannot be made.
+    """
+    work = folder_beside(out)
+    try:
+        work.mkdir()
+        if out.exists():  # looked for now: another training may just have ended
+            work.rmdir()
+            return False
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise cannot_write(work, error) from None
+    return True
+
+
 def abandon(out: str | Path) -> None:
     """Remove what an ended training that nobody is to resume has left beside its model, which may be gigabytes; what another
     training is at work in stays.
     """
     work = folder_beside(Path(out))
-    if work.exists():
-        with suppress(NeuralocksError, OSError), claimed(work):
-            discard(work)
+    with suppress(NeuralocksError, OSError):
+        if work.exists():
+            with claimed(work):
+                discard(work)
 
 
 def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | None:

@@ -8,9 +8,11 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 from unittest import SkipTest
+from unittest.mock import patch
 
 import bpy
 
+from neuralocks_core.errors import NeuralocksError
 from tests.blender import scenes
 from tests.blender.checks import MODEL, messages, refused
 from tests.blender.panel import drawn
@@ -64,13 +66,18 @@ def training_leaves_nothing(folder: Path) -> None:
     from dcc_addon.operators import training as operator
 
     made = "open(settings['out'] + '.training/checkpoint.npz', 'w')"
-    _in_training(folder, before=f"import os; os.mkdir(settings['out'] + '.training'); {made}; sys.exit('broken')")
+    _in_training(
+        folder,
+        before=f"import os; os.makedirs(settings['out'] + '.training', exist_ok=True); {made}; sys.exit('broken')",
+    )
     assert _ended() == ("Hair: training failed: broken", False)
     assert not list(folder.glob("*.training"))
     theirs = folder / "Hair_1.neuralocks.training"
     theirs.mkdir()
     (theirs / "checkpoint.npz").touch()
-    _in_training(folder, before=f"import os; os.mkdir(settings['out'] + '.training'); {made}; time.sleep(60)")
+    _in_training(
+        folder, before=f"import os; os.makedirs(settings['out'] + '.training', exist_ok=True); {made}; time.sleep(60)"
+    )
     ours, end = folder / "Hair_2.neuralocks.training", time.monotonic() + 60
     while not (ours / "checkpoint.npz").exists() and time.monotonic() < end:
         time.sleep(0.05)
@@ -84,6 +91,25 @@ def training_leaves_nothing(folder: Path) -> None:
     finally:
         tempfile.tempdir = exported
     assert operator.job() is None
+
+
+def trained_in_two_blenders(folder: Path) -> None:
+    """Two that train for characters of one name, beside files in one folder, write two models; what is not begun keeps no name."""
+    from dcc_addon.operators import training as operator
+
+    with patch.object(operator, "TrainingJob", side_effect=NeuralocksError("no memory")):
+        try:
+            _in_training(folder)
+        except RuntimeError as error:
+            assert "no memory" in str(error)
+    assert not list(folder.glob("*.training"))
+    _in_training(folder)
+    other, operator._running[:] = operator._running[:], []  # as of another Blender
+    strands = _in_training(folder)
+    assert _ended() == ("Hair: trained", True) and strands.neuralocks_hair.model == "//Hair_2.neuralocks"
+    operator._running[:] = other
+    assert _ended() == ("Hair: trained", True) and strands.neuralocks_hair.model == "//Hair_1.neuralocks"
+    assert not list(folder.glob("*.training"))
 
 
 def training_meanwhile(folder: Path) -> None:

@@ -35,6 +35,23 @@ def test_what_nobody_resumes_is_removed_and_nothing_else(tmp_path):
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
+def test_a_name_is_reserved_once(tmp_path):
+    """Until who has it gives it up; not where there is a model, or a training that somebody may resume."""
+    out, kept = tmp_path / "hair.neuralocks", tmp_path / "kept.neuralocks"
+    assert work.reserve(out) and not work.reserve(out)
+    work.abandon(out)
+    assert not list(tmp_path.iterdir())
+    assert work.reserve(out)
+    with work.claimed(work.folder_beside(out)):  # its training
+        assert not work.reserve(out)
+        out.touch()
+    assert not work.reserve(out) and [path.name for path in tmp_path.iterdir()] == [out.name]
+    _kept(kept)
+    assert not work.reserve(kept)
+    with pytest.raises(NeuralocksError, match="nowhere"):
+        work.reserve(tmp_path / "nowhere" / "hair.neuralocks")
+
+
 @pytest.mark.parametrize("forged", ("[" * 100_000, "[]", '{"seed": 0}', "", "null"))
 def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
     monkeypatch.setattr(work, "_inputs", lambda scene: {"seed": 0, "groom": "a"})
