@@ -24,7 +24,7 @@ from . import body as body_reader
 from . import body_drawn, riding
 from .binding import bind_places, hidden
 from .carried import bodies_of, hairs_of
-from .layers import layer_of, working_in
+from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
@@ -159,6 +159,10 @@ class _Recording:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
         anew, since handlers may have changed them.
         """
+        if not row and (layer := layer_of(named(self.name), self._scene)) is not None:
+            # Blender writes poses back into objects only from what it has evaluated for itself, not in a scene that it has never
+            # shown: what the first frame's reading tags would be at the file's frame.
+            graph_of(self._scene, layer)
         if row and abs(shown_frame(self._scene) - self.frames[row - 1]) > 1e-3:
             step(self._scene, self.frames[row - 1])  # a simulation goes on from the frame before it only
         step(self._scene, self.frames[row])

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Characters that another scene draws, as its set or in an instance of their collection."""
 
+import time
 from pathlib import Path
 from unittest.mock import patch
 
@@ -55,6 +56,33 @@ def drawn_by_another_scene(folder: Path) -> None:
             for frame in (9, 5):
                 other.frame_set(frame)
                 assert same(_seen(bpy.data.objects["Hair"], graph_of(other, other.view_layers[0])), frame), way
+
+
+@patch("dcc_addon.live_strands.at_once", lambda graph: False)
+def shown_before_its_own_scene(folder: Path) -> None:
+    """Of a file that opens in the scene that draws it, hair is sampled in a scene that Blender has never shown, prepared beside
+    Blender, and then is as in its own; also what is of the first frame, where the file was saved at another.
+    """
+    from dcc_addon import background, preparing
+    from dcc_addon.scene.layers import graph_of
+    from dcc_addon.session import session
+
+    scene = _own(None)
+    other = bpy.data.scenes.new("Shot")
+    _set(other, scene)
+    wanted = _seen(bpy.data.objects["Hair"], _shown(scene, 9))
+    poses = session.rigs["Rig"].motion.rotation
+    bpy.context.window.scene = other
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    other, scene = bpy.data.scenes["Shot"], bpy.data.scenes["Scene"]
+    assert bpy.context.scene == other and scene.view_layers[0].depsgraph is None
+    other.frame_set(9)
+    while background.look() is not None or preparing.look() is not None:
+        time.sleep(0.01)
+    assert np.array_equal(session.rigs["Rig"].motion.rotation, poses) and not messages(), messages()
+    got = _seen(bpy.data.objects["Hair"], graph_of(other, other.view_layers[0]))
+    assert all(apart(a, b) < 1e-6 for a, b in zip(got, wanted, strict=True))
 
 
 def not_drawn_by_another_scene(_folder: Path) -> None:
