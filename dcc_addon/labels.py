@@ -30,6 +30,8 @@ def _room(icon: str) -> tuple:
     scale = preferences.system.ui_scale
     if not region or not scale:
         return 40, len
-    blf.size(0, preferences.ui_styles[0].widget_label.points * scale)
+    style = preferences.ui_styles[0]
+    letters = getattr(style, "widget_label", None) or style.widget  # Blender 5 has no style of labels alone
+    blf.size(0, letters.points * scale)
     room = region.width - scale * (MARGINS + (ICON if icon != "NONE" else 0))
     return max(room, scale * LEAST), lambda line: blf.dimensions(0, line)[0]

@@ -12,11 +12,11 @@ def drawn(icon: str = "") -> list[str]:
 
     said = []
     for cls in (*panels.CLASSES, *menu.CLASSES):
-        cls.draw(SimpleNamespace(layout=_Layout(said, icon)), bpy.context)
+        cls.draw(SimpleNamespace(layout=Layout(said, icon)), bpy.context)
     return said
 
 
-class _Layout:
+class Layout:
     """Stands in for Blender's layout, which only a window has: what it is asked for must exist in this Blender."""
 
     def __init__(self, said: list, icon: str = ""):
@@ -37,6 +37,6 @@ class _Layout:
                 return SimpleNamespace(**dict.fromkeys(described.properties.keys()))
             if options.get("text") and self.icon in options.get("icon", ""):
                 self.said.append(options["text"])
-            return _Layout(self.said, self.icon)
+            return Layout(self.said, self.icon)
 
         return asked

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texts in a sidebar of some width."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
+
+import bpy
+
+from tests.blender.panel import Layout
+
+TEXT = "The head is 18 m wide; check the scene's Unit Scale or the armature's scale"
+
+
+def texts_fit_the_sidebar(_folder: Path) -> None:
+    """In letters of this Blender: a wider sidebar needs fewer lines, one almost closed no line for each letter."""
+    from dcc_addon import labels
+
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0), ui_styles=bpy.context.preferences.ui_styles)
+    counts = []
+    for width in (30, 260, 400, 2000):
+        context = SimpleNamespace(region=SimpleNamespace(width=width), preferences=preferences)
+        said = []
+        with patch.object(labels, "bpy", SimpleNamespace(context=context)):
+            counts.append(labels.words(Layout(said), TEXT, "INFO"))
+        assert " ".join(said).replace("\u00a0", " ") == TEXT and len(said) == counts[-1]
+    assert counts == sorted(counts, reverse=True) and counts[0] < 15 and counts[-1] == 1, counts
+    assert 2 < counts[1] < 6, counts
