@@ -22,6 +22,8 @@ CHECK = Path(__file__).with_name("training_check.py")
 ADDON = Path(__file__).resolve().parent.parent
 _NEW_GROUP, _NO_WINDOW = 0x00000200, 0x08000000
 """How Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console of its own."""
+ANSWER = 60
+"""[s] Torch takes so long to load, the first time, from a slow drive."""
 _KILLED = 9
 """The signal of a system that is short of memory."""
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
@@ -46,12 +48,14 @@ def problem(python: str) -> str:
             env=environment(),
             capture_output=True,
             **UTF8,
-            timeout=60,
+            timeout=ANSWER,
             stdin=subprocess.DEVNULL,
             creationflags=_NO_WINDOW if os.name == "nt" else 0,
         )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return f"{python}: cannot be run ({type(error).__name__}); {remedy}"
+    except subprocess.TimeoutExpired:
+        return f"{python}: does not answer within {ANSWER} s; {remedy}"
+    except OSError as error:
+        return f"{python}: cannot be run ({error.strerror or type(error).__name__}); {remedy}"
     if done.returncode:
         lines = [line for line in done.stderr.strip().splitlines() if line]
         return f"{python}: {lines[-1] if lines else 'does not run'}; {remedy}"

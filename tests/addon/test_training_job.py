@@ -150,6 +150,17 @@ def test_a_program_that_is_no_python_cannot_train():
     assert f"{shutil.which('true')}: is no Python; in a Python of" in training_job.problem(shutil.which("true"))
 
 
+def test_why_a_python_cannot_be_asked(tmp_path, monkeypatch):
+    """In words, not names of errors."""
+    check = tmp_path / "check.py"
+    check.write_text("import time; time.sleep(60)")
+    monkeypatch.setattr(training_job, "CHECK", check)
+    monkeypatch.setattr(training_job, "ANSWER", 0.2)
+    assert f"{sys.executable}: does not answer within 0.2 s; in a Python of" in training_job.problem(sys.executable)
+    if os.name == "posix":
+        assert f"{check}: cannot be run (Permission denied); in a" in training_job.problem(str(check))
+
+
 def test_a_python_that_can_train_says_so(tmp_path, monkeypatch):
     """Whatever libraries print as they load."""
     modules = ("torch", "warp", "onnx", "usd", "usd.models", "usd.models.train")
