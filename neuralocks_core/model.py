@@ -169,14 +169,16 @@ def _parsed(text: bytes):
 
 
 def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes:
-    if info.file_size > _LARGEST:  # no more than it claims is ever unpacked
+    if info.file_size > _LARGEST:
         raise NeuralocksError(
             f"{path}: {info.filename} claims {info.file_size} bytes, more than a model has; get another copy"
         )
     if info.compress_type not in _PACKED:
         raise NeuralocksError(f"{path}: {info.filename} is packed as in no model; get an undamaged copy")
     try:
-        return archive.read(info)
+        # No more than it claims, and a byte to see its end: zipfile's own `read` unpacks what there is, and cuts that off.
+        with archive.open(info) as file:
+            return file.read(info.file_size + 1)
     except zlib.error as error:
         raise NeuralocksError(
             f"{path}: {info.filename} is damaged ({_first_line(error)}); get an undamaged copy"

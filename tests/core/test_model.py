@@ -4,6 +4,8 @@
 import os
 import random
 import re
+import struct
+import tracemalloc
 import zipfile
 
 import pytest
@@ -45,6 +47,21 @@ def test_what_unpacks_to_more_than_a_model_is_not_unpacked(tmp_path):
     assert bomb.stat().st_size < 10 << 20
     with pytest.raises(NeuralocksError, match=r"tail.onnx claims 68157440 bytes, more than a model has; get another"):
         model.read(bomb)
+
+
+def test_what_unpacks_to_more_than_it_claims_is_unpacked_as_far_as_that(tmp_path):
+    bomb, size = tmp_path / "bomb.neuralocks", 200 << 20
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("model.json", "w") as entry:
+        for _ in range(size >> 20):
+            entry.write(bytes(1 << 20))
+    bomb.write_bytes(bomb.read_bytes().replace(struct.pack("<I", size), struct.pack("<I", 1000)))
+    tracemalloc.start()
+    try:
+        with pytest.raises(NeuralocksError, match="bomb.neuralocks: damaged or no model"):
+            model.read(bomb)
+        assert tracemalloc.get_traced_memory()[1] < 20 << 20
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize("packed", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
