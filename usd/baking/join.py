@@ -15,7 +15,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import first_line, named
-from ..border.stage_files import check_layer_name, check_not_input, one_file, open_stage
+from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_input, one_file, open_stage
 from ..border.units import Border
 from ..shot.gaps import gaps
 from ..shot.made_from import INPUTS, unlike
@@ -105,13 +105,19 @@ class _Part:
 
     def __init__(self, path: Path):
         self.path = path
+        check_file(path)
+        if path.suffix.lower() not in LAYERS:
+            raise self._no_bake()
         with self._named():
             self.layer = Sdf.Layer.FindOrOpen(str(path))
         if self.layer is None:
-            raise NeuralocksError(f"{path}: no such file, or no USD file; check the path")
+            raise NeuralocksError(f"{path}: cannot be read; bake that part again")
         self.grooms = [prim.path for prim in _below(self.layer.pseudoRoot) if self._is_baked(prim)]
         if not self.grooms:
-            raise NeuralocksError(f"{path}: is no bake; give files that neuralocks bake wrote")
+            raise self._no_bake()
+
+    def _no_bake(self) -> NeuralocksError:
+        return NeuralocksError(f"{self.path}: is no bake; give files that neuralocks bake wrote")
 
     @contextmanager
     def _named(self) -> Iterator[None]:

@@ -27,10 +27,7 @@ def open_stage(path) -> Usd.Stage:
         NeuralocksError: it is missing, or no readable USD file.
     """
     path = as_path(path, "path")
-    if not path.exists():
-        raise NeuralocksError(f"{path}: no such file; check the path")
-    if path.is_dir():
-        raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    check_file(path)
     if path.suffix.lower() in EXTENSIONS:
         raise NeuralocksError(
             f"{path}: is a hair file; make a USD groom of it with 'neuralocks import' and add that to a shot"
@@ -43,6 +40,18 @@ def open_stage(path) -> Usd.Stage:
     if stage is None:
         raise NeuralocksError(f"{path}: not a readable USD file; {_remedy(path)}")
     return stage
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is no file.
+
+    Raises:
+        NeuralocksError: it is missing, or a folder.
+    """
+    if not path.exists():
+        raise NeuralocksError(f"{path}: no such file; check the path")
+    if path.is_dir():
+        raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
 
 
 def _remedy(path: Path) -> str:

@@ -164,6 +164,8 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
         stage.OverridePrim(prim[0]).SetCustomDataByKey("neuralocks", prim[1])
         stage.GetRootLayer().Save()
     (tmp_path / "broken.usdc").write_bytes(part.read_bytes()[:-300])
+    (tmp_path / "folder.usdc").mkdir()
+    (tmp_path / "groom.tfx").write_bytes(b"HairAsset Version 2.0")
     elsewhere = write_shot(tmp_path, Recipe(bound="mesh", frames=12), "elsewhere")
     for frames_of, options, said in (
         (
@@ -179,7 +181,9 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
         (None, "shot_alone.usda", "is no bake"),
         (None, "unsampled_alone.usda", "is no bake"),
         (None, "broken.usdc", "broken.usdc: cannot be read"),
-        (None, "missing.usdc", "missing.usdc: cannot be read|no such file"),
+        (None, "missing.usdc", "missing.usdc: no such file; check the path"),
+        (None, "folder.usdc", "folder.usdc: is a folder; name"),
+        (None, "groom.tfx", "groom.tfx: is no bake; give files that neuralocks bake wrote"),
     ):
         second = (
             tmp_path / options if frames_of is None else bake(frames_of, other, model, frames="5:6", **options).path
