@@ -27,6 +27,8 @@ AROUND = 0.25
 SOME = 20
 UNEVEN = 1.02
 """Hair that is stretched so many times more along one axis than along another is told: its strands change their lengths."""
+FLATTENED = 10
+"""Nobody needs to know how many more times than that: nearly flat, it would be millions of percent."""
 
 
 def lies_down(rig: StageRig) -> list[str]:
@@ -69,9 +71,12 @@ def unevenly_scaled(rig: StageRig) -> list[str]:
     code = rig.time_codes[frame]
     placed, joint = rig.source.placement, leaf(rig.source.names[rig.character.carrying_joint])
     what = placed.whose(uneven, code) if uneven(placed.at(code)) else f"joint '{joint}'"
+    much = f"by {ratio[frame] - 1:.0%} more along one axis than"
+    if ratio[frame] >= FLATTENED:
+        much = f"over {FLATTENED} times as much along one axis as"
     return [
-        f"{rig.path}: {what} is scaled unevenly and stretches its hair, at time code {code:g} by {ratio[frame] - 1:.0%} more along "
-        "one axis than along another: strands keep their lengths before that, not in the world; scale it evenly if that shows"
+        f"{rig.path}: {what} is scaled unevenly and stretches its hair, at time code {code:g} {much} "
+        "along another: strands keep their lengths before that, not in the world; scale it evenly if that shows"
     ]
 
 

@@ -194,3 +194,8 @@ def test_hair_that_is_scaled_unevenly_is_told(tmp_path, uneven):
     }.get(uneven)
     said = _said(path, "along one axis")
     assert len(said) == (words is not None) and all(words in note for note in said)
+
+
+def test_hair_that_is_scaled_flat_is_told_without_millions_of_percent(tmp_path):
+    (said,) = _said(write_shot(tmp_path, Recipe(place=np.diag([1e-5, 1, 1, 1]))), "along one axis")
+    assert " over 10 times as much along one axis as along another: " in said and "%" not in said
