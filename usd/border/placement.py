@@ -17,6 +17,18 @@ KEPT = 64
 """So many places of a prim are remembered: in a crowd each groom is held against the same few of each character."""
 
 
+class Unplaced(NeuralocksError):
+    """A prim stands nowhere at some time: its transform, or one above, has zero scale, or is not finite.
+
+    Attributes:
+        prim: the one that was to be placed.
+    """
+
+    def __init__(self, prim: Usd.Prim, what: str):
+        super().__init__(f"{prim.GetPath()}: {what}")
+        self.prim = prim
+
+
 class Placement:
     """Local-to-world transforms of one prim in stage space; evaluated once where nothing above it moves."""
 
@@ -60,7 +72,7 @@ class Placement:
         """Whether the prim can be placed at rest."""
         try:
             return self.reference is not None
-        except NeuralocksError:
+        except Unplaced:
             return False
 
     def whose(self, wrong: Callable[[np.ndarray], bool], time_code: float | None = None) -> str:
@@ -87,7 +99,7 @@ class Placement:
                 code = None if time.IsEarliestTime() else time.GetValue()
                 when = "" if code is None else f" at time code {code:g}"
                 whose = self.whose(wrong, code)
-                raise NeuralocksError(f"{self.prim.GetPath()}: {whose}{when} {fact}; {remedy}")
+                raise Unplaced(self.prim, f"{whose}{when} {fact}; {remedy}")
         return matrix
 
 

@@ -9,7 +9,7 @@ from pxr import Usd
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 
-from ..border.placement import Placement
+from ..border.placement import Placement, Unplaced
 from ..skel.stage_rig import StageRig
 from ..skel.surface import bound_skeleton
 from .attach import Attachment, attach, of_another, off_head, rig_joint
@@ -87,6 +87,17 @@ class HairSearch:
         Raises:
             NeuralocksError: as `attach`; or the curves are named, and those of a skeleton that cannot be used.
         """
+        told = len(self._notes)
+        try:
+            return self._attachment(prim, placement)
+        except Unplaced as error:
+            if self._named or error.prim != prim or bound_skeleton(prim):
+                raise
+            del self._notes[told:]
+            self._far.append(str(error).replace("; ", ", so it is not taken for hair; ", 1))
+            return None
+
+    def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
         path, bound = str(prim.GetPath()), bound_skeleton(prim)
         if self._others and (why := self._clearly_of_another(prim, bound, placement)):
             self._of_others.append(why)
@@ -96,16 +107,12 @@ class HairSearch:
             return self._without(path, bound, bound=True)
         if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
             return self._without(path, own.path, bound=False)
-        if not (bound or self._named) and (why := _nowhere(placement)):
-            self._far.append(why)
-            return None
-        if (
-            self._others
-            and not bound
-            and (other := of_another(prim, self.rigs, self._others.rigs, placement, self._head))
-        ):
-            self._of_others.append(another_carries(path, other))
-            return None
+        if not bound:
+            _ = placement.reference  # before others are read: what lies nowhere is nobody's
+            others = self._others.rigs if self._others else []
+            if others and (other := of_another(prim, self.rigs, others, placement, self._head)):
+                self._of_others.append(another_carries(path, other))
+                return None
         if not self._named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
             return None
@@ -167,12 +174,3 @@ class HairSearch:
     def _unread(self) -> list[Unusable]:
         rigs = self._every
         return find_unusable(rigs[0].source.prim.GetStage(), {rig.path for rig in rigs})
-
-
-def _nowhere(placement: Placement) -> str:
-    """Why curves lie nowhere, such as those that a scale of zero hides; '' if they lie somewhere."""
-    try:
-        _ = placement.reference
-    except NeuralocksError as error:
-        return str(error).replace("; ", ", so it is not taken for hair; ", 1)
-    return ""

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
-from ..border.placement import Placement
+from ..border.placement import Placement, Unplaced
 from ..border.values import as_numbers
 from ..skel.stage_rig import StageRig
 from ..skel.surface import rest_value
@@ -37,11 +37,13 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
 
 def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
     roots = _roots(prim)
-    if not len(roots):
+    try:
+        return bool(len(roots)) and _lies_like_hair(roots, Placement(prim), rigs)
+    except Unplaced:  # as what a scale of zero hides, at first or for a while
         return False
-    placement = Placement(prim)
-    if not placement.usable:
-        return False
+
+
+def _lies_like_hair(roots: np.ndarray, placement: Placement, rigs: Sequence[StageRig]) -> bool:
     for rig in rigs:
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for way in ways(rig, mesh, placement):

@@ -66,17 +66,25 @@ def test_a_character_that_stands_still_stops_nothing_beside_one_that_moves(tmp_p
         read_shot(tmp_path / "shot.usda", ["/doll/Hair"])
 
 
-def test_curves_that_a_scale_of_zero_hides_stop_no_bake_of_others(tmp_path):
+@pytest.mark.parametrize("hidden", [None, 1, 5])
+def test_curves_that_a_scale_of_zero_hides_stop_no_bake_of_others(tmp_path, hidden):
+    """All the time, or from some time code on."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Grass")
-    UsdGeom.Xformable(stage.GetPrimAtPath("/Grass")).AddScaleOp().Set((0, 0, 0))
+    scale = UsdGeom.Xformable(stage.GetPrimAtPath("/Grass")).AddScaleOp()
+    if hidden is None:
+        scale.Set((0, 0, 0))
+    else:
+        for code in (1, 5, 9):
+            scale.Set((0, 0, 0) if code == hidden else (1, 1, 1), code)
     stage.Save()
-    said = "/Grass: its transform has zero scale, so it is not taken for hair; give it a scale above zero"
+    when = "" if hidden is None else f" at time code {hidden}"
+    said = f"/Grass: its transform{when} has zero scale, so it is not taken for hair; give it a scale above zero"
     shot, facts = read_shot(path), inspect(path)
     assert [item.path for item in shot.grooms] == ["/Hero/Hair"] and not facts["stops"]
     assert all(any(note.startswith(said) for note in notes) for notes in (shot.notes, facts["spoils"]))
-    with pytest.raises(NeuralocksError, match="^/Grass: its transform has zero scale; give it"):
+    with pytest.raises(NeuralocksError, match=f"^/Grass: its transform{when} has zero scale; give it"):
         read_shot(path, ["/Grass"])
 
 

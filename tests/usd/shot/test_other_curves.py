@@ -46,9 +46,12 @@ def test_hair_of_other_kinds_is_told(shot, kind):
     assert len(told(shot, "/Hero/Guide")) == len(told(shot, "/Hero/Aura")) == 1
 
 
-def test_what_a_scale_of_zero_hides_stops_no_bake(shot):
+@pytest.mark.parametrize("later", [False, True])
+def test_what_a_scale_of_zero_hides_stops_no_bake(shot, later):
     curves(shot, UsdGeom.NurbsCurves, "/Hero/Locks", strand_points(40, 12))
-    UsdGeom.Xformable(shot.GetPrimAtPath("/Hero/Locks")).AddScaleOp().Set((0, 0, 0))
+    scale = UsdGeom.Xformable(shot.GetPrimAtPath("/Hero/Locks")).AddScaleOp()
+    for code in (1, 5) if later else (5,):
+        scale.Set((1, 1, 1) if code == 1 else (0, 0, 0), code)
     shot.Save()
     assert not told(shot, "/Hero/Locks")
 
