@@ -20,7 +20,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import replace_npz
 from neuralocks_core.materials import RANGES
 from neuralocks_core.network_sizes import K
-from neuralocks_core.training.rollouts import Rollout, RolloutMaker, TrainingScene
+from neuralocks_core.training.rollouts import FINEST, Rollout, RolloutMaker, TrainingScene
 
 
 class RolloutFarm:
@@ -141,6 +141,10 @@ def load(path: Path, scene: TrainingScene | None = None) -> Rollout:
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
             values = {name: arrays[name] for name in arrays.files}
+        if "step" not in values:  # all are of the finest, and what that does not hold is cut off
+            if np.abs(values["moved"]).max(initial=0) >= np.iinfo(np.int16).max:
+                raise ValueError("moved")
+            values["step"] = FINEST
         rollout = Rollout(
             **{
                 **values,

@@ -17,7 +17,7 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.network_sizes import K
 from neuralocks_core.training import checkpoint, farm, methods
-from neuralocks_core.training.rollouts import Rollout
+from neuralocks_core.training.rollouts import FINEST, Rollout
 
 
 def farm_of(monkeypatch, folder, *processes):
@@ -97,9 +97,8 @@ def _rollout() -> Rollout:
     numbers = np.random.default_rng(0)
     planes, moved = numbers.normal(size=(5, 3, K, 4)).astype(np.float16), np.zeros((5, 3, K, 3), np.int16)
     rest, vectors = np.zeros((3, K, 3), np.float32), np.zeros((5, 8), np.float32)
-    return Rollout(
-        0, np.arange(3), rest, 1, vectors, vectors[0], moved, 1e-4, planes, 0.1, np.zeros((3, 4), np.float32)
-    )
+    materials = np.zeros((3, 4), np.float32)
+    return Rollout(0, np.arange(3), rest, 1, vectors, vectors[0], moved, 2 * FINEST, planes, 0.1, materials)
 
 
 _OF = SimpleNamespace(grooms=(SimpleNamespace(rest=np.zeros((3, K, 3))),), spec=SimpleNamespace(size=8))
@@ -126,9 +125,22 @@ def test_a_simulation_of_something_else_says_what_to_do(tmp_path, other):
     path = tmp_path / "000000.npz"
     farm.save(path, _rollout())
     assert np.array_equal(farm.load(path, _OF).planes, _rollout().planes)
+    assert farm.load(path, _OF).step == 2 * FINEST
     farm.save(path, replace(_rollout(), **other))
     with pytest.raises(NeuralocksError, match="000000.npz: this simulation cannot be read; delete it"):
         farm.load(path, _OF)
+
+
+@pytest.mark.parametrize("most", [32766, 32767])
+def test_a_simulation_that_names_no_step_is_gone_on_from_where_nothing_is_cut_off(tmp_path, most):
+    """Those of a training that was begun before steps were kept: to delete each of hundreds would be the remedy."""
+    path, arrays = tmp_path / "000000.npz", vars(replace(_rollout(), moved=np.full((5, 3, K, 3), -most, np.int16)))
+    np.savez(path, **{name: array for name, array in arrays.items() if name != "step"})
+    if most < 32767:
+        assert farm.load(path, _OF).step == FINEST
+    else:
+        with pytest.raises(NeuralocksError, match="000000.npz: this simulation cannot be read; delete it"):
+            farm.load(path, _OF)
 
 
 class _Scene:
