@@ -57,6 +57,7 @@ class HairSearch:
         self._controls: list[str] = []
         self._off_head: list[str] = []
         self._of_others: list[str] = []
+        self._far_off: list[tuple[Usd.Prim, Placement, Attachment]] = []
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
@@ -71,6 +72,17 @@ class HairSearch:
     def of_others(self) -> list[str]:
         """The notes on hair of other skeletons than the named one."""
         return few(self._of_others, "grooms are not its hair")
+
+    def nobodys(self) -> list[str]:
+        """Why hair far from the named skeleton is not taken for its hair, the nearest first, without that of the others, which
+        are read for it: where it has no hair, its own may lie elsewhere.
+        """
+        nearest = sorted(self._far_off, key=lambda each: each[2].far)
+        return [
+            too_far(prim, found)
+            for prim, placement, found in nearest
+            if self._others and not of_another(prim, self.rigs, self._others.rigs, placement, self._head)
+        ]
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
         """The curves that have points, with a note on the others, and are not closed."""
@@ -142,7 +154,10 @@ class HairSearch:
             found = attach(prim, self.rigs, placement, self._head, [])
         except NeuralocksError:  # told below, unless it is another's
             return ""
-        return far_from_named(prim, found) if found.far else ""
+        if not found.far:
+            return ""
+        self._far_off.append((prim, placement, found))
+        return far_from_named(prim, found)
 
     def _without(self, path: str, skeleton: str, bound: bool) -> None:
         """Leave out the curves of a skeleton that cannot be used.

@@ -132,9 +132,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
     if not found:
-        raise NeuralocksError(
-            (*no_hair, f"{skeleton}: carries no groom; choose another skeleton, or name the groom")[0]
-        )
+        nothing = f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
+        raise NeuralocksError((*no_hair, *search.nobodys(), nothing)[0])
     notes += no_hair + search.off_heads() + search.of_others()
     if not grooms:
         found = _moving(found, notes)

@@ -74,3 +74,14 @@ def test_a_skeleton_without_hair_in_a_crowd_is_told_so(tmp_path):
     stage.Save()
     with pytest.raises(skeletons.NeuralocksError, match="^/bob/Model/Rig: carries no groom; choose another skeleton"):
         read_shot(path, skeleton="/bob/Model/Rig")
+
+
+def test_a_skeleton_whose_own_hair_lies_elsewhere_is_told_so(tmp_path):
+    path = _crowd(tmp_path, "none")
+    stage = Usd.Stage.Open(path)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/bob/Model/Hair")).AddTranslateOp().Set(Gf.Vec3d(0, 0, 5))
+    stage.Save()
+    with pytest.raises(
+        skeletons.NeuralocksError, match="^/bob/Model/Hair: lies 4.99 m from joint 'head' of /bob/.* no skin"
+    ):
+        read_shot(path, skeleton="/bob/Model/Rig")
