@@ -29,6 +29,8 @@ PACKED = {
     b"\x28\xb5\x2f\xfd": "zstd",
 }
 """How packed files begin, of which none is read."""
+PACKED_NAMES = ("", *EXTENSIONS, ".gz", ".zip", ".bz2", ".xz", ".zst")
+"""Endings of names of grooms that are packed: much else is, such as a model."""
 
 SCALP = 0.16
 """Width of a narrow scalp [m]."""
@@ -137,7 +139,7 @@ def _raw(path: Path, content: bytes) -> RawGroom:
     except NeuralocksError:
         # Asked only now: a format whose files begin with a number may begin with any.
         packed = next((name for begin, name in PACKED.items() if content.startswith(begin)), None)
-        if packed is None:
+        if packed is None or path.suffix.lower() not in PACKED_NAMES:
             raise
         raise bad_file(str(path), f"is packed ({packed})", "unpack it first") from None
 

@@ -91,6 +91,13 @@ def test_packed_files_are_called_so(folder, name, pack):
         formats.read(put(folder, name, content))
 
 
+@pytest.mark.parametrize("name", ["hair.neuralocks", "arrays.npz", "hair.docx"])
+def test_what_is_packed_and_no_groom_is_not_to_be_unpacked(folder, name):
+    """A model, for one, is a zip."""
+    with pytest.raises(NeuralocksError, match="is not a known groom file, by content or by name; give .tfx"):
+        formats.read(put(folder, name, b"PK\x03\x04" + bytes(100)))
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_every_truncation_is_noticed(folder, name):
     content = FILES[name]
