@@ -18,4 +18,5 @@ def check_training() -> None:
         except ModuleNotFoundError as error:
             raise NeuralocksError(f'train: {error.name} is not installed; pip install "neuralocks[train]"') from None
         except (ImportError, OSError) as error:  # a library that its compiled part asks for, say; on Windows an OSError
-            raise NeuralocksError(f"train: {name} does not load ({error}); install it anew") from None
+            why = " ".join(str(error).split()) or type(error).__name__
+            raise NeuralocksError(f"train: {name} does not load ({why}); install it anew") from None
