@@ -58,6 +58,7 @@ class HairSearch:
         self._off_head: list[str] = []
         self._of_others: list[str] = []
         self._far_off: list[tuple[Usd.Prim, Placement, Attachment]] = []
+        self._bound_off: list[tuple[str, str]] = []
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
@@ -74,14 +75,18 @@ class HairSearch:
         return few(self._of_others, "grooms are not its hair")
 
     def nobodys(self) -> list[str]:
-        """Why hair far from the named skeleton is not taken for its hair, the nearest first, without that of the others, which
-        are read for it: where it has no hair, its own may lie elsewhere.
+        """Why hair that no other skeleton carries is not taken for the named one's, the nearest first: where that has no hair, its
+        own may lie elsewhere, or be bound to what cannot be used. The others are read for it.
         """
+        if not (self._far_off or self._bound_off):
+            return []
+        others = self._others.rigs if self._others else []
+        usable = {rig.path for rig in others}
         nearest = sorted(self._far_off, key=lambda each: each[2].far)
-        return [
+        return [unusable_skeleton(path, own, bound=True) for path, own in self._bound_off if own not in usable] + [
             too_far(prim, found)
             for prim, placement, found in nearest
-            if self._others and not of_another(prim, self.rigs, self._others.rigs, placement, self._head)
+            if not of_another(prim, self.rigs, others, placement, self._head)
         ]
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
@@ -149,7 +154,10 @@ class HairSearch:
     def _clearly_of_another(self, prim: Usd.Prim, bound: str | None, placement: Placement) -> str:
         """Why curves are not the named skeleton's, where that is clear without a look at the others; '' if it is not."""
         if bound:
-            return "" if any(rig.path == bound for rig in self.rigs) else another_binds(str(prim.GetPath()), bound)
+            if any(rig.path == bound for rig in self.rigs):
+                return ""
+            self._bound_off.append((str(prim.GetPath()), bound))
+            return another_binds(str(prim.GetPath()), bound)
         try:
             found = attach(prim, self.rigs, placement, self._head, [])
         except NeuralocksError:  # told below, unless it is another's

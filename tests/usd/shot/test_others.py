@@ -85,3 +85,15 @@ def test_a_skeleton_whose_own_hair_lies_elsewhere_is_told_so(tmp_path):
         skeletons.NeuralocksError, match="^/bob/Model/Hair: lies 4.99 m from joint 'head' of /bob/.* no skin"
     ):
         read_shot(path, skeleton="/bob/Model/Rig")
+
+
+def test_a_skeleton_whose_hair_is_bound_to_what_cannot_be_used_is_told_so(tmp_path):
+    path = _crowd(tmp_path, "own")
+    stage = Usd.Stage.Open(path)
+    stage.GetPrimAtPath("/bob/Model/Hair").SetActive(False)
+    stage.GetPrimAtPath("/cy/Model/Rig").GetAttribute("joints").Set([])
+    stage.Save()
+    with pytest.raises(
+        skeletons.NeuralocksError, match="^/cy/Model/Hair: is bound to /cy/Model/Rig, which cannot be used"
+    ):
+        read_shot(path, skeleton="/bob/Model/Rig")
