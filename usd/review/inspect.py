@@ -31,6 +31,7 @@ from ..shot.character_notes import lies_down, without_body
 from ..shot.curve_ends import groom_between, undrawn
 from ..shot.curves import find_curves, rest_counts
 from ..shot.gaps import gaps
+from ..shot.groom_notes import groom_notes
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom, no_skeleton
 from ..shot.made_from import baked_from_others
@@ -39,7 +40,6 @@ from ..shot.notes import (
     another_head,
     composition_notes,
     few,
-    groom_notes,
     layer_notes,
     left_out,
     not_animated,

@@ -16,7 +16,8 @@ from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
 from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
-from .notes import another_binds, another_carries, far_from_named, few, no_points, too_far, unusable_skeleton
+from .groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
+from .notes import few
 from .other_curves import other_hair
 from .others import Others
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open

@@ -12,18 +12,15 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import joints_read
 from neuralocks_core.boundary_spec import POSE_JOINTS
 from neuralocks_core.character import HEAD_WIDTHS
-from neuralocks_core.groom import Groom
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rotation import flat
 from neuralocks_core.stepped import Stepped
-from neuralocks_core.strands.arclength import count_pointlike
 
 from ..border.damage import text_of
 from ..border.stage_files import unsaved
 from ..border.units import Border
 from ..skel.stage_rig import StageRig
 from .alike import one_person
-from .attach import Attachment, rig_joint
 
 UNIT = UsdGeom.Tokens.metersPerUnit
 FEW = 3
@@ -110,58 +107,11 @@ def few(lines: list[str], others: str = "prims are left out like that") -> list[
     return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more {others}"]
 
 
-def no_points(path: str) -> str:
-    """The note on a prim of curves without points, beside others that have some."""
-    return f"{path}: the curves have no points; left out"
-
-
 def not_animated(rig: StageRig) -> str:
     """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with that one."""
     ignored = rig.source.ignored
     why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
     return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
-
-
-def stands_still(path: str, rig: StageRig) -> str:
-    """The note on a groom whose character is not animated, beside others that are."""
-    return f"{path}: {rig.path}, which carries it, has no animation; left out"
-
-
-def another_carries(path: str, rig: StageRig) -> str:
-    """The note on a groom that another skeleton carries than the one the user named."""
-    return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
-
-
-def another_binds(path: str, own: str) -> str:
-    """The note on a groom that is bound to another skeleton than the one the user named."""
-    return f"{path}: is bound to {own}; left out, or name it with --groom"
-
-
-def far_from_named(prim: Usd.Prim, found: Attachment) -> str:
-    """The note on a groom that lies too far from the skeleton that the user named to be its hair."""
-    return (
-        f"{prim.GetPath()}: lies {found.far:.3g} m from the head of {found.rig.path}; left out, or name it with --groom"
-    )
-
-
-def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> str:
-    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it. Why it is
-    refused, where its user named it.
-    """
-    how, unbound = ("is bound to", "unbind the hair and ") if bound else ("lies on the character of", "")
-    fact = "cannot be used, as neuralocks inspect explains" if named else "cannot be used, and is left out with it"
-    return f"{path}: {how} {own}, which {fact}; mend that skeleton, or {unbound}name another for it with --groom and --skeleton"
-
-
-def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
-    """The note on curves that start too far from any head to be taken for hair, unless their user named them."""
-    where = (
-        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(rig_joint(found))}' of {found.rig.path} "
-        f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}"
-    )
-    if named:
-        return f"{where}, and keeps that distance; put it where the head is in the bind pose or the shot's first frame"
-    return f"{where}, so it is not taken for hair; if it is, name it with --groom"
 
 
 def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
@@ -303,24 +253,3 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
         f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, {much} within {first:g} to "
         f"{last:g}: {held}; check --frames, the shot's range and the layer offsets"
     ]
-
-
-def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
-    """The notes on strands without length and on lengths that no hair has."""
-    path = str(prim.GetPath())
-    notes = []
-    filled = np.flatnonzero(groom.counts > 0)
-    spread = np.zeros(groom.strand_count, np.float32)
-    low = np.minimum.reduceat(groom.points, groom.starts[filled])
-    high = np.maximum.reduceat(groom.points, groom.starts[filled])
-    spread[filled] = (high - low).max(axis=1)
-    still = count_pointlike(groom)
-    if still:
-        notes.append(
-            f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"
-        )
-    longest = float(spread.max())
-    if longest > 2.5 or 0 < longest < 0.002:  # points alone tell nothing of a unit
-        remedy = border.foreign(prim.GetAttribute("points")) or "; check the stage's metersPerUnit"
-        notes.append(f"{path}: the longest strand reaches {longest:.3g} m{remedy}")
-    return notes

@@ -22,18 +22,17 @@ from .attach import Attachment, off_head, rig_joint
 from .character_notes import lies_down, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
+from .groom_notes import groom_notes, stands_still
 from .hair_search import HairSearch
 from .lacking import no_groom, no_skeleton
 from .notes import (
     composition_notes,
     few,
-    groom_notes,
     layer_notes,
     left_out,
     not_animated,
     partial_body,
     rig_notes,
-    stands_still,
     without_turn,
 )
 from .others import Others

@@ -14,7 +14,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.strands.arclength import resample
 from usd.border.units import Border
 from usd.review.inspect import groom_facts, inspect
-from usd.shot.notes import groom_notes
+from usd.shot.groom_notes import groom_notes
 from usd.shot.stage import read_rigs, read_shot
 
 from ..shots import HEAD, POSITIONS, Recipe, write_shot
