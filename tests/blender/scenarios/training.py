@@ -170,11 +170,13 @@ def remedy_followed(folder: Path) -> None:
     from dcc_addon.operators import training as operator
     from dcc_addon.services import trainers, training_job
 
-    there, child = folder / "torch", folder / "child.py"
-    child.write_text(f"import os, sys; os.path.exists({str(there)!r}) or sys.exit('it lacks torch')")
+    there, check = folder / "torch", folder / "check.py"
+    check.write_text(
+        f"import os, sys\nos.path.exists({str(there)!r}) or sys.exit('it lacks torch')\nprint({training_job.CAN!r})"
+    )
     python = shutil.which("python3") or sys.executable
-    kept = training_job.CHILD, operator.training_python, trainers.AGAIN
-    training_job.CHILD, operator.training_python, trainers.AGAIN = child, lambda: python, 0.5
+    kept = training_job.CHECK, operator.training_python, trainers.AGAIN
+    training_job.CHECK, operator.training_python, trainers.AGAIN = check, lambda: python, 0.5
     operator._trainers = trainers.Trainers()
     try:
         assert operator.known_problem() is None and bpy.app.timers.is_registered(operator.await_answer)
@@ -182,7 +184,7 @@ def remedy_followed(folder: Path) -> None:
         there.touch()
         assert not _told(lambda said: not said)
     finally:
-        training_job.CHILD, operator.training_python, trainers.AGAIN = kept
+        training_job.CHECK, operator.training_python, trainers.AGAIN = kept
 
 
 def _told(until) -> str:
