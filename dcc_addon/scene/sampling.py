@@ -159,7 +159,8 @@ class _Recording:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
         anew, since handlers may have changed them.
         """
-        if not row and (layer := layer_of(named(self.name), self._scene)) is not None:
+        layer = None if row else layer_of(named(self.name), self._scene)
+        if layer is not None and layer.depsgraph is None:
             # Blender writes poses back into objects only from what it has evaluated for itself, not in a scene that it has never
             # shown: what the first frame's reading tags would be at the file's frame.
             graph_of(self._scene, layer)
