@@ -8,12 +8,13 @@ import traceback
 import bpy
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
-from ..services.remaining import Remaining, in_words
+from ..services.remaining import in_words
 from ..session import session
 
 SLICE = 0.06
@@ -83,7 +84,7 @@ class Stepwise(Hardened):
         if session.working:
             self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
             return {"CANCELLED"}
-        self._steps, self._remaining = self.steps(context), Remaining()
+        self._steps, self._left = self.steps(context), TimeLeft()
         session.working = self.bl_label
         _running[:] = [self]
         background.request()  # what is half sampled begins anew afterwards
@@ -126,9 +127,9 @@ class Stepwise(Hardened):
             while time.perf_counter() < end:
                 done, total, message = next(self._steps)
             share = done / max(total, 1)
-            self._remaining.told(share)
+            self._left.told(share)
             context.window_manager.progress_update(1000 * share)
-            left = in_words(self._remaining.seconds)
+            left = in_words(self._left.seconds)
             context.workspace.status_text_set(f"{message}  {100 * share:.0f} %{left}   Esc: cancel")
         except StopIteration as stop:
             self._done = True

@@ -11,9 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.time_left import TimeLeft
 from neuralocks_core.training.work import abandon
 
-from .remaining import Remaining
 from .training_check import CAN
 from .training_child import AROUND, LEARNED
 
@@ -105,8 +105,8 @@ class TrainingJob:
         self.notes: list[str] = []
         self.lines = 1
         least = LEARNED + AROUND if settings.get("kind") == "rig" else 0.0
-        self._before = Remaining()
-        self._remaining = Remaining(max(least, 60 * settings["minutes"]))
+        self._before = TimeLeft()
+        self._left = TimeLeft(max(least, 60 * settings["minutes"]))
         self._cancelled = False
         group = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP | _NO_WINDOW}
         try:
@@ -145,7 +145,7 @@ class TrainingJob:
     def seconds_left(self) -> float:
         """Estimate from what is done so far; before anything is, from the time that it was given, and what comes before."""
         before = 0.0 if self.done else self._before.seconds or 0.0
-        return before + self._remaining.seconds
+        return before + self._left.seconds
 
     def cancel(self) -> None:
         """Stop it, with the processes that it started, and leave nothing of it; without effect on the model of one that has
@@ -195,7 +195,7 @@ class TrainingJob:
                     self._before.told(float(said["before"]))
                 else:
                     self.done = float(said.get("done", self.done))
-                    self._remaining.told(self.done)
+                    self._left.told(self.done)
                     self.message = str(said.get("message", self.message))
 
     def _drain(self) -> None:

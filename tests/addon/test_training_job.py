@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from dcc_addon.services import remaining, training_check, training_job
+from dcc_addon.services import training_check, training_job
+from neuralocks_core import time_left
 from neuralocks_core.errors import NeuralocksError
 
 CHILD = """
@@ -70,8 +71,8 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
 
 
 def test_what_comes_before_the_training_counts_too(job, monkeypatch):
-    monkeypatch.setattr(remaining, "KNOWN", 0.0)
     running = job("early")
+    running._before = time_left.TimeLeft(after=0.0)
     _wait(lambda: running.message == "first")
     assert running.seconds_left == 900
     _wait(lambda: running.seconds_left > 900)
@@ -112,8 +113,8 @@ def test_one_that_ends_before_it_has_heard_what_to_do_is_told_of(monkeypatch, tm
 
 def test_time_left_is_known_before_anything_is_learned(job, monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(remaining.time, "monotonic", lambda: clock[0])
-    left = remaining.Remaining(900)
+    monkeypatch.setattr(time_left.time, "monotonic", lambda: clock[0])
+    left = time_left.TimeLeft(900)
     said = []
     for now, done in [(0, 0.0), (60, 0.0), (65, 0.0), (74, 0.01), (110, 0.05), (515, 0.5)]:
         clock[0] = now

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from neuralocks_core.time_left import TimeLeft
+
 from ..border.stopping import check
 
 QUIET_FOR = 2.0
@@ -36,22 +38,17 @@ class _Log:
     """A line now and then, with the time left at the speed so far."""
 
     def __init__(self, title: str):
-        self._title = title
-        self._written = self._since = time.monotonic()
-        # A resumed job begins in the middle, one step follows another, and some prepare long before they begin: only
-        # what is done of this step, since it got going, tells the speed.
-        self._first, self._last = 0, (0, -1)
+        self._title, self._written = title, time.monotonic()
+        # A bake's first frame takes as long as a hundred others; from it alone the estimate would be hours.
+        self._left = TimeLeft(enough=0.01, after=0.0)
 
     def __call__(self, done: int, total: int, message: str = "") -> None:
         now = time.monotonic()
-        if total != self._last[1] or done < self._last[0] or done == self._first:
-            self._since, self._first = now, done
-        self._last = done, total
+        self._left.told(done, total, now)
         if now - self._written <= LOG_EVERY:
             return
-        self._written, gone = now, done - self._first
-        # A bake's first frame takes as long as a hundred others; from it alone the estimate would be hours.
-        left = f", {(now - self._since) * (total - done) / gone / 60:.1f} min left" if 100 * gone > total else ""
+        self._written, seconds = now, self._left.seconds
+        left = "" if seconds is None else f", {seconds / 60:.1f} min left"
         print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
 
     def close(self) -> None:

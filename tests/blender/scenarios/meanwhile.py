@@ -200,8 +200,8 @@ def posed_without_a_key(_folder: Path) -> None:
 def _begun(steps):
     """The work of an operator, begun as in a window."""
     from dcc_addon.operators import base
-    from dcc_addon.services.remaining import Remaining
     from dcc_addon.session import session
+    from neuralocks_core.time_left import TimeLeft
 
     class Work(base.Stepwise):
         bl_label = "Work"
@@ -211,7 +211,7 @@ def _begun(steps):
 
     work, manager = Work(), bpy.context.window_manager
     work._timer, work._steps = manager.event_timer_add(0.01, window=bpy.context.window), steps
-    work._remaining = Remaining()
+    work._left = TimeLeft()
     session.working = work.bl_label
     base._running[:] = [work]
     while next(steps)[2] == "Loading USD":
