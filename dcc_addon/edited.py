@@ -115,8 +115,8 @@ def _applied(hair, before: Written) -> list[str]:
 def _refuse(hair, what: str) -> None:
     hair.neuralocks_hair.live = False
     raise NeuralocksError(
-        f"{hair.name_full}: {what} while it was moved, which is lost, for its rest shape cannot follow; "
-        "undo, and do it with Live off"
+        f"{hair.name_full}: {what} while Live was on, and that change is lost, since its rest shape cannot follow; "
+        "undo, turn Live off, and do it again"
     )
 
 

@@ -67,7 +67,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     if hair.mode in EDITING:
         _restore(hair)
         session.hairs.pop(hair.name_full, None)
-        raise NeuralocksError(f"{hair.name_full}: the hair is being edited; live goes on when you leave the mode")
+        raise NeuralocksError(f"{hair.name_full}: the hair is being edited; Live resumes when you leave this mode")
     sampled = session.rigs.get(armature.name_full)
     if sampled is None:
         raise unsampled(armature.name_full)

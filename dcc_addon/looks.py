@@ -45,7 +45,7 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
         raise NeuralocksError(left_out[0])
     found = {name for names in looks.values() for name in names}
     told = [
-        f"{name}: it is hidden in renders, and so invisible in the file; if it is to be drawn, show it in renders and bake again"
+        f"{name}: it is hidden in renders, so it is invisible in the file; to have it drawn, show it in renders and bake again"
         for name in undrawn
         if name in found
     ]

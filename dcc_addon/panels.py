@@ -19,9 +19,7 @@ from .services.sliders import SLIDERS
 from .session import session
 from .unsampled import FIRST
 
-STRETCHED = (
-    "Time Stretching was changed since it was baked, and it plays the motion of before; press Bake and Attach again"
-)
+STRETCHED = "Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -83,7 +81,7 @@ def _motion(layout, armature, scene) -> None:
         first, last = sampled.motion.frames[[0, -1]]
         if not first <= scene.frame_current <= last:
             words(
-                layout, f"Hair knows the motion of frames {first:g} to {last:g} only; widen the scene's range", "INFO"
+                layout, f"Hair only knows the motion of frames {first:g} to {last:g}; widen the scene's range", "INFO"
             )
     if sampled is not None:
         for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off, *sampled.hairs_off.values()):
@@ -127,11 +125,11 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         if prepared is not None and (fact := prepared.hair.another_body):
             words(
                 layout,
-                f"The model was trained on another body: {fact}; train one for this character if it shows",
+                f"The model was trained on another body: {fact}; if it shows, train one for this character",
                 "INFO",
             )
         if off := off_meanwhile(hair):
-            words(layout, f"Off meanwhile, or the hair would move twice: {', '.join(off)}", "INFO")
+            words(layout, f"Off while Live, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)
         for slider in SLIDERS:
             column.prop(own, slider.name, slider=True)
@@ -140,7 +138,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         row.prop(own, "resolve")
         sampled = session.rigs.get(own.armature.name_full) if own.armature is not None else None
         if own.resolve and sampled is not None and sampled.character.body is None:
-            words(layout, "No body mesh is found; choose it above", "INFO")
+            words(layout, "No body mesh found; choose it above", "INFO")
         layout.operator("neuralocks.reset_look", text="Reset", icon="LOOP_BACK")
         layout.operator("neuralocks.report_card", text="Report Card", icon="PRESET")
         for line in session.cards.get(hair.name_full, ()):
@@ -189,7 +187,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
             layout.label(text="Choose a character first", icon="INFO")
             return
         own = armature.neuralocks_character
-        layout.prop(own, "chains", **hint("Found by themselves"))
+        layout.prop(own, "chains", **hint("Found automatically"))
         layout.operator("neuralocks.find_chains", icon="BONE_DATA")
         for line in session.cards.get(armature.name_full, ()):
             words(layout, line, "NONE")

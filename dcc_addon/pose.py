@@ -53,8 +53,8 @@ def _tell_late(name: str) -> None:
     evaluates over the keys of the frame in view, too late for the hair.
     """
     message = (
-        f"{name}: the render poses it otherwise than the view, and hair may be off; if a script poses it after each frame "
-        "change (frame_change_post), let it do so before (frame_change_pre)"
+        f"{name}: the render poses it differently from the view, so hair may be wrong; if a script poses it after each "
+        "frame change (frame_change_post), make it do so before (frame_change_pre)"
     )
     if session.messages.get(name) != message:
         session.messages[name] = message

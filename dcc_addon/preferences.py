@@ -24,7 +24,7 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "python")
         problem = known_problem()
         if problem is None:
-            column.label(text="Looking for what training needs", icon="TIME")
+            column.label(text="Checking what training needs", icon="TIME")
         else:
             words(column, problem or "Ready to train", "INFO" if problem else "CHECKMARK")
         if problem:

@@ -106,7 +106,7 @@ class HairSettings(bpy.types.PropertyGroup):
     )
     resolve: BoolProperty(
         name="Keep out of Body",
-        description="Push hair out of the body where the motion has brought it in, live and in bakes",
+        description="Push hair out of the body, live and in bakes",
         default=True,
         update=_look_changed,
         **SETTING,
@@ -134,7 +134,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
 
     body: PointerProperty(
         name="Body",
-        description="The skin mesh that the armature moves; found when left empty",
+        description="The skin mesh that the armature moves; found automatically if empty",
         type=bpy.types.Object,
         poll=_is_mesh,
         update=_character_changed,
@@ -142,7 +142,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     head_bone: StringProperty(
         name="Head bone",
-        description="The bone that carries the hair; found by name when left empty",
+        description="The bone that carries the hair; found by name if empty",
         update=_character_changed,
         **SETTING,
     )
@@ -168,7 +168,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     chains: StringProperty(
         name="Chains",
-        description="Names of the first hair bones, with * for anything, separated by commas; found when left empty",
+        description="Names of the first hair bones, separated by commas; * matches anything; found automatically if empty",
         update=_rig_model_changed,
         **SETTING,
     )
@@ -178,7 +178,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     rig_motion: FloatProperty(
         name="Motion",
-        description="How much of the movement shows; up to 2, typed in, exaggerates",
+        description="How much of the motion shows; type up to 2 to exaggerate it",
         default=1.0,
         min=0.0,
         max=2.0,
@@ -205,8 +205,8 @@ class SceneSettings(bpy.types.PropertyGroup):
     frame_end: IntProperty(name="End", description="Last frame of the bake", default=250, update=_range_changed)
     subframes: IntProperty(
         name="Samples",
-        description="Samples per frame: more than one for motion blur; a shutter that is open before the "
-        "first frame, or after the last, needs a bake that is a frame longer there",
+        description="Samples per frame: more than one for motion blur. If the shutter is open before the first "
+        "frame, or after the last, bake one more frame there",
         default=1,
         min=1,
         max=16,
@@ -221,8 +221,8 @@ class SceneSettings(bpy.types.PropertyGroup):
     train_minutes: FloatProperty(
         name="Minutes",
         description=(
-            "About how long a training takes. Strands begin with what the shipped model has learned, so five minutes are "
-            "worth it; hair bones begin with nothing, and take two at least; four are enough"
+            "About how long a training takes. Strands start from what the shipped model has learned, so five minutes "
+            "already help; hair bones start from nothing and take at least two; four are enough"
         ),
         default=15.0,
         min=0.05,

@@ -7,7 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .session import session
 
-FIRST = "its motion is sampled first, as soon as nothing plays; then the hair moves"
+FIRST = "its motion is sampled as soon as playback stops; then the hair moves"
 """What an artist has to wait for, and need not see to."""
 
 

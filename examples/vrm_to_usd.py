@@ -67,7 +67,7 @@ def read(path: Path) -> tuple[dict, bytes]:
     data = path.read_bytes()
     magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data.ljust(20))
     if magic != b"glTF" or kind != b"JSON" or 20 + length > len(data):
-        sys.exit(f"{path}: is no binary glTF file (.glb, .vrm); export it as such")
+        sys.exit(f"{path}: is not a binary glTF file (.glb, .vrm); export it as such")
     return json.loads(data[20 : 20 + length]), data[20 + length :]
 
 

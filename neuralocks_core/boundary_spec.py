@@ -65,7 +65,9 @@ class BoundarySpec:
         """
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
-            raise NeuralocksError("model: its boundary history is no list of names and values; get an undamaged copy")
+            raise NeuralocksError(
+                "model: its boundary history is not a list of names and values; get an undamaged copy"
+            )
         if unknown := set(values) - known:
             raise NeuralocksError(f"model: its boundary history has '{min(unknown)}', unknown here; update neuralocks")
         try:

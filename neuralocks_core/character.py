@@ -38,7 +38,7 @@ class Skeleton:
 
     def __post_init__(self):
         if np.mod(np.asarray(self.parents, float), 1).any():
-            raise NeuralocksError("skeleton: a parent is no whole number; give the index of each joint's parent")
+            raise NeuralocksError("skeleton: a parent is not a whole number; give the index of each joint's parent")
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "parents", np.asarray(self.parents, int))
         object.__setattr__(self, "bind", np.asarray(self.bind, float))

@@ -184,7 +184,7 @@ def as_path(given, name: str) -> Path:
     try:
         return Path(given)
     except TypeError:
-        raise NeuralocksError(f"{name}: {given!r} is no path; give text or a pathlib.Path") from None
+        raise NeuralocksError(f"{name}: {given!r} is not a path; give text or a pathlib.Path") from None
 
 
 def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:

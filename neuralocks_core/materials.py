@@ -120,7 +120,7 @@ def _check(name: str, value, said: str) -> None:
     """Refuse a value that a constant cannot have, called as its user calls it."""
     low, high = RANGES[name]
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise NeuralocksError(f"material {said}: {value!r} is no number; give one from {low:g} to {high:g}")
+        raise NeuralocksError(f"material {said}: {value!r} is not a number; give one from {low:g} to {high:g}")
     if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # single precision's ends
         raise NeuralocksError(
             f"material {said}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"

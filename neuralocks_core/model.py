@@ -98,7 +98,7 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
         text = json.dumps({**meta, "format": FORMAT}, indent=1, allow_nan=False)
     except ValueError:
         raise NeuralocksError(
-            f"{path}: its description would hold NaN or infinity, as of a training that ran away; {REMEDIES[meta['kind']]}"
+            f"{path}: its description would hold NaN or infinity, as after a training that diverged; {REMEDIES[meta['kind']]}"
         ) from None
     with atomic_write(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in {"model.json": text.encode(), **graphs}.items():
@@ -124,7 +124,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
             entries = {info.filename: info for info in archive.infolist()}
             if "model.json" not in entries:
                 raise NeuralocksError(
-                    f"{path}: it is no neuralocks model (no model.json inside); choose a .neuralocks file"
+                    f"{path}: it is not a neuralocks model (no model.json inside); choose a .neuralocks file"
                 )
             meta = _parsed(_entry(archive, entries["model.json"], path))
             _check(meta, path, kind)
@@ -147,7 +147,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         RuntimeError,
         RecursionError,
     ) as error:
-        raise NeuralocksError(f"{path}: damaged or no model ({_first_line(error)}); get an undamaged copy") from None
+        raise NeuralocksError(f"{path}: damaged or not a model ({_first_line(error)}); get an undamaged copy") from None
     return ModelFile(path, meta, graphs)
 
 
@@ -156,7 +156,7 @@ def _check_file(path: Path) -> None:
     if stat.S_ISDIR(found.st_mode):
         raise NeuralocksError(f"{path}: is a folder; name the .neuralocks file in it")
     if not stat.S_ISREG(found.st_mode):  # a device has no end, and a pipe may never begin
-        raise NeuralocksError(f"{path}: is no file; choose a .neuralocks file")
+        raise NeuralocksError(f"{path}: is not a file; choose a .neuralocks file")
     if found.st_size > _LARGEST_FILE:
         raise NeuralocksError(f"{path}: has {found.st_size} bytes, more than a model has; choose a .neuralocks file")
 
@@ -174,7 +174,7 @@ def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes
             f"{path}: {info.filename} claims {info.file_size} bytes, more than a model has; get another copy"
         )
     if info.compress_type not in _PACKED:
-        raise NeuralocksError(f"{path}: {info.filename} is packed as in no model; get an undamaged copy")
+        raise NeuralocksError(f"{path}: {info.filename} is not packed as in a model; get an undamaged copy")
     try:
         # No more than it claims, and a byte to see its end: zipfile's own `read` unpacks what there is, and cuts that off.
         with archive.open(info) as file:
@@ -198,7 +198,7 @@ def _check(meta, path: Path, kind: str | None) -> None:
         if meta.get(name) is None:
             meta[name] = kind_of()
         if not isinstance(meta[name], kind_of):
-            raise NeuralocksError(f"{path}: its '{name}' is no {said}; get an undamaged copy of the model")
+            raise NeuralocksError(f"{path}: its '{name}' is not a {said}; get an undamaged copy of the model")
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}
         raise NeuralocksError(

@@ -9,5 +9,5 @@ def plain_number(word, kind=float):
         ValueError: it is none, or one that Python alone takes for it: 1_0, or digits of other scripts, are slips of the pen.
     """
     if isinstance(word, str) and ("_" in word or not word.isascii()):
-        raise ValueError(f"{word!r} is no number")
+        raise ValueError(f"{word!r} is not a number")
     return kind(word)

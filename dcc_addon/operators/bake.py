@@ -41,7 +41,7 @@ def output_path(path: str) -> str:
     chosen = absolute(path)
     full = os.path.abspath(chosen)
     if chosen.endswith(("/", os.sep)) or os.path.isdir(full):
-        raise NeuralocksError(f"{path}: this is a folder; name the file that is to be written in it")
+        raise NeuralocksError(f"{path}: this is a folder; name a file in it")
     if not full.lower().endswith((".usd", ".usda", ".usdc")):
         full += ".usdc"
     folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # the others are made
@@ -110,7 +110,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
 
     free = untaken(Path(full), label, lambda path: any(is_anothers(out, character) for out in _outs(path, len(looks))))
     if free != Path(full):
-        notes.append(f"{full}: it is of another character, and kept; this one is written to {free.name}")
+        notes.append(f"{full}: it belongs to another character and is kept; this bake is written to {free.name}")
     outs = _outs(free, len(looks))
     groups = [(out, *group) for out, group in zip(outs, looks)]
     for out, _, names in groups:
@@ -160,7 +160,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
     bl_label = "Bake to USD"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="USD file to write; the one of the panel when empty", **FILE)
+    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE)
 
     def steps(self, context):
         armature = shown_armature(context)
@@ -179,7 +179,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
     bl_idname = "neuralocks.bake_attach"
     bl_label = "Bake and Attach"
 
-    filepath: StringProperty(name="File", description="USD file to write; the one of the panel when empty", **FILE)
+    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE)
 
     def steps(self, context):
         armature = shown_armature(context)
@@ -202,7 +202,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
-    """Take the baked cache off the hair object again"""
+    """Remove the baked cache from the hair object"""
 
     bl_idname = "neuralocks.detach"
     bl_label = "Remove Hair Cache"

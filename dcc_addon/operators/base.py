@@ -48,7 +48,7 @@ class Hardened:
             self.report({"ERROR"}, for_the_panel(str(error)))
             return {"CANCELLED"}
         except ReferenceError:
-            self.report({"ERROR"}, "Neuralocks: something that is needed was deleted or undone meanwhile; start again")
+            self.report({"ERROR"}, "Neuralocks: something that this needs was deleted or undone meanwhile; start again")
             return {"CANCELLED"}
         except Exception as error:
             traceback.print_exc()
@@ -82,7 +82,7 @@ class Stepwise(Hardened):
         if bpy.app.background:
             return self.execute(context)
         if session.working:
-            self.report({"ERROR"}, f"Neuralocks: {session.working} is still at work; wait for it, or press Esc")
+            self.report({"ERROR"}, f"Neuralocks: {session.working} is still running; wait for it, or press Esc")
             return {"CANCELLED"}
         self._steps, self._left = self.steps(context), TimeLeft()
         session.working = self.bl_label

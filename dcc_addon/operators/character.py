@@ -69,7 +69,7 @@ def _carrier(thing, shown=None):
 
 
 class NEURALOCKS_OT_check(Hardened, bpy.types.Operator):
-    """Look over the rig: which bone is which, and what may spoil the hair"""
+    """Check the rig: which bone is which, and what may spoil the hair"""
 
     bl_idname = "neuralocks.check"
     bl_label = "Check Rig"

@@ -50,7 +50,7 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
-    """Key the hair bones, and nothing else, in an action of its own on an NLA track; mute it to have the old motion back"""
+    """Key only the hair bones, in a separate action on an NLA track; mute the track to get the old motion back"""
 
     bl_idname = "neuralocks.bake_keys"
     bl_label = "Bake Hair Bones to Keyframes"
@@ -106,7 +106,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     bl_label = "Export USD Animation"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="USD file to write; beside the panel's output when empty", **FILE)
+    filepath: StringProperty(name="File", description="USD file to write; if empty, beside the panel's output", **FILE)
 
     def steps(self, context):
         armature, scene = shown_armature(context), context.scene
@@ -145,7 +145,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(
-        name="File", description="Header to write; beside this file, named after the character, when empty", **FILE
+        name="File", description="Header to write; if empty, beside this file and named after the character", **FILE
     )
 
     def work(self, context):
@@ -155,7 +155,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         path = self.filepath.strip() or f"//{file_label(armature.name)}_hair.h"
         out = Path(absolute(path))
         if out.is_dir():
-            raise NeuralocksError(f"{path}: this is a folder; name the header that is to be written in it")
+            raise NeuralocksError(f"{path}: this is a folder; name a header file in it")
         sampled, model = ensure(context, armature), RigModel.load(model_path(armature, "rig"))
         # Says where the model is another rig's, as the shipped one is.
         LiveBones.of(model, sampled.rig, sampled.character)

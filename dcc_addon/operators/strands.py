@@ -20,7 +20,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
 
     system: StringProperty(
         name="System",
-        description="Name of the particle system; when empty the active one, or the next that is not converted yet",
+        description="Name of the particle system; if empty, the active one, or the next that is not converted yet",
     )
     children: BoolProperty(
         name="Children",
@@ -40,7 +40,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
-    """Put all sliders back to average"""
+    """Reset all sliders to average"""
 
     bl_idname = "neuralocks.reset_look"
     bl_label = "Reset Hair Look"
@@ -55,7 +55,7 @@ class NEURALOCKS_OT_reset_look(Hardened, bpy.types.Operator):
 
 
 class NEURALOCKS_OT_assign(Hardened, bpy.types.Operator):
-    """Let the character shown above carry this hair"""
+    """Attach this hair to the character shown above"""
 
     bl_idname = "neuralocks.assign"
     bl_label = "Attach to Character"

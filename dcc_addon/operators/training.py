@@ -82,7 +82,7 @@ def await_answer() -> float | None:
 
 
 class NEURALOCKS_OT_copy_install(Hardened, bpy.types.Operator):
-    """Copy the command that installs what training needs, to be pasted into a terminal"""
+    """Copy the command that installs what training needs, to paste into a terminal"""
 
     bl_idname = "neuralocks.copy_install"
     bl_label = "Copy Install Command"
@@ -117,7 +117,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         if self.kind == "strands":
             curves.check(target)
         python, name, wanted = training_python(), armature.name_full, target.name_full
-        asking = Threaded(lambda _: _trainers.look(python), "Looking for what training needs", leave=True)
+        asking = Threaded(lambda _: _trainers.look(python), "Checking what training needs", leave=True)
         if problem := (yield from asking.steps()):
             raise NeuralocksError(problem)
         yield from loading("usd.assets.scene_writer")
@@ -205,7 +205,7 @@ def finish() -> str | None:
     if not running.succeeded:
         message = f"{name}: training failed: {running.failure()}"
     elif target is None:
-        message = f"{name}: trained, but it is not in this file any more; choose its model by hand: {running.out}"
+        message = f"{name}: trained, but it is no longer in this file; choose its model by hand: {running.out}"
     else:
         setting = SETTING[wanted.kind]
         set_path(target, setting, named_here(running.out))

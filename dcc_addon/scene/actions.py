@@ -75,12 +75,12 @@ def check_heard(armature) -> None:
         )
     if not data.use_nla:
         raise NeuralocksError(
-            f"{name}: its NLA is switched off, and with it baked keys; switch it on in the NLA editor"
+            f"{name}: its NLA is switched off, so baked keys do not play; switch it on in the NLA editor"
         )
     for track in data.nla_tracks:
         if track.is_solo and track.name not in HAIR:
             raise NeuralocksError(
-                f"{name}: NLA track '{track.name}' is solo, so that no other one plays; take its star off"
+                f"{name}: NLA track '{track.name}' is solo, so no other track plays; switch off its star"
             )
     check_lasting(armature)
 
@@ -94,8 +94,8 @@ def check_lasting(armature) -> None:
     for track in _of_library(armature):
         if track.is_solo:
             raise NeuralocksError(
-                f"{armature.name_full}: NLA track '{track.name}' of {_library(armature)} is solo, and Blender makes it so again "
-                "when this file is opened; take its star off in that file"
+                f"{armature.name_full}: NLA track '{track.name}' of {_library(armature)} is solo, and Blender makes it solo "
+                "again when this file is opened; switch off its star in that file"
             )
 
 
@@ -110,13 +110,13 @@ def check_mode_left(armature, bones) -> None:
         start = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
         if all(start + rotations.CHANNELS[mode] in written for mode in rotations.KEYED):
             raise NeuralocksError(
-                f"{armature.name_full}: hair bone '{bone}' has keys in every rotation mode, which play over baked ones; delete "
-                "its keys of one of them"
+                f"{armature.name_full}: hair bone '{bone}' has keys in every rotation mode, and these would override baked "
+                "keys; delete its keys of one mode"
             )
         if f"{start}rotation_mode" in written:
             raise NeuralocksError(
-                f"{armature.name_full}: hair bone '{bone}' has keys of its rotation mode, so that baked ones would not play; "
-                "delete these"
+                f"{armature.name_full}: hair bone '{bone}' has keys on its rotation mode, so baked keys would not play; "
+                "delete those keys"
             )
 
 

@@ -72,8 +72,8 @@ def left_behind(mesh_object, armature) -> str:
     moving = carrier(mesh_object, None)
     remedy = f"choose {moving.name_full} as the character" if moving not in (None, armature) else "choose another body"
     return (
-        f"{mesh_object.name_full}: none of its vertex groups is a deforming bone of {armature.name_full}, so hair is not kept "
-        f"out of it where it moves; {remedy}"
+        f"{mesh_object.name_full}: none of its vertex groups belongs to a deforming bone of {armature.name_full}, so hair is not "
+        f"kept out of it as it moves; {remedy}"
     )
 
 

@@ -57,8 +57,8 @@ def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -
 def _told(mesh_object, far: float) -> str:
     why = ", ".join(_causes(mesh_object)) or "look at its parent, its weights and its bones"
     return (
-        f"{mesh_object.name_full}: hair is kept out of it where weights and shape keys take it; near the head it is drawn up "
-        f"to {1000 * far:.0f} mm from there: {why}"
+        f"{mesh_object.name_full}: hair is kept out of the shape that weights and shape keys give it; near the head it is drawn "
+        f"up to {1000 * far:.0f} mm from that: {why}"
     )
 
 

@@ -101,7 +101,9 @@ def keep_rest(data, whole: bool = False) -> None:
     """
     if data.library is not None or data.override_library is not None:
         moved = (
-            "; they are not at rest there, for it was no Save that wrote them: save that file" if has_rest(data) else ""
+            "; they are not at rest in that file, because Save did not write it: save that file"
+            if has_rest(data)
+            else ""
         )
         raise NeuralocksError(
             f"{data.name}: its curves are linked from another file and cannot be moved here; make them local (Object > "

@@ -74,6 +74,6 @@ def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> st
     if not far >= FAR:
         return ""
     return (
-        f"{hair.name_full}: its object moves up to {1000 * far:.0f} mm against the head, which live hair and bakes do not "
-        "follow: they stay on the head bone; make it a child of the bone that it shall ride on"
+        f"{hair.name_full}: its object moves up to {1000 * far:.0f} mm relative to the head, which live hair and bakes do "
+        "not follow: they stay on the head bone; make it a child of the bone that it should follow"
     )

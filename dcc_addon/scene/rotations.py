@@ -123,12 +123,12 @@ def check_free(armature, bones) -> None:
         acting = next((c.name for c in bone.constraints if not c.mute and c.influence), None)
         if acting is not None:
             raise NeuralocksError(
-                f"{armature.name_full}: hair bone '{name}' has the constraint '{acting}', which would turn it once more; mute "
+                f"{armature.name_full}: hair bone '{name}' has the constraint '{acting}', which would turn it a second time; mute "
                 "the constraint"
             )
         if not bone.bone.use_inherit_rotation:
             raise NeuralocksError(
-                f"{armature.name_full}: hair bone '{name}' does not turn with its parent; switch on Inherit Rotation (bone "
+                f"{armature.name_full}: hair bone '{name}' does not turn with its parent; turn on Inherit Rotation (bone "
                 "properties, Relations)"
             )
 

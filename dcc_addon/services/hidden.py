@@ -54,7 +54,7 @@ def check_placed(places: np.ndarray, frames: np.ndarray, name: str) -> None:
     """
     linear = places[:, :3, :3]
     for fact, wrong, remedy in (
-        ("has zero scale", flat(linear, NONE), "give it, and what it hangs from, a scale above zero"),
+        ("has zero scale", flat(linear, NONE), "give it and its parents a scale above zero"),
         ("is mirrored (negative scale)", volumes(linear) < 0, "apply its scale (Ctrl A in Object Mode)"),
     ):
         if wrong.any():

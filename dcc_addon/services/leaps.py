@@ -25,10 +25,10 @@ def leaps_told(clip: Clip, joint: int, frames: np.ndarray) -> tuple[str, ...]:
 
     told, flashes = [], find_flashes(clip, joint)
     if len(clip.cuts):
-        told.append(f"The head is put elsewhere at frame {named(clip.cuts)}: hair starts anew there")
+        told.append(f"The head jumps to another place at frame {named(clip.cuts)}: hair starts anew there")
     if len(flashes):
         told.append(
-            f"The head leaps at frame {named(flashes)}, less than {APART:g} s from one leap to the next, and flings the hair; "
-            "repair the animation there"
+            f"The head jumps at frame {named(flashes)}, less than {APART:g} s from one jump to the next, and flings the hair; "
+            "fix the animation there"
         )
     return tuple(told)

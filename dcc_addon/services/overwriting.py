@@ -32,5 +32,5 @@ def check_ours(paths, made_here) -> None:
     for path in paths:
         if os.path.isfile(path) and not made_here(path):
             raise NeuralocksError(
-                f"{path}: would be written over, and was not made by Neuralocks; choose another file name, or move it away"
+                f"{path}: would be overwritten, but Neuralocks did not make it; choose another file name, or move it away"
             )

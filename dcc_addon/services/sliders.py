@@ -41,7 +41,7 @@ MATERIAL = (
 MOTION = Slider(
     "motion",
     "Motion",
-    "How much of the movement shows; at 0 the hair hangs as in a held pose, up to 4, typed in, exaggerates",
+    "How much of the motion shows; at 0 the hair hangs as in a held pose; type up to 4 to exaggerate it",
     0.0,
     4.0,
     1.0,

@@ -40,7 +40,7 @@ def problem(python: str) -> str:
     if not python:
         return f"Training needs a Python with torch, which is too large to come with the add-on; {remedy}"
     if not os.path.isfile(python):
-        fact = "is a folder, where the program in it is needed" if os.path.isdir(python) else "no such file"
+        fact = "is a folder; choose the program in it" if os.path.isdir(python) else "no such file"
         return f"{python}: {fact}; {remedy}"
     try:
         done = subprocess.run(
@@ -60,7 +60,7 @@ def problem(python: str) -> str:
         lines = [line for line in done.stderr.strip().splitlines() if line]
         return f"{python}: {lines[-1] if lines else 'does not run'}; {remedy}"
     if CAN not in done.stdout.splitlines():
-        return f"{python}: is no Python; {remedy}"
+        return f"{python}: is not a Python; {remedy}"
     return ""
 
 

@@ -86,7 +86,7 @@ def simulated(
     steps = np.ceil((times[-1] - times[0]) / STEP - 1e-9)
     if not steps <= MOST_STEPS:
         raise NeuralocksError(
-            f"frames: the solver goes from {times[0]:g} s to {times[-1]:g} s, {steps:g} steps where {MOST_STEPS} are "
+            f"frames: the solver goes from {times[0]:g} s to {times[-1]:g} s, {steps:g} steps, but {MOST_STEPS} are "
             "the most; choose frames near the animation, or fewer"
         )
     parts = clip.parts

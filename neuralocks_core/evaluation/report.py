@@ -25,13 +25,13 @@ LABELS = {
     "penetration_worst_mm": ("worst depth", "mm", "of all frames"),
     "inside_at_rest_percent": ("inside already at rest", "%", "as the groom was made"),
     "droop_cm": ("droop", "cm", "tips below the rigid groom's, mean"),
-    "speed_cm_s": ("speed against the head", "cm/s", "mean; rigid hair has 0"),
+    "speed_cm_s": ("speed relative to the head", "cm/s", "mean; rigid hair has 0"),
     "swing_percent": ("swing of the tips", "%", "of strand length (of a coil's line), rms"),
     "settling_s": ("settling after a stop", "s", "until 10 % of the tip speed"),
     "jitter_mm": ("jitter in a held pose", "mm", "largest step of a vertex, 2 s after the stop"),
     "turn_degrees": ("turn from edge to edge", "deg", "mean; much above that at rest is crinkled"),
     "turn_at_rest_degrees": ("the same at rest", "deg", ""),
-    "energy_gravity": ("gravity energy", "J/kg", "against the rigid groom; below 0 it hangs lower"),
+    "energy_gravity": ("gravity energy", "J/kg", "relative to the rigid groom; below 0 it hangs lower"),
     "energy_bend": ("bend energy", "J/kg", ""),
     "energy_stretch": ("stretch energy", "J/kg", ""),
     "position_percent": ("position error", "% L", "mean over vertices; L as above"),
@@ -136,7 +136,7 @@ class Card:
                         panel.plot(curves["times"], 100 * curve[:, axis], label=who, **style.get(who, {}))
                 panel.set_title(f"{name}: tips, {direction}", fontsize=9)
                 panel.set_xlabel("s")
-                panel.set_ylabel("cm against the head")
+                panel.set_ylabel("cm relative to the head")
             row[0].legend(fontsize=8)
         with atomic_write(path) as part:
             figure.savefig(part, dpi=110, format=path.suffix.lower()[1:])

@@ -106,6 +106,6 @@ class Words:
             try:
                 values.append(np.array(block, bytes).astype(float))
             except ValueError as error:
-                raise self.error(f"its frames hold what is no number ({str(error)[:80]})") from None
+                raise self.error(f"its frames hold something that is not a number ({str(error)[:80]})") from None
             start, most = end, most - len(block)
         return np.concatenate(values)

@@ -57,7 +57,9 @@ def grow(
     if style not in STYLES:
         raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
     if not isinstance(scalp, Scalp):
-        raise NeuralocksError(f"scalp: {scalp!r} is none; give a Scalp, such as hairstyles.from_head marks on a head")
+        raise NeuralocksError(
+            f"scalp: {scalp!r} is not one; give a Scalp, such as hairstyles.from_head marks on a head"
+        )
     if not 1 <= count <= MOST_STRANDS:
         raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
     if variation < 0:

@@ -74,7 +74,7 @@ class HairChains:
         led = self.parents >= 0
         known = (self.chain >= 0) & (self.chain < count - led.sum())
         if not known.all() or (self.chain[led] != self.chain[self.parents[led]]).any():
-            raise NeuralocksError("hair chains: a joint is of another chain than its parent; get an undamaged model")
+            raise NeuralocksError("hair chains: a joint is in another chain than its parent; get an undamaged model")
         if not all(np.isfinite(getattr(self, name)).all() for name in ("origins", "axes", "bones")):
             raise NeuralocksError("hair chains: NaN or infinity in the bind pose; repair the skeleton")
 
@@ -179,7 +179,7 @@ class HairChains:
         for index, name in enumerate(self.names):
             if name not in order:
                 raise NeuralocksError(
-                    f"model: it moves joint '{name}', which is no hair joint here; train a model for this rig"
+                    f"model: it moves joint '{name}', which is not a hair joint here; train a model for this rig"
                 )
             there, parent = order[name], self.parents[index]
             parent_there = other.parents[there]
@@ -198,7 +198,7 @@ class HairChains:
                 break
         if len(wrong):
             raise NeuralocksError(
-                f"model: joint '{self.names[wrong[0]]}' lies {1e3 * off[wrong[0]]:.1f} mm elsewhere than in the rig "
+                f"model: joint '{self.names[wrong[0]]}' lies {1e3 * off[wrong[0]]:.1f} mm away from its place in the rig "
                 "that the model was trained for; train a model for this rig"
             )
         if not SIZES[0] <= size <= SIZES[1]:

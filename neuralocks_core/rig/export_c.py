@@ -52,9 +52,9 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         raise NeuralocksError(f"{path.name!r}: no #include can name it; choose a name without quotes and backslashes")
     beside = example_beside(path)
     if beside.is_file() and not made_here(beside):
-        raise NeuralocksError(f"{beside}: would be written over by the worked example; move it, or name another header")
+        raise NeuralocksError(f"{beside}: would be overwritten by the worked example; move it, or name another header")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
-        raise NeuralocksError(f"--prefix {prefix}: is no C name; use letters, digits and _")
+        raise NeuralocksError(f"--prefix {prefix}: is not a C name; use letters, digits and _")
     known = rig_spec(model.dynamic)
     if any(getattr(model.spec, name) != getattr(known, name) for name in ("pose_joints", "linear", "chest")):
         raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")

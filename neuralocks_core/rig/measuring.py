@@ -52,13 +52,13 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     names = [leaf(skeleton.names[j]) for j in joints]
     double = next((n for n in names if names.count(n) > 1), None)
     if double:
-        raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give them names of their own")
+        raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give each its own name")
     # A model tells joints of one name apart by what they hang from, but for the first of a chain.
     below = [leaf(skeleton.names[j]) for j in np.flatnonzero(skeleton.below(character.head))]
     double = next((name for name, j in zip(names, joints) if j in tops and below.count(name) > 1), None)
     if double:
         raise NeuralocksError(
-            f"skeleton: {below.count(double)} joints below the head are named '{double}', as a hair chain; rename all but that one"
+            f"skeleton: {below.count(double)} joints below the head are named '{double}', like a hair chain; rename all but that one"
         )
     parents = np.array([rows.get(int(skeleton.parents[j]), -1) if j not in tops else -1 for j in joints], int)
     chain = np.zeros(len(joints), int)

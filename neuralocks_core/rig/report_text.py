@@ -21,7 +21,7 @@ def report_lines(report: dict) -> list[str]:
         )
     if "most_turned" in report:
         turned = report["most_turned"]
-        line = f"held poses: no joint is turned more than '{turned['joint']}', by {turned['degrees']:.0f} degrees in the mean"
+        line = f"held poses: no joint is turned more than '{turned['joint']}', by {turned['degrees']:.0f} degrees on average"
         lines.append(
             line
             + (

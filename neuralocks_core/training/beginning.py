@@ -150,7 +150,7 @@ class Beginning:
         except (KeyError, ValueError, RuntimeError) as error:
             fact = str(error).splitlines()[0]
             raise NeuralocksError(
-                f"{self.path}: its network is not built as ours ({fact}); begin with another"
+                f"{self.path}: its network is built differently from this one ({fact}); begin with another"
             ) from None
 
 

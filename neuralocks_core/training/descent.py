@@ -99,5 +99,5 @@ def descend(
             shown = now
             if not (np.isfinite(list(running.values())).all() and all(bool(p.isfinite().all()) for p in parameters)):
                 remedy = remedy or f"train with a smaller --set rate than {schedule.rate:g}"
-                raise NeuralocksError(f"training: it ran away, its loss is not finite after {step} steps; {remedy}")
+                raise NeuralocksError(f"training: it diverged, its loss is not finite after {step} steps; {remedy}")
             yield Descended(step, min(done, 1.0), dict(running))

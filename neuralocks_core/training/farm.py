@@ -82,7 +82,7 @@ class RolloutFarm:
         elif any((process.exitcode or 0) < 0 for process in self._processes):
             why = "training: the solver's process was killed; free some memory"
         else:
-            why = "training: the solver's process ended early; mend what it says above"
+            why = "training: the solver's process ended early; fix what it reports above"
         return NeuralocksError(f"{why}, and {then}")
 
 
@@ -213,5 +213,5 @@ def _work(scene: TrainingScene, folder: Path, indices: range, tell: Connection) 
         tell.send(str(error))
         raise SystemExit(1) from None
     except MemoryError:
-        tell.send("training: the solver has not enough memory; free some")
+        tell.send("training: the solver does not have enough memory; free some")
         raise SystemExit(1) from None

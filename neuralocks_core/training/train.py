@@ -134,7 +134,7 @@ def _trained(
         method = method_of(scene, coder.codes_of, options, farm, report)
         run = _Run(scene, method, RolloutBank(scene_out, coder.codes_of), saved, beginning, resume and saved.exists())
         if tell and run.meta["changed"]:
-            tell([f"{work}: goes on with other options than it was begun with: {', '.join(run.meta['changed'])}"])
+            tell([f"{work}: continues with other options than it began with: {', '.join(run.meta['changed'])}"])
         told = run.train(farm, held_farm, report)
     card = {**run.card(), **_inputs_of(scene, coder, beginning), "options": asdict(options, dict_factory=_plain)}
     description = {

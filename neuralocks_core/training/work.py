@@ -91,7 +91,7 @@ def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | N
         raise NeuralocksError(f"{begin}: the training in {work} did not begin with it; resume without --begin")
     if kept is None and (work / "checkpoint.npz").exists() and not (work / CODES).exists():
         # Its network would go on with codes of strands that mean something else to it.
-        raise NeuralocksError(f"{work}: lacks what its network reads strands with, {CODES}; train without --resume")
+        raise NeuralocksError(f"{work}: lacks {CODES}, with which its network reads strands; train without --resume")
     return kept
 
 
@@ -108,7 +108,7 @@ def claimed(work: Path) -> Iterator[None]:
     Raises:
         NeuralocksError: another training is at work in it, or it cannot be made.
     """
-    lock = FolderLock(work, work, "another training is at work there; wait for that one, or choose another name")
+    lock = FolderLock(work, work, "another training is running there; wait for it, or choose another name")
     try:
         yield
     finally:
@@ -129,12 +129,10 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
         if "seed" in changed:
-            raise NeuralocksError(
-                f"{work}: the training there was begun with --seed {before['seed']}; resume with that"
-            )
+            raise NeuralocksError(f"{work}: the training there began with --seed {before['seed']}; resume with that")
         if changed:
             raise NeuralocksError(
-                f"{work}: the training there was begun with another {changed[0]}; resume with the same, or train "
+                f"{work}: the training there began with a different {changed[0]}; resume with the same, or train "
                 "without --resume"
             )
     with atomic_write(file) as part:

@@ -19,13 +19,13 @@ def test_prims_become_objects():
 @pytest.mark.parametrize(
     "note",
     [
-        "Rig: no joint found for neck, chest; the next one towards the trunk serves, or name it with --joint",
+        "Rig: no joint found for neck, chest; the next one towards the trunk is used, or name it with --joint",
         "Rig: no joint found for left_lower_arm, so the arms count as bound in a T-pose; "
         "name it with --joint left_lower_arm=JOINT",
-        "Rig: its head is put elsewhere at 13; the hair starts anew there (--cuts says where)",
-        "Rig: its head leaps at 3,4, less than 0.2 s from one leap to the next, so these are no cuts and the hair is flung; "
-        "repair the animation, or name them all if they are (--cuts 3,4,20, ...)",
-        "Rig: its head is put elsewhere at 13; a loop has no cuts, so the hair is flung there; leave out --loop, or repair "
+        "Rig: its head jumps to another place at 13; the hair starts anew there (--cuts says where)",
+        "Rig: its head jumps at 3,4, less than 0.2 s from one jump to the next, so these are not taken as cuts and the hair is "
+        "flung; repair the animation, or name them all if they are (--cuts 3,4,20, ...)",
+        "Rig: its head jumps to another place at 13; a loop has no cuts, so the hair is flung there; leave out --loop, or repair "
         "the animation",
         "Rig: 'curl' and 3 more hang from 'neck' and are not moved; to move all, train and bake with --head neck",
         "Rig: 'curl' hangs from 'head_2', not from 'head_1', so it is not moved; take that head with --head head_2",
@@ -50,9 +50,9 @@ def test_notes_name_what_the_panel_has(note):
     ("note", "told"),
     [
         (
-            "Rig: joint 'hips/spine/head' is turned by 19 degrees between time codes 1 and 24; a loop ends with the pose that it "
-            "begins with",
-            "Rig: bone 'head' is turned by 19 degrees between frames 1 and 24; a loop ends with the pose that it begins with",
+            "Rig: joint 'hips/spine/head' is turned by 19 degrees between time codes 1 and 24; a loop must end with the pose "
+            "that it begins with",
+            "Rig: bone 'head' is turned by 19 degrees between frames 1 and 24; a loop must end with the pose that it begins with",
         ),
         ("Rig: its head joint 'head' does not move", "Rig: its head bone 'head' does not move"),
         ("Hair: hair joint 'a/b' is mirrored", "Hair: hair bone 'b' is mirrored"),

@@ -219,8 +219,8 @@ def test_leaps_are_told_by_their_frames():
     clip = Clip(frames / 24, joints)
     clip = replace(clip, cuts=find_cuts(clip, 0))
     cut, flash = leaps_told(clip, 0, frames)
-    assert cut == "The head is put elsewhere at frame 30: hair starts anew there"
-    assert flash.startswith("The head leaps at frame 60, 64, less than 0.2 s from one leap to the next")
+    assert cut == "The head jumps to another place at frame 30: hair starts anew there"
+    assert flash.startswith("The head jumps at frame 60, 64, less than 0.2 s from one jump to the next")
     still = Clip(frames / 24, np.tile(np.eye(4), (64, 1, 1, 1)))
     for many, named in ((6, "10, 18, 26, 34, 42, 50:"), (7, "10, 18, 26, 34, 42, 50, ...:")):
         (cut,) = leaps_told(replace(still, cuts=still.times[: 8 * many : 8]), 0, frames)

@@ -169,7 +169,7 @@ def test_card_of_the_panel_has_plain_numbers_that_an_artist_can_use():
         "vertices in the body: 0.05 %",
         "worst depth: 1234 mm",
         "droop: 0 cm",
-        "speed against the head: 31.4 cm/s",
+        "speed relative to the head: 31.4 cm/s",
         "swing of the tips: 12 %",
         "jitter in a held pose: 100 mm",
     ]

@@ -142,13 +142,13 @@ def test_training_says_why_it_failed(job, out, words):
 _PROBLEMS = [
     ("", "needs a Python with torch"),
     ("/nowhere/python", "no such file"),
-    (os.path.sep, "is a folder, where"),
+    (os.path.sep, "is a folder; choose"),
 ]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="of a program that only there comes with the system")
 def test_a_program_that_is_no_python_cannot_train():
-    assert f"{shutil.which('true')}: is no Python; in a Python of" in training_job.problem(shutil.which("true"))
+    assert f"{shutil.which('true')}: is not a Python; in a Python of" in training_job.problem(shutil.which("true"))
 
 
 def test_why_a_python_cannot_be_asked(tmp_path, monkeypatch):

@@ -31,7 +31,7 @@ def test_ends_of_a_range_are_taken_and_what_lies_beyond_is_refused(name):
 
 @pytest.mark.parametrize("value", ["1", None, True, [1.0]])
 def test_what_is_no_number_is_refused_in_words(value):
-    with pytest.raises(NeuralocksError, match="material bend: .* is no number; give one from 0.0002 to 0.005"):
+    with pytest.raises(NeuralocksError, match="material bend: .* is not a number; give one from 0.0002 to 0.005"):
         Material(bend=value)
 
 

@@ -31,7 +31,7 @@ def test_truncated_missing_and_foreign_files_are_refused(tmp_path):
             model.read(file)
     with pytest.raises(NeuralocksError, match="strand hair, not for rigged"):
         model.read(PATH, "rig")
-    with pytest.raises(NeuralocksError, match=f"^{re.escape(os.devnull)}: (is no file|no such)"):
+    with pytest.raises(NeuralocksError, match=f"^{re.escape(os.devnull)}: (is not a file|no such)"):
         model.read(os.devnull)
     with open(cut, "ab") as file:
         file.truncate(1 << 30)
@@ -57,7 +57,7 @@ def test_what_unpacks_to_more_than_it_claims_is_unpacked_as_far_as_that(tmp_path
     bomb.write_bytes(bomb.read_bytes().replace(struct.pack("<I", size), struct.pack("<I", 1000)))
     tracemalloc.start()
     try:
-        with pytest.raises(NeuralocksError, match="bomb.neuralocks: damaged or no model"):
+        with pytest.raises(NeuralocksError, match="bomb.neuralocks: damaged or not a model"):
             model.read(bomb)
         assert tracemalloc.get_traced_memory()[1] < 20 << 20
     finally:

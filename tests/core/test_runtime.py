@@ -177,7 +177,7 @@ def test_lengths_are_kept(path, strands):
             r"frame \(278\), not frame",
         ),
         ({"model_json": b'{"format": 1, "kind": []}'}, "unknown here"),
-        ({"model_json": json.dumps({"format": 1, "kind": "strands", "training": [1]})}, "'training' is no table"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "training": [1]})}, "'training' is not a table"),
         ({"model_json": b'{"format": ' + b"1" * 5000 + b"}"}, "damaged"),
         ({"model_json": b"\xff"}, "damaged"),
         ({"model_json": json.dumps({"format": 1, "kind": "strands", "boundary": 5})}, "boundary history"),
@@ -194,7 +194,7 @@ def test_lengths_are_kept(path, strands):
             "'anchored' is neither true nor false",
         ),
         ({"model_json": json.dumps({"format": 1, "kind": "strands"})}, "boundary history"),
-        ({"model_json": json.dumps({"format": 1, "kind": "strands", "credits": "me"})}, "'credits' is no list"),
+        ({"model_json": json.dumps({"format": 1, "kind": "strands", "credits": "me"})}, "'credits' is not a list"),
         ({"tail_onnx": b"nonsense"}, "cannot be loaded"),
     ],
 )

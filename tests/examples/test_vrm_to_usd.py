@@ -68,7 +68,7 @@ def test_long_names_are_cut_to_what_blender_takes():
 
 def test_what_is_no_binary_gltf_is_refused(tmp_path):
     (path := tmp_path / "avatar.vrm").write_text("{}")
-    with pytest.raises(SystemExit, match="no binary glTF file"):
+    with pytest.raises(SystemExit, match="not a binary glTF file"):
         runpy.run_path(str(SCRIPT))["read"](path)
 
 

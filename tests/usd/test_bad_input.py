@@ -28,7 +28,7 @@ def test_a_hair_file_in_place_of_a_stage_is_told_to_be_imported(tmp_path, model,
 
 WRONG = {
     "prim": ({"grooms": ["/Hero/Nope"]}, "/Hero/Nope: no such prim"),
-    "no prim path": ({"grooms": ["Hair"]}, "Hair: no prim path"),
+    "no prim path": ({"grooms": ["Hair"]}, "Hair: not a prim path"),
     "not a groom": ({"grooms": ["/Hero/Skin"]}, "without BasisCurves"),
     "skeleton": ({"skeleton": "/Nope"}, "/Nope: no such skeleton"),
     "head": ({"head": "nose"}, "nose"),
@@ -45,15 +45,15 @@ WRONG = {
     "material range": ({"material": ["bend=1e9"]}, "bend"),
     "model": ({"model": "nope.neuralocks"}, "nope.neuralocks"),
     "folder as model": ({"model": "."}, "is a folder"),
-    "number as model": ({"model": 5}, "model: 5 is no path"),
-    "number as groom": ({"grooms": 5}, "grooms: 5 is no prim path"),
-    "number as skeleton": ({"skeleton": 5}, "skeleton: 5 is no prim path"),
+    "number as model": ({"model": 5}, "model: 5 is not a path"),
+    "number as groom": ({"grooms": 5}, "grooms: 5 is not a prim path"),
+    "number as skeleton": ({"skeleton": 5}, "skeleton: 5 is not a prim path"),
     "number as frames": ({"frames": 5}, "frames: 5 holds no time codes"),
     "word as cuts": ({"cuts": "25"}, "cuts: '25' holds no time codes"),
     "word as strength": ({"strength": "1"}, "--strength '1': must be a number from 0 to 4"),
     "no strength": ({"strength": float("nan")}, "--strength nan: must be"),
     "truth as jobs": ({"jobs": True}, "--jobs True: must be a whole number"),
-    "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is no dict"),
+    "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is not a dict"),
 }
 
 

@@ -160,7 +160,7 @@ def test_a_groom_alone_is_told_to_be_put_on_its_character(tmp_path, model):
     stage.Save()
     for missing, remedy in (
         (None, "if it holds hair alone, sublayer or reference it"),
-        ("lost.usda", "bring along what"),
+        ("lost.usda", "add the files that it"),
     ):
         if missing:
             Sdf.Layer.FindOrOpen(str(shot)).subLayerPaths.append(missing)
@@ -177,7 +177,7 @@ def test_where_a_character_stands_that_cannot_be_used_stops_nothing_more(tmp_pat
     stage.GetPrimAtPath("/Hero/Rig").GetAttribute("joints").Set(["rig:hips"])
     stage.Save()
     (stop,) = inspect(shot)["stops"]
-    assert "'rig:hips', which is no path" in stop
+    assert "'rig:hips', which is not a path" in stop
 
 
 def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
@@ -195,6 +195,8 @@ def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of
     path = tmp_path / "shot.usda"
     path.write_text(f"#usda 1.0\n{made_of}\n")
     for work in (lambda: bake(path, tmp_path / "a.usdc", model), lambda: bake_rig(path, tmp_path / "b.usda")):
-        with pytest.raises(NeuralocksError, match=r"shot.usda: holds no .*groom.usda.*bring along") as caught:
+        with pytest.raises(
+            NeuralocksError, match=r"shot.usda: holds no .*parts of it are missing.*groom.usda"
+        ) as caught:
             work()
         assert "\n" not in str(caught.value)

@@ -30,9 +30,9 @@ def test_a_name_too_long_for_a_file_is_told(tmp_path):
 
 
 def test_nothing_is_no_path(model):
-    with pytest.raises(NeuralocksError, match="out: None is no path"):
+    with pytest.raises(NeuralocksError, match="out: None is not a path"):
         bake("shot.usda", None, model)
-    with pytest.raises(NeuralocksError, match="shot: None is no path"):
+    with pytest.raises(NeuralocksError, match="shot: None is not a path"):
         bake(None, "a.usdc", model)
     for work in (
         lambda: demo(None),
@@ -42,7 +42,7 @@ def test_nothing_is_no_path(model):
         lambda: write_body(None),
         lambda: export_model(model, None),
     ):
-        with pytest.raises(NeuralocksError, match="None is no path"):
+        with pytest.raises(NeuralocksError, match="None is not a path"):
             work()
 
 
@@ -54,9 +54,9 @@ def test_a_lone_prim_path_of_any_kind_is_taken(tmp_path, kind):
 
 def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
     shot = write_shot(tmp_path, name="line\nbreak")
-    with pytest.raises(NeuralocksError, match="line break or the like.*rename it"):
+    with pytest.raises(NeuralocksError, match="such as a line break.*rename it"):
         bake(shot, tmp_path / "a.usdc", model, frames="1")
-    with pytest.raises(NeuralocksError, match="SDF_FORMAT_ARGS: for arguments; choose another name"):
+    with pytest.raises(NeuralocksError, match="SDF_FORMAT_ARGS: as arguments; choose another name"):
         bake(shot, tmp_path / "a:SDF_FORMAT_ARGS:b=c.usdc", model, frames="1")
     assert [path.name for path in tmp_path.iterdir()] == [shot.name]
 

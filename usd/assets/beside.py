@@ -99,9 +99,9 @@ def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Prim
 def _stays(kind: Sdf.ValueTypeName) -> str:
     """Why values of a type do not go on to another file, where units and axes are others; '' if they do."""
     if kind.scalarType == Sdf.ValueTypeNames.Asset:
-        return "names files, which are not found from everywhere"
+        return "names files, whose paths may not resolve from elsewhere"
     if kind.role in OF_A_SPACE or str(kind.scalarType).startswith(("matrix", "frame")):
-        return f"({kind}) is of the space of its file"
+        return f"({kind}) is in the space of its own file"
     return ""
 
 

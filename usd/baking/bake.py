@@ -103,7 +103,7 @@ def as_material(material) -> Material:
     words = [material] if isinstance(material, str) else material or ()
     if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
         raise NeuralocksError(
-            f"material: {material!r} is none; give a Material, words such as 'bend=2x', or a dict of them"
+            f"material: {material!r} is not one; give a Material, words such as 'bend=2x', or a dict of them"
         )
     return Material.parse(words)
 

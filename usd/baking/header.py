@@ -54,9 +54,13 @@ def relative(file, out: Path) -> str:
     folder's own path has a link, `..` must lead to the file both from there and from behind the link.
     """
     if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
-        raise NeuralocksError(f"{file}: its path holds a line break or the like, and no layer can name it; rename it")
+        raise NeuralocksError(
+            f"{file}: its path holds a control character such as a line break, which no layer can name; rename it"
+        )
     if os.sep == "/" and "\\" in os.path.abspath(out):
-        raise NeuralocksError(f"{out}: USD takes the backslash in its path for a slash and finds no shot; rename it")
+        raise NeuralocksError(
+            f"{out}: USD reads the backslash in its path as a slash and does not find the shot; rename it"
+        )
     folder, behind = out.parent, os.path.realpath(out.parent)
     try:
         ways = [

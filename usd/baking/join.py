@@ -117,7 +117,7 @@ class _Part:
             raise self._no_bake()
 
     def _no_bake(self) -> NeuralocksError:
-        return NeuralocksError(f"{self.path}: is no bake; give files that neuralocks bake wrote")
+        return NeuralocksError(f"{self.path}: is not a bake; give files that neuralocks bake wrote")
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -147,7 +147,7 @@ class _Part:
             raise NeuralocksError(f"{self.path}: {path} has no sample at {code:g}; bake that part again")
         fact = ""
         if not isinstance(found, Vt.Vec3fArray):
-            fact = "is no array of vectors"
+            fact = "is not an array of vectors"
         elif count is not None and len(found) != count:
             fact = f"has {len(found)} values for {count}"
         elif not np.isfinite(found).all():
@@ -176,7 +176,7 @@ class _Part:
                 )
         if others and self._shots() != others[0]._shots():
             raise NeuralocksError(
-                f"{self.path}: is a bake of another shot than {others[0].path} is; join the parts of one"
+                f"{self.path}: is a bake of a different shot from {others[0].path}; join parts of one shot"
             )
         for groom in self.grooms:
             other = next((part for part in others if groom in part.grooms), self)
@@ -184,12 +184,12 @@ class _Part:
             options = sorted(name for name in {*mine, *theirs} - {INPUTS} if mine.get(name) != theirs.get(name))
             if options:
                 raise NeuralocksError(
-                    f"{self.path}: {groom} was baked with other {', '.join(options)} than in {other.path}; "
+                    f"{self.path}: {groom} was baked with different {', '.join(options)} than in {other.path}; "
                     "bake both with the same options"
                 )
             if inputs := unlike(mine, theirs):
                 raise NeuralocksError(
-                    f"{self.path}: {groom} was baked from another {' and '.join(inputs)} than in {other.path}; "
+                    f"{self.path}: {groom} was baked from a different {' and '.join(inputs)} than in {other.path}; "
                     "bake the older one again"
                 )
 

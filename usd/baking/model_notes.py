@@ -34,7 +34,7 @@ def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
     on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest has not a head's measures
     told = {path: model.another_body(each.character, each.rig.clip) for path, each in on_heads.items()}
     return [
-        f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, take the shipped model, "
+        f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, use the shipped model, "
         "or train one on this character"
         for path, fact in told.items()
         if fact

@@ -19,4 +19,4 @@ def check_training() -> None:
             raise NeuralocksError(f'train: {error.name} is not installed; pip install "neuralocks[train]"') from None
         except (ImportError, OSError) as error:  # a library that its compiled part asks for, say; on Windows an OSError
             why = " ".join(str(error).split()) or type(error).__name__
-            raise NeuralocksError(f"train: {name} does not load ({why}); install it anew") from None
+            raise NeuralocksError(f"train: {name} does not load ({why}); reinstall it") from None

@@ -17,7 +17,7 @@ def prim_path(given, name: str) -> str | None:
     if given is None:
         return None
     if not isinstance(given, str | Sdf.Path):
-        raise NeuralocksError(f"{name}: {given!r} is no prim path; give text such as /Hero/Hair, or an Sdf.Path")
+        raise NeuralocksError(f"{name}: {given!r} is not a prim path; give text such as /Hero/Hair, or an Sdf.Path")
     text = str(given)
     return text[:-1] if len(text) > 1 and text.endswith("/") else text
 

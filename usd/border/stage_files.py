@@ -81,7 +81,7 @@ def check_layer_name(out: Path) -> None:
         NeuralocksError: it has another ending, is a folder's, or says more to USD than a name.
     """
     if ":SDF_FORMAT_ARGS:" in str(out):
-        raise NeuralocksError(f"{out}: USD takes what follows :SDF_FORMAT_ARGS: for arguments; choose another name")
+        raise NeuralocksError(f"{out}: USD reads what follows :SDF_FORMAT_ARGS: as arguments; choose another name")
     if out.suffix.lower() not in LAYERS:
         raise NeuralocksError(f"{out}: is written as a USD layer; end its name with {', '.join(LAYERS)}")
     if os.path.isdir(out):  # False of a name too long for a file, too, which is told when it is written

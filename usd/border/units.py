@@ -78,8 +78,8 @@ class Border:
         if not self.guessed:
             return []
         return [
-            f"{subject}: timeCodesPerSecond is {self.rate:g} and no framesPerSecond says how many frames that are, so they "
-            f"are {USUAL:g}; author framesPerSecond"
+            f"{subject}: timeCodesPerSecond is {self.rate:g} and framesPerSecond is not authored, so a second counts as "
+            f"{USUAL:g} frames; author framesPerSecond"
         ]
 
     def seconds(self, time_codes) -> np.ndarray:
@@ -108,7 +108,7 @@ class Border:
             raise NeuralocksError(f"{name}: upAxis is '{up}'; set it to Y or Z")
         rate = float(stage.GetTimeCodesPerSecond())
         if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
-            raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, 24 say")
+            raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, such as 24")
         shown = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else math.nan
         # At 1 and 1 a stage counts seconds all the same.
         if usual(rate) or rate == shown > 1:

@@ -91,11 +91,11 @@ def import_command(
     unit: Annotated[
         str | None,
         typer.Option(
-            help="mm, cm, m, in, or metres per unit of the file; what it says or a scalp suggests if left out."
+            help="mm, cm, m, in, or metres per unit of the file; if left out, as the file says or the scalp's size suggests."
         ),
     ] = None,
     up: Annotated[
-        str | None, typer.Option(help="Upward axis of the file, Y or Z; the usual one of its format if left out.")
+        str | None, typer.Option(help="Up axis of the file, Y or Z; if left out, the usual one of its format.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -140,15 +140,13 @@ def evaluate_command(
     joint: Joints = None,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="With --reference: also show this model's answer to each pose as if held."),
+        typer.Option("--model", help="With --reference: also show this model's hair for each pose as if held."),
     ] = None,
     material: Materials = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Also draw how the tips move, as curves (.png, .svg, .pdf).")
-    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also plot how the tips move (.png, .svg, .pdf).")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a bake's report card. Its material and head are known from the bake; give --groom, --skeleton and --joint again."""
+    """Print a bake's report card. The bake records its material and head; repeat --groom, --skeleton and --joint."""
     from neuralocks_core.evaluation.report import check_plot
 
     from ..baking.bake import as_material
@@ -182,7 +180,7 @@ def preview_command(
 ) -> None:
     """Draw a bake: a strip of pictures (.png) or a clip (.mp4, .gif).
 
-    Of several characters the first with hair is drawn, or the one that --groom or --skeleton names.
+    If there are several characters, it draws the first one with hair, or the one that --groom or --skeleton names.
     """
     from ..review.picture import preview
     from .progress import progress_bar
@@ -199,7 +197,7 @@ def export_command(
         Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
     ] = None,
     shot: Annotated[
-        Path | None, typer.Option(help="USD stage: also write the data of its grooms that no frame changes.")
+        Path | None, typer.Option(help="USD stage: also write the data of its grooms that is the same in every frame.")
     ] = None,
     groom: Grooms = None,
     skeleton: Skeleton = None,
@@ -231,16 +229,14 @@ def body_command(
 
 @command("grow")
 def grow_command(
-    style: Annotated[str, typer.Argument(help="A style of the procedural library; a wrong one lists them.")],
+    style: Annotated[str, typer.Argument(help="A style of the procedural library; an unknown name lists them.")],
     character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
     out: Out,
     count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
     seed: Seed = 0,
     variation: Annotated[
         int,
-        typer.Option(
-            min=0, help="Number of a variation: cut, parted, waved and laid otherwise; 0 is the style itself."
-        ),
+        typer.Option(min=0, help="Number of a variation, with another cut, parting and waves; 0 is the style itself."),
     ] = 0,
     skeleton: Skeleton = None,
     head: Head = None,

@@ -47,11 +47,11 @@ def bake_command(
     jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
-    """Bake moving hair into a layer that goes over the shot.
+    """Bake moving hair into an override layer over the shot.
 
-    The layer sublayers the shot: open it for the whole shot with moving hair, mute it to have the shot back. A bake
-    that was stopped goes on where it was when the same command is given again. Machines of a farm bake parts of the
-    range with --frames; neuralocks join makes one bake of them.
+    The shot is a sublayer of it: open the layer for the whole shot with moving hair, mute it to get the shot back. To
+    resume a bake that was stopped, give the same command again. On a farm, bake parts of the range with --frames;
+    neuralocks join makes one bake of them.
     """
     from ..baking.bake import bake
     from .progress import progress_bar
@@ -67,13 +67,11 @@ def bake_command(
 
 
 def join_command(
-    parts: Annotated[
-        list[Path], typer.Argument(help="Bakes of parts of a shot, of its frames or its grooms, in any order.")
-    ],
+    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of a shot (frames or grooms), in any order.")],
     out: Out,
     as_json: AsJson = False,
 ) -> None:
-    """Join the bakes of parts of a shot, as the machines of a farm write them, into one.
+    """Join bakes of parts of a shot, as the machines of a farm write them, into one.
 
     The file is the same, byte for byte, as if all frames and characters had been baked at once.
     """
@@ -100,12 +98,12 @@ def simulate_command(
     subframes: Subframes = 1,
     material: Materials = None,
     strands: Annotated[
-        int | None, typer.Option(help="Simulate at most so many strands, 2000 if left out; the others follow them.")
+        int | None, typer.Option(help="Simulate at most this many strands, 2000 if left out; the others follow them.")
     ] = None,
     loop: Loop = False,
     cuts: Cuts = None,
     volume: Annotated[
-        float, typer.Option(help="Stiffness against strands crowding closer than in the groom; try 0.3.")
+        float, typer.Option(help="Stiffness that keeps strands from crowding closer than in the groom; try 0.3.")
     ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
@@ -127,7 +125,7 @@ def _how_to_go_on(out: Path) -> list[str]:
     from ..baking.spool import kept
 
     frames = kept(out)
-    return [f"the same command goes on from here, with {counted(frames, 'frame')} done"] if frames else []
+    return [f"the same command continues from here, with {counted(frames, 'frame')} done"] if frames else []
 
 
 def _bake_report(result, as_json: bool) -> None:

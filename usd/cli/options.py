@@ -14,15 +14,13 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine t
 Grooms = Annotated[
     list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All hair if left out.")
 ]
-Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, where there are several.")]
+Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, if there are several.")]
 Head = Annotated[
-    str | None, typer.Option("--head", help="The head joint, where names do not tell; it carries unbound hair.")
+    str | None, typer.Option("--head", help="The head joint, if its name does not tell; it carries unbound hair.")
 ]
 Joints = Annotated[
     list[str] | None,
-    typer.Option(
-        "--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, where names do not tell; repeat for more."
-    ),
+    typer.Option("--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, if names do not tell; repeat for more."),
 ]
 Frames = Annotated[
     str | None,
@@ -42,11 +40,11 @@ Cuts = Annotated[
     list[str] | None,
     typer.Option(
         "--cuts",
-        help="First frames after cuts, such as 25,49, where all hair starts anew, or 'none'; found if left out.",
+        help="First frames after cuts, such as 25,49, or 'none'; hair starts anew there. Detected if left out.",
     ),
 ]
 Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Seed of everything random.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Random seed.")]
 Jobs = Annotated[
     int | None, typer.Option("--jobs", help="Threads; if left out one per core, at most eight. The result is the same.")
 ]
@@ -62,7 +60,7 @@ def cut_codes(given: list[str] | None) -> list[float] | None:
     try:
         return [plain_number(code) for code in text.split(",")]
     except ValueError:
-        raise NeuralocksError(f"--cuts {text}: is no list of frames; write for example 25,49, or none") from None
+        raise NeuralocksError(f"--cuts {text}: is not a list of frames; write for example 25,49, or none") from None
 
 
 def pairs(words: list[str] | None, option: str) -> dict[str, str]:

@@ -16,7 +16,9 @@ from .progress import progress_bar
 app = typer.Typer(no_args_is_help=True, add_completion=False)
 command = command_of(app)
 
-Chains = Annotated[list[str] | None, typer.Option(help="Name pattern of hair chains' first joints, such as 'Hair*_1'.")]
+Chains = Annotated[
+    list[str] | None, typer.Option(help="Name pattern of the first joints of hair chains, such as 'Hair*_1'.")
+]
 Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
 
 
@@ -30,20 +32,22 @@ def train(
     seconds: Annotated[
         float | None,
         typer.Option(
-            help="Seconds to train, besides simulating (see --clips) and the report; 120, and 75 quasi-static."
+            help="Seconds to train, without simulating (see --clips) and the report; 120, or 75 if quasi-static."
         ),
     ] = None,
     steps: Annotated[
         int | None, typer.Option(help="Train this many steps instead; the result is then reproducible.")
     ] = None,
-    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, and 16 quasi-static.")] = None,
-    clips: Annotated[int | None, typer.Option(help="Simulated motions to learn from; 256. Dynamic only.")] = None,
+    hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, or 16 if quasi-static.")] = None,
+    clips: Annotated[
+        int | None, typer.Option(help="Simulated motions to learn from; 256 if left out. Dynamic only.")
+    ] = None,
     bend: Annotated[
         float | None, typer.Option(help="Stiffness over line density, in m^4/s^2; 0.01 if left out.")
     ] = None,
-    weight: Annotated[float | None, typer.Option(help="Times gravity; 1 if left out.")] = None,
+    weight: Annotated[float | None, typer.Option(help="Weight as a multiple of gravity; 1 if left out.")] = None,
     damping: Annotated[
-        float | None, typer.Option(help="Of motion in the head's frame [1/s], 6 if left out. Dynamic only.")
+        float | None, typer.Option(help="Damping of motion in the head's frame [1/s]; 6 if left out. Dynamic only.")
     ] = None,
     seed: Seed = 0,
     chains: Chains = None,
@@ -98,7 +102,9 @@ def bake(
     model: Annotated[Path | None, typer.Option(help="Model file; the shipped one if left out.")] = None,
     frames: Annotated[
         str | None,
-        typer.Option(help="FIRST:LAST[:STEP] to sample besides the animation's own; the shot's range if left out."),
+        typer.Option(
+            help="FIRST:LAST[:STEP] to sample besides the animation's own samples; the shot's range if left out."
+        ),
     ] = None,
     subframes: Subframes = 1,
     loop: Loop = False,
@@ -111,9 +117,9 @@ def bake(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write the hair joints' animation, of every character that has the model's chains, as an override layer of the shot.
+    """Bake the hair joints of every character that has the model's chains into an override layer over the shot.
 
-    Where characters need different models, bake one with --skeleton, then the next from that bake: the last layer moves them all.
+    If characters need different models, bake one with --skeleton, then the next from that bake: the last layer moves them all.
     """
     from ..rig.bake import bake_rig
 
@@ -152,7 +158,7 @@ def evaluate(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print the report card of hair that moves on its bones: how much lies in the body, how far it swings, whether it rests."""
+    """Print the report card of hair on bones: how much is inside the body, how far it swings, whether it comes to rest."""
     from ..rig.evaluate import evaluate_rig
 
     with progress_bar("evaluating") as progress:
@@ -173,7 +179,7 @@ def evaluate(
 def export_c(
     model: Model = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Header to write.")] = Path("hair.h"),
-    prefix: Annotated[str, typer.Option(help="Prefix of all names in it.")] = "nl_hair",
+    prefix: Annotated[str, typer.Option(help="Prefix of all names in the header.")] = "nl_hair",
 ) -> None:
     """Write one self-contained C99 header, usable from C++, and a worked example beside it."""
     from neuralocks_core.rig.export_c import example_beside

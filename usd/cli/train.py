@@ -33,7 +33,7 @@ def train_command(
     out: Out,
     groom: Annotated[list[str] | None, typer.Option(help="USD grooms, or 'library' for the procedural styles.")] = None,
     motion: Annotated[
-        list[str] | None, typer.Option(help="BVH or USD motions; made-up motion is always added.")
+        list[str] | None, typer.Option(help="BVH or USD motions; generated motion is always added.")
     ] = None,
     minutes: Annotated[float, typer.Option(help="Time to train.")] = 10.0,
     steps: Annotated[
@@ -43,26 +43,26 @@ def train_command(
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="Begin with what this model has learned, with the 'shipped' one or with 'nothing'.",
+            help="Start from what this model has learned, from the 'shipped' one or from 'nothing'.",
             show_default="shipped, where it fits",
         ),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted training, or with a kept one for more minutes.")
+        bool, typer.Option("--resume", help="Resume an interrupted training, or continue a kept one for more minutes.")
     ] = False,
     skeleton: Skeleton = None,
     head: Head = None,
     joint: Joints = None,
     static: Annotated[bool, typer.Option("--static", help="The quasi-static variant: no history.")] = False,
     variations: Annotated[
-        int, typer.Option(min=0, max=50, help="Of each style of the library, beside the style itself.")
+        int, typer.Option(min=0, max=50, help="Variations of each library style, besides the style itself.")
     ] = 0,
     rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
     method: Annotated[
         str,
         typer.Option(
-            help="rollouts: learn from simulations made meanwhile; selfsupervised: the paper's own, from the physics alone."
+            help="rollouts: learn from simulations made during training; selfsupervised: the paper's, from the physics alone."
         ),
     ] = "rollouts",
     paper: Annotated[
@@ -70,12 +70,12 @@ def train_command(
         typer.Option("--paper", help="With selfsupervised, the paper's network, bending, adhesion and damping."),
     ] = False,
     setting: Annotated[
-        list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; a wrong name lists them.")
+        list[str] | None, typer.Option("--set", help="NAME=VALUE of the method's options; an unknown name lists them.")
     ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
     seed: Seed = 0,
-    credit: Annotated[list[str] | None, typer.Option(help="A line for the model card; repeat for more.")] = None,
-    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint afterwards.")] = False,
+    credit: Annotated[list[str] | None, typer.Option(help="A credit for the model card; repeat for more.")] = None,
+    keep_work: Annotated[bool, typer.Option("--keep-work", help="Keep simulations and checkpoint when done.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Train a strand model for a character (extra 'train')."""
@@ -118,4 +118,4 @@ def _how_to_go_on(out: Path) -> list[str]:
         work_folder(out, resume=True)
     except NeuralocksError:  # nothing kept yet
         return []
-    return ["the same command with --resume goes on from here, without it it begins anew"]
+    return ["the same command with --resume continues from here; without it, training starts over"]

@@ -39,14 +39,14 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
     if not _ours(folder / DESCRIPTION):
-        raise NeuralocksError(f"{folder / DESCRIPTION}: is of something else; move it, or choose another folder")
+        raise NeuralocksError(f"{folder / DESCRIPTION}: belongs to something else; move it, or choose another folder")
     description, again = described(file), (folder / DESCRIPTION).exists()
     tables = {}
     with ExitStack() as all_or_none:
 
         def put(name: str) -> Path:
             if not again and (folder / name).is_file():
-                raise NeuralocksError(f"{folder / name}: is of something else; move it, or choose another folder")
+                raise NeuralocksError(f"{folder / name}: belongs to something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
         if shot is not None:

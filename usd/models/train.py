@@ -151,7 +151,7 @@ def parsed(kind: type, settings: dict) -> dict:
     result = {}
     for name, value in settings.items():
         if name not in fields:
-            raise NeuralocksError(f"--set {name}: is no option of this method; it has {', '.join(sorted(fields))}")
+            raise NeuralocksError(f"--set {name}: is not an option of this method; it has {', '.join(sorted(fields))}")
         result[name] = _value(name, value, fields[name].default) if isinstance(value, str) else value
     return result
 

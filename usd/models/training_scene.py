@@ -79,7 +79,7 @@ def training_scene(
         raise NeuralocksError(f"--variations {variations}: must be from 0 to {MOST_VARIATIONS}")
     if variations and LIBRARY not in grooms:
         raise NeuralocksError(
-            f"--variations {variations}: are of the library's styles; add --groom {LIBRARY}, or leave it out"
+            f"--variations {variations}: apply to the library's styles; add --groom {LIBRARY}, or leave it out"
         )
     rigs = read_rigs(character, skeleton, head, joints)
     rig = rigs[0]

@@ -79,7 +79,7 @@ def evaluate(
     notes = list(baked.shot.notes)
     each = {item.path: baked.alone(item) for item in baked.shot.grooms}
     if min(len(own.codes) for own in each.values()) < 3:
-        notes.append("fewer than three frames: nothing is said about motion, and nothing is compared")
+        notes.append("fewer than three frames: motion is neither measured nor compared")
     for item in baked.shot.grooms:
         own = each[item.path]
         subject = _Subject(own, item, say)

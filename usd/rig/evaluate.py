@@ -57,7 +57,7 @@ class RigCard:
         m = self.measures
         lines = [
             f"measured: {m['vertices']} vertices in {m['frames']} frames",
-            f"swing: {m['swing_mm']:.1f} mm from where hair carried rigidly is, most of '{m['swing_most']}', "
+            f"swing: {m['swing_mm']:.1f} mm from hair carried rigidly, most of '{m['swing_most']}', "
             f"{m['swing_most_mm']:.1f} mm"
             if m["swing_most_mm"] > ROUNDING
             else "swing: none, as if hair were carried rigidly",
@@ -74,7 +74,7 @@ class RigCard:
                     f"in {m['body_frames']} frames"
                 )
         if "body" not in m:
-            lines.append("inside the body: not measured, none of this skeleton's is near the hair")
+            lines.append("inside the body: not measured, no body of this skeleton is near the hair")
         return lines
 
 

@@ -22,7 +22,7 @@ def facing_notes(rig: StageRig) -> list[str]:
     by = " and ".join(f"'{leaf(names[joint])}'" for joint in character.sides)
     if witness := _behind(character):
         return [
-            f"{rig.path}: by {by} it faces away from where its {witness} point, and hair is moved as if it did; "
+            f"{rig.path}: judged by {by}, it faces away from where its {witness} point, and hair is moved as if it did; "
             "left and right are swapped, rename them"
         ]
     angle = character.facing_angle
@@ -30,8 +30,8 @@ def facing_notes(rig: StageRig) -> list[str]:
     if abs(off) <= ASKEW:
         return []
     return [
-        f"{rig.path}: by {by} its bind pose faces {abs(off):.0f} degrees off the stage's nearest axis, and hair is moved as if "
-        "it did; bind it symmetrically, or turn an engine's axes as the C header says"
+        f"{rig.path}: judged by {by}, its bind pose faces {abs(off):.0f} degrees off the stage's nearest axis, and hair is "
+        "moved as if it did; bind it symmetrically, or turn an engine's axes as the C header says"
     ]
 
 

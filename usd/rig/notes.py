@@ -51,13 +51,13 @@ def weight_notes(source: StageRig) -> list[str]:
         if free.any():
             first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
             notes.append(
-                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights; read as if they were bound to the "
-                f"first joint that they name, such as '{first}', bind them in the rig"
+                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights and are read as bound to the "
+                f"first joint that they name, such as '{first}'; bind them in the rig"
             )
         if (off & ~free).any():
             notes.append(
-                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one; "
-                "read as if they did, normalise them in the rig"
+                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one "
+                "and are read as if they did; normalise them in the rig"
             )
     return notes
 

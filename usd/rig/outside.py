@@ -32,7 +32,7 @@ def outside_notes(source: StageRig) -> list[str]:
     hang, them = f"hangs from '{above}' and is", "it"
     if loose[1:]:
         hang, them = f"and {len(loose) - 1} more hang from '{above}' and are", "them"
-    remedy = f"hang {them} from the head in the rig"
+    remedy = f"parent {them} to the head in the rig"
     if above in neck:
         remedy = f"to move all, train and bake with --head {above}"
     return [f"{source.path}: '{leaf(loose[0])}' {hang} not moved; {remedy}"]

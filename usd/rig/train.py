@@ -96,7 +96,7 @@ def train_rig(
         model = train(hair.rig, values, seed=seed, keep=write if early else None, progress=progress, **chosen)
     except KeyboardInterrupt:
         if written and tell:
-            tell([f"{out}: is written, without the report that was being measured"])
+            tell([f"{out}: is written, but without its report, which was still being measured"])
         raise
     write(model)
     if tell:

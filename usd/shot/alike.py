@@ -42,8 +42,8 @@ def one_of_alike(prim: Usd.Prim, seats: list[Seat], notes: list[str]) -> Seat:
         )
     if others:
         notes.append(
-            f"{prim.GetPath()}: is taken for hair of {best.rig.path}, where that stands; the body of {others[0].rig.path} is as "
-            "near in its bind pose: if it is that one's, bind it, or name both with --groom and --skeleton"
+            f"{prim.GetPath()}: is taken as hair of {best.rig.path}, by where that stands; the body of {others[0].rig.path} is "
+            "as near in its bind pose: if the hair is that one's, bind it, or name both with --groom and --skeleton"
         )
     return best
 

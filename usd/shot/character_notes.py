@@ -54,8 +54,8 @@ def untrained(rig: StageRig) -> list[str]:
         return []
     each = [f"its {MEASURES[i]} is {measures[i]:.3g} m (trained: {LOWEST[i]:g} to {HIGHEST[i]:g})" for i in far]
     return [
-        f"{rig.path}: {', '.join(each)}; the shipped model, and any that was not trained on this character, draws its hair as if "
-        "that were the nearest trained; if it shows, train one on it; if a hat or the like is one piece with its skin, part them"
+        f"{rig.path}: {', '.join(each)}; a model that was not trained on this character, such as the shipped one, moves its hair as if "
+        "that were the nearest trained size; if it shows, train one on it; if a hat or the like is part of its skin mesh, split it off"
     ]
 
 
@@ -76,7 +76,7 @@ def unevenly_scaled(rig: StageRig) -> list[str]:
         much = f"over {FLATTENED} times as much along one axis as"
     return [
         f"{rig.path}: {what} is scaled unevenly and stretches its hair, at time code {code:g} {much} "
-        "along another: strands keep their lengths before that, not in the world; scale it evenly if that shows"
+        "along another: strands keep their lengths before that scale, not in the world; scale it evenly if that shows"
     ]
 
 
@@ -105,7 +105,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
         return []
     hidden, loose = _unused_meshes(bare[0].source.prim.GetStage())
     return [
-        f"{rig.path}: moves no visible mesh, so hair is kept out of no body and moves as an average head's; "
+        f"{rig.path}: moves no visible mesh, so hair is kept out of no body and moves as on an average head; "
         f"{_meant(hidden.get(rig.path, []), loose, rig) or 'bind its mesh to it'}"
         for rig in bare
     ]

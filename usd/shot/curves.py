@@ -30,7 +30,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     chosen = set()
     for text in prim_paths(wanted, "grooms"):
         if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
-            raise NeuralocksError(f"{text}: no prim path; give an absolute one such as {_examples(every)}")
+            raise NeuralocksError(f"{text}: not a prim path; give an absolute one such as {_examples(every)}")
         below = [p for p in every if p.GetPath().HasPrefix(text)]
         if not below:
             prim = stage.GetPrimAtPath(text)
@@ -88,11 +88,11 @@ def left_as_they_are(prim: Usd.Prim) -> list[str]:
     if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
         notes.append(
             f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
-            "remove them, so that it is drawn as tubes or towards the camera"
+            "remove them, so that it is drawn as tubes or facing the camera"
         )
     if UsdSkel.BindingAPI(prim).GetBlendShapeTargetsRel().GetTargets():
         notes.append(
-            f"{prim.GetPath()}: has blend shapes of its own, which a bake leaves out; put them into its points"
+            f"{prim.GetPath()}: has blend shapes of its own, which a bake leaves out; apply them to its points"
         )
     return notes
 

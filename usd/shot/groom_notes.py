@@ -67,7 +67,7 @@ def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> 
     """
     how, unbound = ("is bound to", "unbind the hair and ") if bound else ("lies on the character of", "")
     fact = "cannot be used, as neuralocks inspect explains" if named else "cannot be used, and is left out with it"
-    return f"{path}: {how} {own}, which {fact}; mend that skeleton, or {unbound}name another for it with --groom and --skeleton"
+    return f"{path}: {how} {own}, which {fact}; fix that skeleton, or {unbound}name another for it with --groom and --skeleton"
 
 
 def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:

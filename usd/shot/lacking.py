@@ -43,7 +43,7 @@ def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> Neura
     missing = composition_notes(stage, path)
     if missing:
         loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
-        remedy = f"not all of it is there ({loaded}); bring along what the file refers to"
+        remedy = f"parts of it are missing ({loaded}); add the files that it refers to"
     return NeuralocksError(f"{path}: holds no {what}; {remedy}")
 
 

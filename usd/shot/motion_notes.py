@@ -19,7 +19,7 @@ def motion_notes(motion: Motion, joints: np.ndarray, humanoid: Humanoid) -> list
     notes = []
     if motion.guessed:
         notes.append(
-            f"{motion.name}.bvh: its pose without turns stands along no axis, so how the performer stands is told by the motion; "
+            f"{motion.name}.bvh: its pose with zero rotations stands along no axis, so which way is up is taken from the motion; "
             "if joints look twisted, export it with a T-pose as rest pose"
         )
     if mostly_lies(joints, humanoid):

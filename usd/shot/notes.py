@@ -134,7 +134,7 @@ def on_twos(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     frames = np.array([held.min(), held.max()]) * np.median(np.diff(rig.time_codes)) / rig.border.frame
     named = " to ".join(dict.fromkeys(f"{each:.3g}" for each in frames))
     return [
-        f"{rig.path}: its animation holds poses for {named} frames each; hair moves as if it went on smoothly in between"
+        f"{rig.path}: its animation holds poses for {named} frames each; hair moves as if the motion were smooth in between"
     ]
 
 
@@ -150,7 +150,7 @@ def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
             "turn against it; export it with the body's skeleton as one"
         ]
     return [
-        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk serves, or name it with --joint",
+        f"{rig.path}: no joint found for {', '.join(missing)}; the next one towards the trunk is used, or name it with --joint",
         *_without_elbow(rig, joints),
     ]
 
@@ -235,8 +235,8 @@ def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
     if not others:
         return []
     return [
-        f"{rig.path}: {', '.join(others[:3])} {'is' if len(others) == 1 else 'are'} the same character, whose meshes hair is not "
-        "kept out of; bind them to one skeleton if hair touches them"
+        f"{rig.path}: {', '.join(others[:3])} {'is' if len(others) == 1 else 'are'} the same character, but hair is not kept "
+        "out of those meshes; bind all to one skeleton if hair touches them"
     ]
 
 

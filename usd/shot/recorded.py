@@ -40,7 +40,7 @@ def retimed(prim: Usd.Prim) -> list[str]:
     if abs(slower - 1) < 1e-6:
         return []
     return [
-        f"{prim.GetPath()}: its bake is stretched to {slower:g} times as long, but its velocities and the way it swings are not; "
+        f"{prim.GetPath()}: its bake is stretched to {slower:g} times its length, but its velocities and its swing are not; "
         "bake the shot as it is timed here"
     ]
 

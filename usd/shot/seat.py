@@ -174,7 +174,7 @@ def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
     if apart < APART:
         return []
     return [
-        f"{prim.GetPath()}: its motion is neither that of {seat.rig.path} nor of the head, and it is guessed where it lies at rest, "
+        f"{prim.GetPath()}: its motion is neither that of {seat.rig.path} nor of the head, so its place at rest is a guess, "
         f"maybe wrong by {1000 * apart:.2g} mm; bind it to the skeleton"
     ]
 

@@ -114,6 +114,6 @@ def coarsely_placed(prim: Usd.Prim, rig: StageRig, character: Character, placeme
     if worst < COARSE:
         return []
     return [
-        f"{prim.GetPath()}: the head is up to {away:.0f} m from this prim's origin, where points can only be {1000 * worst:.2g} mm "
-        "apart, so its strands tremble; bring the character there by a transform above its hair"
+        f"{prim.GetPath()}: the head is up to {away:.0f} m from this prim's origin, where points only move in steps of {1000 * worst:.2g} mm, "
+        "so its strands tremble; move the character there by a transform above its hair"
     ]

@@ -226,7 +226,7 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
 def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tuple[list[StageRig], list[str]]:
     """The skeletons that can be used, and the notes on those that cannot."""
     if not isinstance(joints, dict | None):
-        raise NeuralocksError(f"joints: {joints!r} is no dict; give one such as {{'left_upper_arm': 'arm_L'}}")
+        raise NeuralocksError(f"joints: {joints!r} is not a dict; give one such as {{'left_upper_arm': 'arm_L'}}")
     prims = find_skeletons(stage)
     names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
     if skeleton is not None:

@@ -43,8 +43,8 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
 
     if held(first, last, 2) and not held(first, last, len(samples)):
         source.notes.append(
-            f"{source.path}: its animation has {len(samples):,} samples of {len(source.names)} joints, too many to hold; it is read "
-            "once a frame"
+            f"{source.path}: its animation has {len(samples):,} samples of {len(source.names)} joints, too many to hold in memory; it is "
+            "read once per frame"
         )
         samples = [first, last]
     stage = source.prim.GetStage()
@@ -57,7 +57,7 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
             first, last = start, end
     if not held(first, last, len(samples)):
         raise NeuralocksError(
-            f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold; "
+            f"{source.path}: its animation spans time codes {first:g} to {last:g}, too many samples to hold in memory; "
             "remove stray keys, or samples and joints that the shot does not need"
         )
     begin = np.ceil(first) if frame == 1 else first

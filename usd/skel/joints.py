@@ -136,7 +136,7 @@ class JointSource:
         parents = []
         for index, name in enumerate(self.names):
             if not Sdf.Path.IsValidPathString(name):
-                raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is no path; rename it")
+                raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is not a path; rename it")
             if name in seen:
                 # Exporters put '_' for each letter that they do not take: all names of a Japanese rig become alike.
                 lost = not any(letter.isalnum() for letter in leaf(name))

@@ -92,13 +92,13 @@ class StageRig:
             name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
             notes.append(
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
-                "a loop ends with the pose that it begins with"
+                "a loop must end with the pose that it begins with"
             )
         # Subframes of the last frame lie past the end, too.
         if len(codes) and (codes[0] < start or codes[-1] >= end + self.border.frame):
             notes.append(
-                f"{self.path}: its animation goes from {start:g} to {end:g}; outside of that its hair moves on as the loop "
-                "does while the body stands, so bake one round and repeat it"
+                f"{self.path}: its animation goes from {start:g} to {end:g}; outside that range the hair goes on with the "
+                "loop while the body stands still, so bake one cycle and repeat it"
             )
         return notes
 
@@ -116,12 +116,12 @@ class StageRig:
             if loop
             else "the hair starts anew there (--cuts says where)"
         )
-        notes = [f"{self.path}: its head is put elsewhere at {self._named(cuts)}; {what}"] if len(cuts) else []
+        notes = [f"{self.path}: its head jumps to another place at {self._named(cuts)}; {what}"] if len(cuts) else []
         if len(flashes):
             every = self._named(np.union1d(cuts, flashes))
             notes.append(
-                f"{self.path}: its head leaps at {self._named(flashes)}, less than {APART:g} s from one leap to the next, so these "
-                f"are no cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
+                f"{self.path}: its head jumps at {self._named(flashes)}, less than {APART:g} s from one jump to the next, so these "
+                f"are not taken as cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
             )
         return notes
 

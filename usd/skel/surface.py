@@ -87,9 +87,9 @@ def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
     remedy = f"make {common} a SkelRoot" if common != Sdf.Path.absoluteRootPath else "put both below a SkelRoot"
     if hidden:
         kind = hidden.GetTypeName()
-        remedy = f"{hidden.GetPath()} is one below an opinion that types it {kind}: type it SkelRoot there"
+        remedy = f"{hidden.GetPath()} is one below a stronger opinion that types it {kind}: type it SkelRoot there"
     return [
-        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws that as it was made, whatever the skeleton does; {remedy}"
+        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws it as modelled, whatever the skeleton does; {remedy}"
     ]
 
 
@@ -235,7 +235,7 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | 
         raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     triangles = _triangles(mesh, path, len(points))
     if inside_out(points, triangles):
-        notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to be rid of this")
+        notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to fix this")
         triangles = triangles[:, ::-1]
     method = _in_effect(prim, "primvars:skel:skinningMethod")
     if method and rest_value(method) == UsdSkel.Tokens.dualQuaternion:

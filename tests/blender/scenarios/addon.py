@@ -68,7 +68,7 @@ def panel(folder: Path) -> None:
     assert said.count(attach) == 1
     assert not any("wide" in line or "range" in line for line in said), said
     scene.frame_set(30)
-    assert "frames 1 to 24 only" in " ".join(drawn())
+    assert "Hair only knows the motion of frames 1 to 24" in " ".join(drawn())
     rig.neuralocks_character.loop = True
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
     scene.neuralocks.use_scene_range = False

@@ -253,6 +253,6 @@ def not_ours(folder: Path) -> None:
                 stage.DefinePrim("/Mine")
                 stage.Export(str(own))
             mine = own.read_bytes()
-            refused(lambda write=write, first=first: write(filepath=str(first)), own.name, "not made by Neuralocks")
+            refused(lambda write=write, first=first: write(filepath=str(first)), own.name, "Neuralocks did not make it")
             assert own.read_bytes() == mine
             own.write_bytes(made)

@@ -41,7 +41,7 @@ def told_of_the_export(folder: Path) -> None:
     (first, ended), *notes = said
     assert first == "INFO" and ended.startswith("Rig: hair bones written to"), said
     assert notes and all(kind == "WARNING" and "--" not in text for kind, text in notes), notes
-    assert any(text.startswith("Rig: bone '") and "a loop ends" in text for _, text in notes), notes
+    assert any(text.startswith("Rig: bone '") and "a loop must end" in text for _, text in notes), notes
 
 
 def export_cancelled(folder: Path) -> None:

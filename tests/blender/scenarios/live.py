@@ -27,7 +27,7 @@ def sampled_first(_folder: Path) -> None:
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     with patch("dcc_addon.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
         strands.neuralocks_hair.live = True
-        assert session.wanting and "sampled first" in messages()["Hair"], messages()
+        assert session.wanting and "sampled as soon as playback stops" in messages()["Hair"], messages()
         assert said("TIME") and not said("ERROR")
         session.failed.add("Rig")
         live.refresh(scene)

@@ -125,7 +125,7 @@ def training_meanwhile(folder: Path) -> None:
     assert bpy.ops.neuralocks.train() == {"FINISHED"}
     bpy.data.objects.remove(strands)
     said, well = _ended()
-    assert "not in this file" in said and "HHH_1.neuralocks" in said and not well
+    assert "no longer in this file" in said and "HHH_1.neuralocks" in said and not well
 
     _in_training(folder)
     scenes.empty()

@@ -115,7 +115,7 @@ def told_of_a_bake(folder: Path) -> None:
     curves.write(strands.data, first.astype(np.float32))
     scene.neuralocks.output = str(folder / "hair.usdc")
     told = _told(bpy.ops.neuralocks.bake)
-    for begin, words in (("Hero: its head is put elsewhere at 13", "anew"), ("前髪: 1 of 20 strands", "rigidly")):
+    for begin, words in (("Hero: its head jumps to another place at 13", "anew"), ("前髪: 1 of 20 strands", "rigidly")):
         assert any(line.startswith(begin) and words in line for line in told), told
     assert not any("/Character" in line or "--" in line for line in told), told
     assert bpy.ops.neuralocks.report_card() == {"FINISHED"}

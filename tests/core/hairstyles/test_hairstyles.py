@@ -190,7 +190,7 @@ def test_a_mouth_is_no_room_for_hair():
         (lambda: Scalp(np.zeros((3, 3)), [[0, 1, 2]], CENTRE), "its area is 0"),
         (lambda: Scalp(np.zeros((3, 3)), [[0, 1, 7]], CENTRE), "not there"),
         (lambda: Scalp(np.full((3, 3), np.nan), [[0, 1, 2]], CENTRE), "not finite"),
-        (lambda: grow("bob", None, 10), "scalp: None is none; give a Scalp"),
+        (lambda: grow("bob", None, 10), "scalp: None is not one; give a Scalp"),
         (lambda: grow("bob", SCALP, 10, body=(BODY[0] + 9, BODY[1])), "same space"),
         (lambda: from_head(BODY[0] - [0, 5, 0], BODY[1], CENTRE), "by hand"),
     ],

@@ -89,7 +89,7 @@ def test_two_models_under_one_prefix_do_not_compile(tmp_path):
 
 def test_nobodys_own_file_is_written_over_by_the_example(tmp_path):
     (tmp_path / "hair_example.c").write_text("int mine;\n")
-    with pytest.raises(NeuralocksError, match="hair_example.c: would be written over by the worked example"):
+    with pytest.raises(NeuralocksError, match="hair_example.c: would be overwritten by the worked example"):
         export_c(random_model(), tmp_path / "hair.h")
     assert [file.name for file in tmp_path.iterdir()] == ["hair_example.c"]
     with pytest.raises(NeuralocksError, match="no #include can name it"):

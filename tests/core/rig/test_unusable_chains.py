@@ -45,7 +45,7 @@ def test_a_model_for_other_chains_is_refused():
     with pytest.raises(NeuralocksError, match="train a model for this rig"):
         chains.match(["head", "head/hair_1"], np.array([False, True]))
     longer = find_chains(character(tail("hair", 3, step=(0, -0.08, 0))))
-    with pytest.raises(NeuralocksError, match="elsewhere"):
+    with pytest.raises(NeuralocksError, match="away from its place"):
         chains.check_same(longer)
     assert HairChains.from_json(chains.to_json()).names == chains.names
 
@@ -71,7 +71,7 @@ def test_a_rig_with_another_joint_called_as_a_chain_is_refused_before_it_is_trai
     alike = Character(replace(longer, names=[name.replace("/tip", "/lock_2") for name in longer.names]))
     assert find_chains(alike).names == ("lock_1", "lock_2"), "what it hangs from tells the second joint"
     who = Character(replace(rig, names=[name.replace("/tip", "/lock_1") for name in rig.names]))
-    with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', as a hair chain; rename"):
+    with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', like a hair chain; rename"):
         find_chains(who)
 
 

@@ -166,7 +166,9 @@ def test_damaged_and_hostile_models_are_refused(tmp_path):
 
 def test_a_deep_map_of_a_strand_is_not_left_out(tmp_path):
     path = _written(tmp_path / "deep.neuralocks", strand_map="deep")
-    with pytest.raises(NeuralocksError, match="not built as ours .a deep map of a strand.; begin with another"):
+    with pytest.raises(
+        NeuralocksError, match="built differently from this one .a deep map of a strand.; begin with another"
+    ):
         Beginning(path).fill(StrandNet(SPEC.size, motion="modulated"))
 
 

@@ -193,7 +193,7 @@ def test_ctrl_c_while_processes_start_is_heard_once_they_run(tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("status", "why"), [(-9, "was killed; free some memory, and"), (1, "mend what it says above, and")]
+    ("status", "why"), [(-9, "was killed; free some memory, and"), (1, "fix what it reports above, and")]
 )
 def test_memory_is_blamed_for_a_process_that_was_killed(tmp_path, monkeypatch, status, why):
     assert why in str(farm_of(monkeypatch, tmp_path, SimpleNamespace(exitcode=status)).failure("try again"))

@@ -192,11 +192,11 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     hung = replace(scene.character, skeleton=replace(skeleton, parents=[*skeleton.parents[:-1], 0]))
     assert skeleton.parents[-1] != 0
     for other, fact in (
-        (replace(scene, seed=7), f"begun with --seed {scene.seed}; resume with that"),
-        (replace(scene, character=renamed), "begun with another character"),
-        (replace(scene, character=hung), "begun with another character"),
-        (replace(scene, character=replace(scene.character, carrier=2)), "begun with another character"),
-        (replace(scene, grooms=shorter), "begun with another groom; resume with the same, or train without"),
+        (replace(scene, seed=7), f"began with --seed {scene.seed}; resume with that"),
+        (replace(scene, character=renamed), "began with a different character"),
+        (replace(scene, character=hung), "began with a different character"),
+        (replace(scene, character=replace(scene.character, carrier=2)), "began with a different character"),
+        (replace(scene, grooms=shorter), "began with a different groom; resume with the same, or train without"),
     ):
         with pytest.raises(NeuralocksError, match=fact):
             train_strands(other, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True)
@@ -211,7 +211,7 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     told = []
     other = RegressionOptions(steps=6, collision=9.0, **tiny)
     train_strands(scene, out, other, rollouts=4, resume=True, tell=told.extend)
-    assert len(told) == 1 and "goes on with other options than it was begun with: collision 9.0 after 45.0" in told[0]
+    assert len(told) == 1 and "continues with other options than it began with: collision 9.0 after 45.0" in told[0]
     assert model.read(out).meta["training"]["resumed with other options"] == ["collision 9.0 after 45.0"]
 
 

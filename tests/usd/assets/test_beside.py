@@ -91,8 +91,8 @@ def test_what_does_not_go_on_is_told(imported):
     prim, stage, notes = imported(change)
     assert sorted(notes) == [
         "/Hero/Hair: its material /Hero/Brown is not imported; bind one to the new groom",
-        "/Hero/Hair: primvars:Pref (point3f[]) is of the space of its file; left out",
+        "/Hero/Hair: primvars:Pref (point3f[]) is in the space of its own file; left out",
         "/Hero/Hair: primvars:few (uniform) does not fit 3 strands of 12 points; left out",
-        "/Hero/Hair: primvars:map names files, which are not found from everywhere; left out",
+        "/Hero/Hair: primvars:map names files, whose paths may not resolve from elsewhere; left out",
     ]
     assert not any(UsdGeom.PrimvarsAPI(prim).HasPrimvar(name) for name in ("Pref", "map", "few"))

@@ -49,8 +49,8 @@ def bakes(shots, model):
 
 
 def test_hair_starts_anew_after_a_cut(bakes):
-    assert any(note.startswith("/Hero/Rig: its head is put elsewhere at 13;") for note in bakes["found"].notes)
-    assert not any("elsewhere" in note for name in ("given", "none", "after") for note in bakes[name].notes)
+    assert any(note.startswith("/Hero/Rig: its head jumps to another place at 13;") for note in bakes["found"].notes)
+    assert not any("another place" in note for name in ("given", "none", "after") for note in bakes[name].notes)
     for code in (1, CUT - 1, CUT, CUT + 3):
         found, given = (samples(bakes[name].path, "points", at=code) for name in ("found", "given"))
         np.testing.assert_array_equal(found, given)
@@ -71,7 +71,7 @@ def test_cuts_that_follow_each_other_at_once_are_told_with_what_makes_them_some(
         places[0, 0] -= 3
         motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(places), code)
     layer.Save()
-    told = "/Hero/Rig: its head leaps at 13,16, less than 0.2 s from one leap to the next"
+    told = "/Hero/Rig: its head jumps at 13,16, less than 0.2 s from one jump to the next"
     (note,) = [note for note in inspect(layer.realPath)["spoils"] if "its head" in note]
     assert note.startswith(told) and "(--cuts 13,16)" in note
     assert note in bake(layer.realPath, tmp_path / "out.usdc", model).notes
@@ -128,16 +128,16 @@ def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
     rigs = {item.attachment.rig.path: item.attachment.rig for item in read_baked(second).shot.grooms}
     assert rigs["/Hero/Rig"].clip.cuts * 24 == pytest.approx([5, 7])
     assert not len(rigs["/Twin/Rig"].clip.cuts)
-    assert not any("elsewhere" in note for note in inspect(second)["spoils"])
+    assert not any("another place" in note for note in inspect(second)["spoils"])
 
 
 def test_a_loop_has_no_cuts(shots, tmp_path, model):
     made = [bake(shots[0], tmp_path / f"{i}.usdc", model, loop=True, cuts=cuts) for i, cuts in enumerate((None, []))]
     for bakes in made:
-        (note,) = [note for note in bakes.notes if "elsewhere" in note]
-        assert note.startswith("/Hero/Rig: its head is put elsewhere at 13; a loop has no cuts")
+        (note,) = [note for note in bakes.notes if "another place" in note]
+        assert note.startswith("/Hero/Rig: its head jumps to another place at 13; a loop has no cuts")
     whole = write_loop(tmp_path)
-    assert not any("elsewhere" in note for note in bake(whole, tmp_path / "whole.usdc", model, loop=True).notes)
+    assert not any("another place" in note for note in bake(whole, tmp_path / "whole.usdc", model, loop=True).notes)
     loops = [each.path for each in made]
     for name in ("points", "velocities"):
         assert (samples(loops[0], name, at=CUT) == samples(loops[1], name, at=CUT)).all()

@@ -117,7 +117,9 @@ def test_parts_by_character_are_the_one_bake_byte_for_byte(crowd, tmp_path, mode
         f"/Set/{name}: no part has samples before 3" for name in ("Bob/Hair", "Bob/Beard", "Ann/Hair", "Ann/Beard")
     ]
     bake(crowd, tmp_path / "other.usdc", model, material=["stiffness=2x"])
-    with pytest.raises(NeuralocksError, match="other.usdc: /Set/.* was baked with other material than in .*Zoe0.usdc"):
+    with pytest.raises(
+        NeuralocksError, match="other.usdc: /Set/.* was baked with different material than in .*Zoe0.usdc"
+    ):
         join([*parts, tmp_path / "other.usdc"], tmp_path / "hair.usdc")
 
 
@@ -171,19 +173,19 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
         (
             shot,
             {"material": ["stiffness=2x"]},
-            "other.usdc: /Hero/Hair was baked with other material than in .*part.usdc",
+            "other.usdc: /Hero/Hair was baked with different material than in .*part.usdc",
         ),
-        (shot, {"strength": 0.5, "resolve": False}, "other resolve, strength than"),
-        (shot, {"joints": {"upper_chest": "spine"}}, "other joints than"),
-        (shot, {"velocities": False}, "other velocities than"),
-        (elsewhere, {}, "is a bake of another shot than .*part.usdc is"),
-        (None, "empty.usda", "is no bake"),
-        (None, "shot_alone.usda", "is no bake"),
-        (None, "unsampled_alone.usda", "is no bake"),
+        (shot, {"strength": 0.5, "resolve": False}, "different resolve, strength than"),
+        (shot, {"joints": {"upper_chest": "spine"}}, "different joints than"),
+        (shot, {"velocities": False}, "different velocities than"),
+        (elsewhere, {}, "is a bake of a different shot from .*part.usdc"),
+        (None, "empty.usda", "is not a bake"),
+        (None, "shot_alone.usda", "is not a bake"),
+        (None, "unsampled_alone.usda", "is not a bake"),
         (None, "broken.usdc", "broken.usdc: cannot be read"),
         (None, "missing.usdc", "missing.usdc: no such file; check the path"),
         (None, "folder.usdc", "folder.usdc: is a folder; name"),
-        (None, "groom.tfx", "groom.tfx: is no bake; give files that neuralocks bake wrote"),
+        (None, "groom.tfx", "groom.tfx: is not a bake; give files that neuralocks bake wrote"),
     ):
         second = (
             tmp_path / options if frames_of is None else bake(frames_of, other, model, frames="5:6", **options).path
@@ -220,7 +222,7 @@ def test_a_lone_part_needs_no_list(shot, tmp_path, model):
     part = bake(shot, tmp_path / "part.usdc", model).path
     for each in (str(part), part):
         assert join(each, tmp_path / "hair.usdc").path.read_bytes() == part.read_bytes()
-    with pytest.raises(NeuralocksError, match="parts: 3 is no path"):
+    with pytest.raises(NeuralocksError, match="parts: 3 is not a path"):
         join(3, tmp_path / "hair.usdc")
 
 

@@ -13,7 +13,7 @@ from usd.rig.stage import read_rigged_hair
 from ..rig_shots import model_for, rotations, small_shot
 from ..shots import Recipe, samples, write_shot
 
-NOTE = "its animation holds poses for 2 frames each; hair moves as if it went on smoothly in between"
+NOTE = "its animation holds poses for 2 frames each; hair moves as if the motion were smooth in between"
 
 
 def on_twos(path, back=0.0):

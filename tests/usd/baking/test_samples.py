@@ -175,7 +175,7 @@ def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
     said = process.communicate()[1]
     assert process.returncode == 130 and not out.exists(), "the bake was over before it could be stopped"
     done = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
-    assert said.endswith(f"note: the same command goes on from here, with {done} frames done\nstopped\n")
+    assert said.endswith(f"note: the same command continues from here, with {done} frames done\nstopped\n")
 
 
 @pytest.mark.parametrize("save_every", [1, 1 << 30])
@@ -190,7 +190,7 @@ def test_a_disk_that_fills_up_leaves_finished_frames_to_go_on_from(tmp_path, mod
     assert ended.value.code == 1 and not out.exists()
     *_, note, error = capsys.readouterr().err.splitlines()
     done = kept(out)
-    assert note == f"note: the same command goes on from here, with {done} frames done" and done >= 3
+    assert note == f"note: the same command continues from here, with {done} frames done" and done >= 3
     assert error.startswith(f"error: {out}: ") and "space" in error
     assert bake(shot, out, model).resumed >= done - 1
     assert out.read_bytes() == whole

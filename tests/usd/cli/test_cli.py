@@ -104,7 +104,7 @@ def test_a_caller_that_closed_the_streams_gets_its_files(tmp_path, model):
 def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     assert status("bake", "--help") == 0
-    assert "mute it to have the shot back. A bake that was stopped goes on" in capsys.readouterr().out
+    assert "mute it to get the shot back. To resume a bake that was stopped, give" in capsys.readouterr().out
 
 
 def test_the_version_is_told(capsys):

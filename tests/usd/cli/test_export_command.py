@@ -49,7 +49,7 @@ def test_a_graph_of_something_else_is_not_written_over(tmp_path, capsys):
     """An earlier export is."""
     (tmp_path / "tail.onnx").write_text("mine")
     assert status("export", "-o", tmp_path) == 1
-    assert "tail.onnx: is of something else" in capsys.readouterr().err
+    assert "tail.onnx: belongs to something else" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["tail.onnx"] and (
         tmp_path / "tail.onnx"
     ).read_text() == "mine"
@@ -62,7 +62,7 @@ def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
     for text in ('{"units": 1}', "notes"):
         (tmp_path / "description.json").write_text(text)
         assert status("export", "-o", tmp_path) == 1
-        assert "description.json: is of something else" in capsys.readouterr().err
+        assert "description.json: belongs to something else" in capsys.readouterr().err
         assert [path.name for path in tmp_path.iterdir()] == ["description.json"]
         assert (tmp_path / "description.json").read_text() == text
 

@@ -105,7 +105,7 @@ def test_numbers_are_written_plainly(tmp_path, model, capsys):
     shot = write_shot(tmp_path)
     for words, fact in (
         (("--frames", "1:1_0"), "--frames 1:1_0: is not FIRST:LAST"),
-        (("--cuts", "1_0"), "--cuts 1_0: is no list of frames"),
+        (("--cuts", "1_0"), "--cuts 1_0: is not a list of frames"),
         (("--material", "weight=\u0662"), "material 'weight=\u0662': no number"),
     ):
         assert status("bake", shot, "-o", tmp_path / "o.usdc", "--model", model, *words) == 1

@@ -55,7 +55,7 @@ def _askew(names, binds):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (_askew, "by 'upperarm_l' and 'upperarm_r' its bind pose faces 1. degrees off the stage's nearest axis"),
+        (_askew, "by 'upperarm_l' and 'upperarm_r', its bind pose faces 1. degrees off the stage's nearest axis"),
         (_swapped, "it faces away from where its toes point, .*; left and right are swapped"),
         (lambda names, binds: (names, binds), None),
     ],

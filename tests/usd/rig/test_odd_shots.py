@@ -148,7 +148,7 @@ def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
 def test_vertices_without_weights_are_told_as_such(tmp_path):
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.0))
     (note,) = weight_notes(hair.source)
-    assert "have no weights; read as if they were bound to the first joint" in note
+    assert "have no weights and are read as bound to the first joint" in note
 
 
 def test_a_range_that_the_animation_does_not_reach_is_told(tmp_path):

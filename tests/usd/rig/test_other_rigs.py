@@ -100,7 +100,7 @@ def test_joints_that_only_begin_otherwise_are_the_models(tmp_path, prefix):
     assert any(f"'{prefix}0' for 'hair_0'" in note for note in result.notes)
     small_shot(tmp_path / "long.usda", step=0.09)
     (other := tmp_path / "long_named.usda").write_text((tmp_path / "long.usda").read_text().replace("hair_", prefix))
-    with pytest.raises(NeuralocksError, match="elsewhere than in the rig"):
+    with pytest.raises(NeuralocksError, match="away from its place in the rig"):
         bake_rig(other, tmp_path / "long_out.usda", model)
 
 

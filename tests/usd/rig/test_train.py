@@ -32,7 +32,7 @@ def test_what_is_there_and_does_not_load_is_not_called_missing(tmp_path, monkeyp
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(
         NeuralocksError,
-        match=r"torch does not load \(libcudart.so.12: cannot open shared object file\); install it anew",
+        match=r"torch does not load \(libcudart.so.12: cannot open shared object file\); reinstall it",
     ):
         train_rig(tmp_path / "none.usda", tmp_path / "m.neuralocks")
 
@@ -70,7 +70,7 @@ def test_who_stops_while_the_report_is_measured_keeps_the_model(tmp_path, monkey
     small = {"steps": 2, "hidden": 4, "early": early, "command": "made so", "clips": 2 if dynamic else None}
     with pytest.raises(KeyboardInterrupt):
         train_rig(small_shot(tmp_path / "who.usda"), out, dynamic=dynamic, tell=told.extend, **small)
-    assert out.exists() == early == any("is written, without the report" in note for note in told)
+    assert out.exists() == early == any("is written, but without its report" in note for note in told)
     if early:
         kept = RigModel.load(out)
         assert kept.training["command"] == "made so" and kept.training["character"] == "who.usda" and not kept.report

@@ -31,7 +31,7 @@ def _named(*joints):
             "pony",
             "'pony' hangs from 'neck' and is not moved; to move all, train and bake with --head neck",
         ),
-        ("hips", "hair_back", "'hair_back' hangs from 'hips' and is not moved; hang it from the head in the rig"),
+        ("hips", "hair_back", "'hair_back' hangs from 'hips' and is not moved; parent it to the head in the rig"),
         ("hips", "tail_0", None),
         ("hips/neck", "scarf_fringe", None),
     ],

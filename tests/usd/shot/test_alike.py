@@ -61,7 +61,7 @@ def test_hair_where_one_of_the_twins_stands_is_its_and_that_is_told(tmp_path):
     shot = read_shot(_twins(tmp_path, {"alice": 2.0, "bob": 0.0}, ["one"]))
     assert _carriers(shot) == {"one": "bob"}
     (note,) = (note for note in shot.notes if note.startswith("/World/Grooms/one/Hair: "))
-    assert "taken for hair of /World/Cast/bob/Model/Rig" in note and "/World/Cast/alice/Model/Rig" in note
+    assert "taken as hair of /World/Cast/bob/Model/Rig" in note and "/World/Cast/alice/Model/Rig" in note
 
 
 def test_one_person_in_two_skeletons_is_no_pair_of_twins(tmp_path):

@@ -72,7 +72,7 @@ def test_a_unit_that_no_layer_says_is_told(tmp_path):
     assert len(_said(_without(path, "metersPerUnit"), "no metersPerUnit, so a unit counts as a centimetre")) == 1
 
 
-NO_BODY = "/Hero/Rig: moves no visible mesh, so hair is kept out of no body and moves as an average head's; "
+NO_BODY = "/Hero/Rig: moves no visible mesh, so hair is kept out of no body and moves as on an average head; "
 
 
 @pytest.mark.parametrize("bound", ["own", "none"])

@@ -50,7 +50,9 @@ def test_what_was_published_anew_is_told(tmp_path, model, name, prim, attribute,
     assert OLD.format(name) in inspect(parts[0])["spoils"] and OLD.format(name) in evaluate(parts[0]).notes
     notes = bake(shot, parts[1], model, frames="5:9").notes
     assert OLD.format(name) not in notes
-    with pytest.raises(NeuralocksError, match=f"part2.usdc: /Hero/Hair was baked from another {name} than in .*part1"):
+    with pytest.raises(
+        NeuralocksError, match=f"part2.usdc: /Hero/Hair was baked from a different {name} than in .*part1"
+    ):
         join(parts, tmp_path / "hair.usdc")
     assert not (tmp_path / "hair.usdc").exists()
     assert not any("bake again" in note for note in bake(parts[0], tmp_path / "over.usdc", model).notes)
@@ -111,7 +113,7 @@ def test_a_bake_that_is_played_slower_is_told_so_and_another_frame_rate_is_not(t
     bake(write_shot(tmp_path), tmp_path / "hair.usdc", model)
     slow = over(tmp_path, "slow", "hair.usdc", " (scale = 2)")
     for notes in (inspect(slow)["spoils"], evaluate(slow).notes):
-        assert any("/Hero/Hair: its bake is stretched to 2 times as long" in note for note in notes)
+        assert any("/Hero/Hair: its bake is stretched to 2 times its length" in note for note in notes)
     fast = over(tmp_path, "fast", "hair.usdc")
     fast.write_text(fast.read_text().replace("(\n", "(\n  timeCodesPerSecond = 48\n", 1))
     for path in (fast, over(tmp_path, "late", "hair.usdc", " (offset = 10)")):

@@ -125,7 +125,7 @@ def test_hair_that_points_cannot_place_is_told(tmp_path):
     assert told(by_transform) == []
     (note,) = told(by_joints)
     assert note.startswith(
-        "/Hero/Hair: the head is up to 10000 m from this prim's origin, where points can only be 0.62 mm apart"
+        "/Hero/Hair: the head is up to 10000 m from this prim's origin, where points only move in steps of 0.62 mm"
     )
 
 

@@ -199,7 +199,7 @@ def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
     stage = Usd.Stage.Open(layer)
     stage.RemovePrim("/Coat/Hair")
     layer.Save()
-    told = "/Hero/Rig: /Coat/Rig is the same character, whose meshes hair is not kept out of; bind them"
+    told = "/Hero/Rig: /Coat/Rig is the same character, but hair is not kept out of those meshes; bind all"
     assert any(note.startswith(told) for note in read_shot(path).notes)
     assert any(note.startswith(told) for note in inspect(path)["spoils"])
     UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))

@@ -150,7 +150,9 @@ def test_more_samples_than_can_be_held_are_read_once_a_frame(tmp_path, monkeypat
     np.testing.assert_array_equal(rig.time_codes, np.arange(1, 10))
     np.testing.assert_array_equal(rig.clip.joints, every.clip.joints[np.isin(every.time_codes, rig.time_codes)])
     (note,) = [note for note in rig.notes if "too many to hold" in note]
-    assert note.endswith(f"its animation has 65 samples of {joints} joints, too many to hold; it is read once a frame")
+    assert note.endswith(
+        f"its animation has 65 samples of {joints} joints, too many to hold in memory; it is read once per frame"
+    )
     assert not any("too many" in note for note in every.notes)
     monkeypatch.setattr("usd.skel.clip_codes.LARGEST_CLIP", 8 * joints)
     with pytest.raises(NeuralocksError, match="spans time codes 1 to 9, too many samples to hold"):

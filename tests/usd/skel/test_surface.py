@@ -127,7 +127,7 @@ def test_a_body_that_usd_leaves_where_it_was_made_is_told(tmp_path):
     stage.Save()
     (note,) = told(tmp_path / "set.usda")
     assert note.startswith("/Set/Left/Rig: ")
-    assert note.endswith("; /Set/Left is one below an opinion that types it Xform: type it SkelRoot there")
+    assert note.endswith("; /Set/Left is one below a stronger opinion that types it Xform: type it SkelRoot there")
 
 
 @pytest.mark.parametrize("above", [False, True])
