@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line `neuralocks`: one module a family of commands."""
+"""The command line `neuralocks`: one module per family of commands."""

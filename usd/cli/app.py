@@ -119,7 +119,7 @@ def inspect_command(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what a file holds, and what would stop or spoil a bake of it."""
+    """Show what a file holds, and what would stop or spoil a bake of it."""
     from ..review.facts_text import as_text
     from ..review.inspect import inspect
 

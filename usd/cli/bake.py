@@ -67,11 +67,11 @@ def bake_command(
 
 
 def join_command(
-    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of a shot (frames or grooms), in any order.")],
+    parts: Annotated[list[Path], typer.Argument(help="Bakes of parts of the shot (frames or grooms), in any order.")],
     out: Out,
     as_json: AsJson = False,
 ) -> None:
-    """Join bakes of parts of a shot, as the machines of a farm write them, into one.
+    """Join partial bakes of a shot, such as those from a farm, into one.
 
     The file is the same, byte for byte, as if all frames and characters had been baked at once.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all commands share: expected errors become one line on stderr and an exit status."""
+"""Shared by all commands: expected errors become one line on stderr and an exit status."""
 
 import functools
 import importlib

@@ -32,7 +32,7 @@ def train(
     seconds: Annotated[
         float | None,
         typer.Option(
-            help="Seconds to train, without simulating (see --clips) and the report; 120, or 75 if quasi-static."
+            help="Seconds to train, without the simulations (see --clips) and the report; 120, or 75 if quasi-static."
         ),
     ] = None,
     steps: Annotated[

@@ -65,7 +65,7 @@ def test_a_network_does_not_go_on_without_what_it_learned_with(tmp_path, learned
     """New codes of the strands would mean something else to it, and the model would be wrong without a word."""
     out = tmp_path / "hair.neuralocks"
     folder = _kept(out)
-    with pytest.raises(NeuralocksError, match="lacks what .* codes.npz; train without --resume"):
+    with pytest.raises(NeuralocksError, match="lacks codes.npz, with which .*; train without --resume"):
         work.beginning_of(folder, None, resume=True)
     (folder / learned_with).touch()
     kept = folder / learned_with if learned_with == work.BEGINNING else None

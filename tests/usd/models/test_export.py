@@ -49,7 +49,7 @@ def test_the_history_told_is_that_of_the_model(tmp_path, linear, chest, told):
     history = described["boundary vector"]["how"]["history"]
     assert f"is {told}, three numbers each" in history
     assert all((f"{step} =" in history) == (step in told) for step in ("f_k", "v_k", "s_k"))
-    assert ("the same of the upper chest" in history) == chest
+    assert ("the same for the upper chest" in history) == chest
 
 
 @pytest.mark.parametrize(("kind", "entry"), [("strands", "boundary vector"), ("rig", "features")])
@@ -60,7 +60,7 @@ def test_all_that_the_history_names_is_in_the_description(tmp_path, kind, entry)
     history = json.loads(text)[entry]["how"]["history"]
     named = set(re.findall("`(\\w[^`]*)`", history))
     assert {name for name in named if f'"{name}":' not in text} == set()
-    assert all(word in history for word in ("between two samples t goes evenly", "`--loop`", "stands still"))
+    assert all(word in history for word in ("between two samples, t goes linearly", "`--loop`", "stands still"))
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
