@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What whoever runs a model elsewhere must know: its graphs, how its input is made, what its sliders do."""
+"""What another runtime needs to know about a model: its graphs, how to make its input, what its sliders do."""
 
 import numpy as np
 
@@ -19,17 +19,17 @@ from ..skel.clip_codes import ALONE, CLOSE, SAME, STAND, STEP
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
 
 GRAPHS = {
-    "encoder.onnx": f"once a groom: `shape` (S, {SHAPE}), root-relative points of {K} vertices in scalp axes [m] "
+    "encoder.onnx": f"once per groom: `shape` (S, {SHAPE}), root-relative points of {K} vertices in scalp axes [m] "
     f"-> `code` (S, {CODE})",
-    "strand.onnx": f"once a groom: `strand` (S, {PLAIN_STRAND} or {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
-    f"length 1 [m], and where it reads {STRAND}, rest points from the root {SHAPE} [m, canonical space] -> `strand_part` (S, {HIDDEN})",
-    "frame.onnx": f"once a frame: `frame` (1, F), the boundary vector -> `frame_part` (1, {HIDDEN}), and where the frame "
-    f"changes the weights behind, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
-    "tail.onnx": f"per strand and frame: `strand_part` (S, {HIDDEN}), all that `frame.onnx` gave, `anchor` (S, {SHAPE}): the `offsets` "
-    f"answered for the held bind pose (zeros where the model is not anchored), `edges` (S, {SHAPE}): rest[i] - rest[i-1] "
+    "strand.onnx": f"once per groom: `strand` (S, {PLAIN_STRAND} or {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
+    f"length 1 [m], and if it reads {STRAND}, rest points from the root {SHAPE} [m, canonical space] -> `strand_part` (S, {HIDDEN})",
+    "frame.onnx": f"once per frame: `frame` (1, F), the boundary vector -> `frame_part` (1, {HIDDEN}), and if the frame "
+    f"changes the weights of the later layers, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
+    "tail.onnx": f"per strand and frame: `strand_part` (S, {HIDDEN}), all outputs of `frame.onnx`, `anchor` (S, {SHAPE}): the `offsets` "
+    f"for the held bind pose (zeros if the model is not anchored), `edges` (S, {SHAPE}): rest[i] - rest[i-1] "
     f"with row 0 zero [m] -> `offsets` (S, {SHAPE}), `displacement` (S, {SHAPE}) in canonical space [m]",
     "rig.onnx": "`features` (B, F) of B characters -> `turns` (B, joints, 4) wxyz, joints as in the model's `chains`: local "
-    "rotation now = local rotation in the bind pose * turn. The C header of `neuralocks rig export-c` makes the features, too",
+    "rotation now = local rotation in the bind pose * turn. The C header of `neuralocks rig export-c` also computes the features",
 }
 
 _STEPS = {
@@ -38,38 +38,38 @@ _STEPS = {
     "v_k": f"v_k = T(R_head(t_k)) (p(t_k) - p(t_k+1)) / dt, no longer than {BoundarySampler.SPEED_LIMIT:g}",
     "s_k": "s_k = T(R_head(t_k)) r / dt with r the rotation vector of R_head(t_k) T(R_head(t_k+1)), no longer than "
     f"{BoundarySampler.SPIN_LIMIT:g}",
-    "c_k": "c_k the same of the upper chest, in the head's axes too",
+    "c_k": "c_k the same for the upper chest, also in the head's axes",
 }
-"""What a step of the history may be made of."""
+"""What a step of the history may consist of."""
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
-    f"shot's range adds its end where that lies after the last of them, and its start where that lies {STAND:g} s or more before "
-    "the first: the character stands meanwhile. A start less than that before it adds nothing. Between two "
-    f"samples farther apart than {CLOSE:g} s each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
-    f"or, where these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second and framesPerSecond differs, a framesPerSecond-th "
-    f"of a second, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and of the two sides of a "
+    "end of the shot's range is a sample, too, if it lies after the last of them, and the start of the range if it lies "
+    f"{STAND:g} s or more before the first: the character stands still in between. A start less than that before the first adds nothing. Between two "
+    f"samples farther apart than {CLOSE:g} s, each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
+    f"or, if these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second and framesPerSecond differs, 1 / framesPerSecond "
+    f"seconds, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and so does the later of the two sides of a "
     f"step, which are less than {STEP:g} frames apart and more than {ALONE:g} times as far from the samples around them; no frame less than "
     f"{STEP:g} frames before a step is a sample"
 )
 _BLOWS = (
-    " The places that the spline goes through are those of the samples, but where the velocity from sample to sample, (p_i+1 - p_i) / "
+    " The spline goes through the places of the samples, except where the velocity from sample to sample, (p_i+1 - p_i) / "
     "(t_i+1 - t_i), changes at a sample by a vector longer than "
-    f"{BoundarySampler.GRAVITY_LIMIT:g} * 9.81 max((t_i+1 - t_i-1) / 2, dt): it changes by one so long, "
-    "and the path goes on from there as it would. A loop stays as it is."
+    f"{BoundarySampler.GRAVITY_LIMIT:g} * 9.81 max((t_i+1 - t_i-1) / 2, dt): there the change is shortened to that length, "
+    "and the path continues from there as before. A loop stays as it is."
 )
-_SPACES = "(3, 3), without scale: columns made of unit length, and of what then shears the nearest rotation; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
+_SPACES = "(3, 3), without scale: columns made of unit length, and the nearest rotation if they are sheared; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
 _PLACE = "the place of the head joint"
-_STRAND_PLACE = _PLACE + " (on hair that a joint below it carries: of `canonical_to_head`'s origin)"
+_STRAND_PLACE = _PLACE + " (for hair carried by a joint below it: that of `canonical_to_head`'s origin)"
 
 STRAND_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), " + _SPACES,
-    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 but for upper arms",
+    "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 except for upper arms",
     "gravity": "T(R_head(t)) g / 9.81",
     "shape": "ten lengths of the bind body [m], as in `held`",
-    "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; 0, since clumping is no input",
+    "material": f"logarithms of bend / {Material.bend:g}, weight, damping / {Material.damping:g}; then 0, because clumping is not an input",
     "clip": _CLIP,
 }
-"""How each part of the boundary vector is made, but for the history (`_history`)."""
+"""How each part of the boundary vector is made, except the history (`_history`)."""
 
 RIG_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(that in the bind pose), both turned about Y so that the "
@@ -79,36 +79,36 @@ RIG_INPUT = {
     "pose": "for neck and upper chest: column 0, then column 1, of T(R_head) R_j",
     "gravity": STRAND_INPUT["gravity"],
     "clip": _CLIP,
-    "hats": "where a bone between the head and some chains moves on the head, as a hat's does, evaluate once more with that bone's "
-    "rotation as the head's, and take those chains' turns from there. Its history is one of its own, p the place to which "
+    "hats": "if a bone between the head and some chains moves on the head, as a hat's does, evaluate once more with that bone's "
+    "rotation as the head's, and take those chains' turns from there. It needs its own history, with p the place to which "
     "that bone carries the head's joint",
     "turns": "in the axes that each joint has in the model's rig: B, its row of `chains.axes`, is its world rotation in the bind "
-    "pose that faces +Z. With J your joint's own there, D = T(J) B, the turn (w, v) becomes (w, det(D) D v)",
+    "pose that faces +Z. With J your joint's own there and D = T(J) B, the turn (w, v) becomes (w, det(D) D v)",
 }
-"""How the features of a rig model are made, but for the history (`_history`), and what becomes of its answer."""
+"""How the features of a rig model are made, except the history (`_history`), and how to use its output."""
 
 SLIDERS = {
     "bend, weight, damping": "bend is what bakes and Blender call stiffness. "
     + ", ".join(f"{name} goes from {low:g} to {high:g}" for name, (low, high) in RANGES.items())
-    + ", motion strength from 0 to 4. They change `material` in the boundary vectors and in `held`; then, once, where the model is anchored, "
-    "`anchor` anew: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
-    "motion strength": "times `history`: 0 is each pose as if held, 1 as trained",
+    + ", motion strength from 0 to 4. They change `material` in the boundary vectors and in `held`; if the model is anchored, then compute "
+    "`anchor` again, once: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
+    "motion strength": "a factor of `history`: 0 is each pose as if held, 1 as trained",
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
-    "vertex 0 and 1 at rest, each further vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
-    'it, scaled to the length that it has with D: its rest length, unless the model\'s `output` is "displacement"',
-    "a game": "the clip is what has been so far: keep the samples of the last (steps + 2) dt seconds, each put in when the animation "
-    "has been updated, with the time of that pose, and ask for the newest one's time: of frames drawn between two updates each "
-    "would be a stop. Put in no pose that is not finite. Keep times in double. Clear it at a cut",
-    "blend shapes": "roots and `shape` here are those of the clip's first sample. Where the animation changes blend shapes, a bake "
-    "moves roots with the skin below them, and measures `shape` anew in each frame",
-    "a cut": "where a character is put elsewhere, hair starts anew: the cut is the clip's first sample, before which the head "
-    "goes on in a straight line and does not turn. The sample before it is the last of a clip of its own, after which the head "
-    "stands still. A bake finds cuts, or is told them (`--cuts`)",
-    "the body": "nothing here keeps strands out of it: that is a step of the bake's own (`--no-resolve` leaves it out)",
+    "with vertices 0 and 1 at rest, each further vertex follows the one before by an edge: the rest edge + what L + f (D - L) adds to "
+    'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
+    "a game": "the clip is the motion so far: keep the samples of the last (steps + 2) dt seconds. Add one whenever the animation "
+    "has been updated, with the time of that pose, and ask for the newest one's time: frames drawn between two updates would "
+    "look like stops. Add no pose that is not finite. Keep times in double. Clear the samples at a cut",
+    "blend shapes": "roots and `shape` here are those of the clip's first sample. If the animation changes blend shapes, a bake "
+    "moves roots with the skin below them, and measures `shape` again in each frame",
+    "a cut": "where a character jumps to another place, hair starts anew: the cut is the first sample of a new clip, before which the "
+    "head moves in a straight line and does not turn. The sample before it is the last of the previous clip, after which the head "
+    "stands still. A bake finds cuts, or is given them (`--cuts`)",
+    "the body": "nothing here keeps strands out of the body: that is a separate step of the bake (`--no-resolve` leaves it out)",
 }
-"""What an artist or a game changes, and what it does to what is above."""
+"""What an artist or a game changes, and its effect on the inputs and outputs above."""
 
 
 def described(file: model_file.ModelFile) -> dict:
@@ -152,14 +152,14 @@ def _history(spec: BoundarySpec, place: str) -> str:
     return (
         f"step k = 0 ... steps - 1 is {', '.join(steps)}, three numbers each. With p {place} and t_k = t - k dt: "
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
-        "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history are those of a "
-        "natural cubic spline through them, of the place and of the quaternion's components, signs continuous; `pose` and `gravity` are of the "
-        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} Of animation on twos to fours, in which poses are held for two to four samples each, the "
-        "samples that repeat a pose are left out, and at their times t is that of the pose's first (between two samples t goes evenly "
-        "from the one's to the other's, after the last one on with time); one that shows for longer than "
-        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row, which this only nears). Before the first sample "
-        "the head comes in a straight line, with its velocity there, and does not turn; after the last one it stands still. Of a loop (`--loop`) "
-        "t goes round instead, the head ahead by its way in each round, and the spline goes on over the seam on both sides"
+        "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history follow a "
+        "natural cubic spline through them, of the place and of the quaternion's components with continuous signs; `pose` and `gravity` are of the "
+        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} In animation on twos to fours, in which poses are held for two to four samples each, the "
+        "samples that repeat a pose are left out, and at their times t is that of the pose's first sample (between two samples, t goes linearly "
+        "from that of the one to that of the other; after the last one it continues with time). A pose that shows for longer than "
+        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row; this rule only approximates that). Before the first sample "
+        "the head moves in a straight line, with its velocity there, and does not turn; after the last one it stands still. In a loop (`--loop`), "
+        "t wraps round instead, with the head ahead by its path in each round, and the spline continues over the seam on both sides"
     )
 
 
