@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sampling in the background, a few frames at a time while Blender is idle, so that live hair catches up with an edited
-animation by itself.
+"""Sampling in the background, a few frames at a time while Blender is idle, so that live hair follows an edited animation
+by itself.
 """
 
 import time

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Build the Blender extension: `python dcc_addon/build.py [--platform linux-x64] [-o dist]`.
 
-One zip a platform with the wheels for the Python of every supported Blender, so that Blender installs them without
-network, and for Blender before 4.2 a zip with a folder in which everything lies unpacked.
+One zip per platform with the wheels for the Python of every supported Blender, so that Blender installs them without
+network. For Blender before 4.2, a zip with everything unpacked in a folder.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edits of live hair's points by others: applied transforms, a moved origin, applied modifiers. Live points are not the
-hair's rest shape, so what was done to them is done to that; or it is told that this cannot be. A rest shape that was
-deleted is put back.
+hair's rest shape, so such edits are transferred to the rest shape, or refused with a message. A rest shape that was
+deleted is restored.
 """
 
 import zlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender calls: each handler a few lines, all work in `live`."""
+"""The handlers that Blender calls. Each is a few lines; all work is in `live`."""
 
 import bpy
 from bpy.app.handlers import persistent

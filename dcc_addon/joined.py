@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live hair that an artist joins to other hair, in Blender 5.2 and later. Blender brings the points into the other hair's
-space; the rest shape, an attribute like any other, stays in the space of the hair that is gone.
+"""Live hair that an artist joins to other hair, in Blender 5.2 and later. Blender converts the points to the other hair's
+space; the rest shape, an ordinary attribute, stays in the space of the hair that was joined.
 """
 
 import zlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept in memory of each live object, as the session holds it."""
+"""What the session keeps in memory for each live object."""
 
 from typing import NamedTuple
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which hair is baked, and which of it together: hair of one look is one file."""
+"""Which hair is baked, and which of it together: hair with the same look goes into one file."""
 
 from typing import NamedTuple
 

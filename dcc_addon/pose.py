@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pose that is drawn, of a sampled armature."""
+"""The pose of a sampled armature as Blender draws it."""
 
 import numpy as np
 

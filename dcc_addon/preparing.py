@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preparing hair beside Blender: a large groom takes a second, and nobody should have to wait for it."""
+"""Preparing hair in a thread: a large groom takes a second, during which Blender stays usable."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything the add-on puts into Blender, and takes out again, in one place."""
+"""All that the add-on registers in Blender, and unregisters again, in one place."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is computed once and kept in memory while Blender runs. Nothing here is saved; losing it costs only time.
+"""Data that is computed once and kept in memory while Blender runs. Nothing here is saved; losing it costs only time.
 
 Blender objects are looked up by name each time: a pointer kept over an undo or a file load is invalid.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live hair whose character's motion is unknown so far."""
+"""Live hair whose character's motion is not sampled yet."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a network reads of the body, and where it lies in its input: plain numbers that every model file holds."""
+"""What a network reads of the body, and where in its input: plain numbers that every model file holds."""
 
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a clip holds of its joints as a C2 spline through its samples, and what it does outside of them."""
+"""A clip's joints as a C2 spline through its samples, and their motion before and after them."""
 
 from collections.abc import Callable
 

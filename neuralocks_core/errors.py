@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error for whatever a user can get wrong, in one line."""
+"""The error for users' mistakes, in one line."""
 
 from contextlib import contextmanager
 

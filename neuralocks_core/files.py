@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that appear under their name whole or not at all."""
+"""Files that appear under their name complete or not at all."""
 
 import errno
 import glob

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values as every reader of JSON takes them: NaN and infinity, which JSON does not know, are null."""
+"""Values that every JSON reader accepts: NaN and infinity, which JSON lacks, become null."""
 
 import math
 

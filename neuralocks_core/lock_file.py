@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A folder that one process at a time works in; its lock ends with the process that holds it, however that ends."""
+"""A folder that only one process at a time works in; its lock ends with the process that holds it, even if killed."""
 
 import os
 from contextlib import suppress

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What hair is made of: the four numbers that an artist moves and the network reads, and what nobody moves."""
+"""The material of hair: the four numbers that an artist sets and the network reads, and fixed constants."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Body shape as ten lengths that mean the same on every rig.
 
-The paper conditions on the coefficients of its statistical body; those mean nothing on another one. Ten lengths
-measured on the bind pose around the head tell the network the same: where head, neck, shoulders and back are. They are
-those of the character's own skin, not of what it wears.
+The paper conditions on the coefficients of its statistical body, which mean nothing on another body. Ten lengths
+measured around the head in the bind pose tell the network the same: where head, neck, shoulders and back are. They are
+measured on the character's own skin, not on what it wears.
 """
 
 import numpy as np

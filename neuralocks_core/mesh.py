@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the faces of a mesh tell: normals at its vertices, which vertices hang together, and which side is out."""
+"""What the faces of a mesh tell: vertex normals, connected parts, and which side is outside."""
 
 import numpy as np
 

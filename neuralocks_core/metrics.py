@@ -2,7 +2,7 @@
 """The numbers of the report card: plain functions of arrays, each with its definition.
 
 Hair comes as points (T, S, K, 3) [m] in canonical space, where hair that is carried rigidly stands still, so that
-whatever moves here is motion of the hair itself. `reference` is a trusted simulation of the same strands at the same
+all motion here is motion of the hair itself. `reference` is a trusted simulation of the same strands at the same
 times.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one-file model, `*.neuralocks`: a zip of ONNX graphs and one JSON. Nothing in it is ever executed but the graphs."""
+"""The one-file model, `*.neuralocks`: a zip of ONNX graphs and one JSON. Only its graphs are ever executed."""
 
 import json
 import os

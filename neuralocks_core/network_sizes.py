@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many numbers the strand network reads and gives: the widths of a model file's graphs (docs/architecture.md)."""
+"""How many numbers the strand network takes and returns: the widths of a model file's graphs (docs/architecture.md)."""
 
 K = 24
 """Vertices of a network strand, root first."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where libraries keep what they compile for a user without a home folder that can be written, as on a farm."""
+"""Where libraries keep compiled code for a user without a writable home folder, as on a farm."""
 
 import os
 import stat

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long work tells how far it is, and is stopped."""
+"""How long work reports its progress, and is stopped."""
 
 from collections.abc import Callable
 

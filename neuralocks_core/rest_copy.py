@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The copy of a groom's points at rest that lies beside points which Blender's live view has moved: an attribute of the
-curves there, and a primvar where Blender's own exporter has written them as USD.
+"""The copy of a groom's rest points beside points that Blender's live view has moved: an attribute of the curves there,
+and a primvar if Blender's own exporter has written them as USD.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strand inference with onnxruntime: what is the same for all frames once, what is the same for all strands once a frame.
+"""Strand inference with onnxruntime: work that all frames share is done once, work that all strands share once per frame.
 
-The first layer is linear in the strand and in the body, so its two parts are computed apart and added: exact, and a
-third of the arithmetic is left per strand and frame. Strands go through in chunks that stay in a core's cache, several
-cores each at one of its own.
+The first layer is linear in the strand and in the body, so its two parts are computed separately and added. This is exact,
+and leaves a third of the arithmetic per strand and frame. Strands are processed in chunks that stay in a core's cache, one
+chunk per core at a time.
 """
 
 import os

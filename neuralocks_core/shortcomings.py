@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a model's own report says against using it. A report comes out of a file, and may hold anything."""
+"""What a model's own report says against using it. A report is read from a file, and may contain anything."""
 
 from collections.abc import Mapping
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A few numbers that tell whether two large sets of values are the same but for rounding.
 
-A hash cannot: machines round otherwise. Here a change of any values, by d in the root of the sum of squares, moves each
-number by about d / sqrt(n), for the signs are drawn by chance (Johnson and Lindenstrauss).
+A hash cannot, since machines round differently. Here a change of any values, by d in the root of the sum of squares, moves
+each number by about d / sqrt(n), because the signs are random (Johnson and Lindenstrauss).
 """
 
 from collections.abc import Iterable

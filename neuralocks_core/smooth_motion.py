@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""World transforms of all joints at any time of a clip, by the spline that the network's reading of the head goes along."""
+"""World transforms of all joints at any time of a clip, by the same spline along which the network reads the head."""
 
 import numpy as np
 

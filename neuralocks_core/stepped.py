@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Animation on twos, threes or fours, whose poses are each held for some frames: the smooth motion that it shows parts of."""
+"""Animation on twos, threes or fours, where each pose is held for some frames: the smooth motion through its poses."""
 
 from __future__ import annotations
 

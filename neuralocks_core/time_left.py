@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long work still takes, at its speed so far."""
+"""The time left for long work, at its speed so far."""
 
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Warp, started quietly, or a clear word that it is missing."""
+"""Starts warp quietly, or says clearly that it is missing."""
 
 import os
 from collections.abc import Iterator

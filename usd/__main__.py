@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`neuralocks`, and `python -m usd`: the command line. Ctrl-C ends it in one word, even while it is still loading."""
+"""`neuralocks`, and `python -m usd`: the command line. Ctrl-C ends it with one word, even while it is still loading."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all operators share: errors as reports, and long work with progress and cancel."""
+"""Shared by all operators: errors as reports, and long work with progress and cancel."""
 
 import math
 import time

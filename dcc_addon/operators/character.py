@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding the character, looking over its rig, sampling its motion."""
+"""Finding the character, checking its rig, sampling its motion."""
 
 import bpy
 

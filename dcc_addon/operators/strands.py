@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands: hair Curves from a particle system, a look as it was, attaching to a character."""
+"""Strands: hair Curves from a particle system, resetting the look, attaching to a character."""
 
 import bpy
 from bpy.props import BoolProperty, StringProperty

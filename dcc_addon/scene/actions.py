@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keyframes on exactly the hair bones, in an action of their own that can be muted."""
+"""Keyframes on the hair bones only, in a separate action that can be muted."""
 
 from contextlib import contextmanager
 

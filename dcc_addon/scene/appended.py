@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths of objects that are appended from another file: Blender remakes its own paths that begin with //, but not those
+"""Paths of objects that are appended from another file: Blender updates its own paths that begin with //, but not those
 of add-ons.
 """
 

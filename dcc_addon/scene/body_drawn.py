@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a body is drawn from where its bones' weights and shape keys alone take it, which is all that hair is kept out
-of: modifiers, and settings of the armature's own, may move it further.
+"""How far the drawn body is from the shape that its weights and shape keys alone give. Hair is kept out of that shape only:
+modifiers and settings of the armature modifier may move the body further.
 """
 
 import numpy as np

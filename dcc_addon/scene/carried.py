@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an armature carries: its hair, and the body that this is kept out of."""
+"""What an armature carries: its hair, and the body that the hair is kept out of."""
 
 from . import body as body_reader
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A hair Curves object: its strands, and where its rest shape is kept while the live view moves the points.
 
-The rest shape lies in the attribute `neuralocks_rest` of the Curves while it is live, so it is saved, appended and
-undone with the hair; the absence of the attribute says that the points themselves are at rest.
+While the hair is live, its rest shape is in the attribute `neuralocks_rest` of the Curves, so it is saved, appended and
+undone with the hair. Without the attribute, the points themselves are at rest.
 """
 
 import bpy

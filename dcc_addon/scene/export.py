@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character of the scene as a USD shot, from the very numbers that the live view reads."""
+"""A character of the scene as a USD shot, from the same numbers that the live view reads."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is live in one scene and drawn by another: as part of the set behind it, or in an instance of a collection. There it
-is at the frame of the scene that draws it, and moves as in its own.
+"""Hair that is live in one scene and drawn by another: as part of its background set, or in a collection instance. There it
+is at the frame of the scene that draws it, and moves as in its own scene.
 """
 
 import bpy

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whom Blender calls after it has evaluated a frame. Others may pose a rig then: Blender evaluates that once more, and
-calls nobody any more.
+"""Handlers that Blender calls after it has evaluated a frame. Other add-ons may pose a rig in them: Blender then evaluates
+again, but calls no handler.
 """
 
 import bpy

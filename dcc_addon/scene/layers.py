@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""View layers: Blender poses a character only in those that show it or what it moves. Elsewhere it may be evaluated,
-because the panel points at it, and yet stand still.
+"""View layers: Blender poses a character only in those that show it or what it moves. In others it may be evaluated,
+because the panel points at it, but stands still.
 """
 
 from contextlib import contextmanager

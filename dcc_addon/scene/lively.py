@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What among objects is live, or draws what is: seen in one pass, for every frame asks and a scene may have ten thousand."""
+"""Which objects are live, or draw live ones: found in one pass, since every frame asks and a scene may have ten thousand."""
 
 from typing import NamedTuple
 

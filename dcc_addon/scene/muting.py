@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modifiers of hair that the live view, or a cache, already moves: what would move it a second time is off meanwhile, and
-what grows more hair beside it does so on the surface as it is posed. All is remembered with the hair, and given back.
+"""Modifiers of hair that the live view, or a cache, already moves: those that would move it a second time are off meanwhile,
+and those that grow more hair beside it use the posed surface. Their settings are stored with the hair, and restored.
 """
 
 import json

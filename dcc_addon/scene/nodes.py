@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees of geometry nodes, made alike in every Blender, and what a modifier gives them."""
+"""Geometry node trees, built the same way in every Blender version, and their modifier inputs."""
 
 import bpy
 

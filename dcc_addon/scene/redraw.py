@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing the panel anew while work in the background goes on."""
+"""Redrawing the panel while work runs in the background."""
 
 import bpy
 

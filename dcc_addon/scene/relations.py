@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What depends on what, as Blender keeps it until something comes or goes."""
+"""Dependencies between objects, as Blender keeps them until something is added or removed."""
 
 import bpy
 

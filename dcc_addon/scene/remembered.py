@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scene remembers of things that were changed for live hair, as text in the file: anybody may have written it."""
+"""What a scene remembers of things that were changed for live hair, as text in the file, which is not to be trusted."""
 
 import json
 from collections.abc import Callable, Sequence

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What hair objects ride on: the head, a joint below it such as a beard's jaw, or neither, when their object moves by keys of its
-own. That is told, for live hair and bakes stay on the head whatever such an object does.
+"""What hair objects ride on: the head, a joint below it such as a beard's jaw, or neither, if the object has its own keys. The
+latter is reported, since live hair and bakes stay on the head whatever such an object does.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a rig's motion is put together: strips, drivers, constraints, parents, the rest pose. When one of these is edited,
-Blender says only that the object has changed, as it does when a bone is posed; for keys it names the action.
+"""What makes up a rig's motion: strips, drivers, constraints, parents, the rest pose. When one of these is edited,
+Blender only reports that the object has changed, as it does when a bone is posed; for keys it names the action.
 """
 
 import zlib

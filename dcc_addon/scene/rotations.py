@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations of bones, put aside as text while something else turns these bones, and given back as they were."""
+"""Rotations of bones, stored as text while something else turns these bones, and restored exactly."""
 
 import json
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sampling a rig's motion by stepping through the frames, so that constraints, IK, drivers and NLA count."""
+"""Sampling a rig's motion by stepping through the frames, so that it includes constraints, IK, drivers and NLA."""
 
 import math
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths as a file names them: with // beside it. When it is saved in another folder Blender remakes its own of these, but not
+"""Paths relative to the file, with //. When the file is saved in another folder, Blender updates its own paths, but not
 those of add-ons.
 """
 

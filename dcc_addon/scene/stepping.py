@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Showing one frame after the other, to read them, and leaving the scene as it was."""
+"""Showing one frame after the other to read them, then restoring the scene."""
 
 from contextlib import ExitStack
 

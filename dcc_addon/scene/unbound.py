@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that *Deform Curves on Surface* leaves where it is, for the rest of a tree must go on: that node lets pass what names
-no UV map. The name lies in a property of the Curves meanwhile, so it is saved, appended and undone with the hair.
+"""Hair that *Deform Curves on Surface* must not move while the rest of its node tree runs: that node passes curves without a
+UV map name unchanged. The name is kept in a property of the Curves, so it is saved, appended and undone with the hair.
 """
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses without keys: animators move several bones, or turn a lamp up, before they set a key. Stepping through frames,
-which happens by itself in the background, evaluates the animation over them.
+"""Poses without keys: animators move several bones, or change a lamp, before they set a key. Stepping through frames,
+which happens in the background, would overwrite them with the animation.
 """
 
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a sampled motion is still what Blender shows, and sampling it anew where it is not."""
+"""Whether a sampled motion is still what Blender shows, and sampling it again if not."""
 
 from ..services.motion import same_pose
 from ..session import SampledRig, session

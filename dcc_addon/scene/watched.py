@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hidden objects: Blender leaves their places and shape keys as in the frame that showed them last."""
+"""Hidden objects: Blender leaves their transforms and shape keys as in the last frame that showed them."""
 
 from contextlib import contextmanager
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the windows show: each has a scene of its own, and a timer's context names only one of them."""
+"""What the windows show: each has its own scene, and a timer's context names only one of them."""
 
 import bpy
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All that the add-on does without Blender: arrays in, arrays out, tested without `bpy`."""
+"""The part of the add-on that needs no Blender: arrays in, arrays out, tested without `bpy`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair bones: which they are, and how they turn at any time."""
+"""Hair bones: which bones they are, and their rotations at any time."""
 
 from dataclasses import dataclass, replace
 

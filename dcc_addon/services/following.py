@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves with which joint: objects on their carriers, told from their motion."""
+"""Which joint an object moves with, found from its motion."""
 
 from collections.abc import Callable, Sequence
 

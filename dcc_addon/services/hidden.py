@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones that are hidden by a scale of zero, as props are, or mirrored by a negative one; and armatures that are."""
+"""Bones and armatures that are hidden by a scale of zero, as props are, or mirrored by a negative scale."""
 
 import numpy as np
 

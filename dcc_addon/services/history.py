@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boundary vectors of a clip: those at its own samples, which playing and scrubbing ask for, are made in blocks and kept."""
+"""Boundary vectors of a clip: those at its own samples, which playing and scrubbing need, are computed in blocks and kept."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What to say of frames at which a character is put elsewhere."""
+"""Messages about frames at which a character jumps to another place."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One hairstyle on one character, ready to give its points at any time: what the live view draws."""
+"""One hairstyle on one character, ready to compute its points at any time: what the live view draws."""
 
 import numpy as np
 

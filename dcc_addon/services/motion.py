@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A rig's motion, sampled once: joint by joint translation, rotation and scale, as USD will store it.
 
-Blender's matrices are turned at once into the float32 channels of a SkelAnimation, and everything else is computed from
-these: live view, bake and the exported stage then see the very same numbers.
+Blender's matrices are converted at once to the float32 channels of a SkelAnimation, and everything else is computed from
+these: the live view, the bake and the exported stage then see the same numbers.
 """
 
 from dataclasses import dataclass, field, replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files may be written over only if they were made here, and for the same: a panel asks nobody before."""
+"""Files may be overwritten only if this program made them for the same character, since the panel does not ask first."""
 
 import itertools
 import os

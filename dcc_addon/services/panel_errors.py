@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors and notes of the core in the words of the panel: they name things and what to do as the command line does."""
+"""Errors and notes of the core in the words of the panel: the core names options and remedies of the command line."""
 
 import re
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the panel and the status line tell how long work still takes."""
+"""How the panel and the status line show the time left."""
 
 
 def in_words(seconds: float | None) -> str:

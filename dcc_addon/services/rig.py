@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender rig, read as arrays, as the core's character; and in plain words what is wrong with it."""
+"""A Blender rig, read as arrays, as the core's character; and messages about what is wrong with it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders among the temporary files, for what is written to be read once."""
+"""Temporary folders, for files that are read once."""
 
 import tempfile
 

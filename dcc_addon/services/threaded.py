@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work in a thread of its own, so that the panel can show progress and cancel; it calls nothing of Blender."""
+"""Work in its own thread, so that the panel can show progress and cancel; it calls nothing of Blender."""
 
 import importlib
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which Pythons can train, asked beside Blender, since an answer takes seconds."""
+"""Which Pythons can train, asked in the background, since an answer takes seconds."""
 
 import threading
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run by a Python to say whether it can train; written so that the oldest reads it too, which is to say that it is too old."""
+"""Run by a Python to say whether it can train. The syntax is old enough for any Python to run it and say that it is too old."""
 
 import importlib
 import sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run by a Python with torch: reads settings as JSON from standard input, trains, and says how far it is, a JSON object
-a line.
+"""Run by a Python with torch: reads settings as JSON from standard input, trains, and reports progress, one JSON object
+per line.
 """
 
 import json

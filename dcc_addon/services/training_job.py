@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training in a process of its own, in a Python that has torch; Blender stays usable and only reads its lines."""
+"""Training in a separate process, in a Python that has torch; Blender stays usable and only reads its output."""
 
 import json
 import os

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones with another scale along each axis, as stretch and squash give them: what a chain of joints, each with a
-translation, a rotation and three scales relative to its parent, can carry of them.
+"""Bones with a different scale along each axis, as from stretch and squash: how much of that a chain of joints can represent,
+each with a translation, a rotation and three scales relative to its parent.
 
-Below a bone that is stretched, one that turns and inherits all of it is sheared in the world and is not relative to its
-parent; one that inherits nothing, or is turned by constraints, is sheared relative to its parent and is not in the world.
+Below a stretched bone, a bone that turns and inherits the full scale is sheared in the world but not relative to its
+parent; one that inherits nothing, or is turned by constraints, is sheared relative to its parent but not in the world.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of work that is refused, fails or is cancelled half-way: as they were before it."""
+"""Restores the files of work that is refused, fails or is cancelled half-way."""
 
 import os
 import shutil

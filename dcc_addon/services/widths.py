@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How thick strands of particle hair are drawn."""
+"""The width at which strands of particle hair are drawn."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text broken into lines by how wide its letters are drawn, for these differ by half, and more in other scripts."""
+"""Text wrapped by the drawn width of its letters, since widths differ by half, and more in other scripts."""
 
 import re
 from collections.abc import Callable

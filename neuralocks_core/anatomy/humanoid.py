@@ -3,7 +3,7 @@
 
 The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
 capital), parts by their usual names (`limb_names`; by `limb_shapes` where none is named like one, and by `limb_chains`
-where only the first joint is), and the trunk by hierarchy: the upper chest is where the ways from the head and from the arms
+where only the first joint is), and the trunk by hierarchy: the upper chest is where the paths from the head and from the arms
 meet.
 """
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What joint names say: which side a joint is on, which part it is once namespaces and rig prefixes are gone, and which joint
-somebody means.
+"""What joint names say: which side a joint is on, which part it is once namespaces and rig prefixes are removed, and which
+joint a user means.
 """
 
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Elbow and hand, or knee and foot, where names tell no more than where the limb begins: by hierarchy, from there on."""
+"""Elbow and hand, or knee and foot, if names tell only where the limb begins: found by hierarchy from there on."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pieces of a character's meshes are its own skin, for a hat or a pack must not count as a part of the head or back."""
+"""Which pieces of a character's meshes are its own skin, since a hat or a backpack must not count as part of the body."""
 
 import numpy as np
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clips made and understood: retargeted captures, random motion, cuts."""
+"""Making and analysing clips: retargeted captures, random motion, cuts."""

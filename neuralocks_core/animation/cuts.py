@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cuts in a clip: a character is put elsewhere between two samples, and its hair must not feel the jump."""
+"""Cuts in a clip: a character jumps to another place between two samples, and its hair must not feel the jump."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion where there is no motion capture: random clips to learn from, scripted ones to be judged by.
+"""Motion without motion capture: random clips for training, scripted ones for evaluation.
 
-Both come from the same gestures, with sizes and timings of people; the scripted clips' are fixed and lie between the
-random ones'.
+Both use the same gestures, with the sizes and timings of people; those of the scripted clips are fixed and lie between the
+random ones.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether points lie in a mesh, however it folds into itself."""
+"""Whether points lie inside a mesh that may fold into itself."""
 
 import numpy as np
 

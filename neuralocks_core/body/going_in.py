@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How deep strands lie where the body is unknown: below moving skin it is known only to some depth."""
+"""How deep strands lie below moving skin, whose samples reach only to some depth."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signed distance to what stands still against the hair, the head: a grid, made once. Its hollows count as inside."""
+"""Signed distance to the head, which does not move relative to the hair: a grid, built once. Its hollows count as inside."""
 
 import hashlib
 from dataclasses import dataclass, field

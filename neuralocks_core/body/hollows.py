@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hollows of a head that hair does not get into: a mouth, nostrils, what is behind the eyes."""
+"""Hollows of a head that hair must not enter: the mouth, nostrils, the space behind the eyes."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signed distance to the skin that moves against the head: samples with planes, blended to a smooth surface.
+"""Signed distance to the skin that moves relative to the head: samples with planes, blended to a smooth surface.
 
-Samples are chosen once. A pose moves them and enters them in a grid, which is all that a frame costs; no tree is built.
+Samples are chosen once. Each frame only poses them and puts them into a grid; no tree is built.
 """
 
 import numpy as np

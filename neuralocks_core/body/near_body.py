@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The body close to hair: the head out of a grid made once, the skin that moves against it posed in each frame."""
+"""The body close to hair: the head from a grid built once, the skin that moves relative to it posed in each frame."""
 
 import numpy as np
 import scipy.sparse

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carrying a deformation of the network's 24 vertices back to the groom's own, and these to where they are shown."""
+"""Transfers a deformation of the network's 24 vertices to the groom's own, and these to where they are shown."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clumping in inference: how far the hairs of a lock stray from the motion of their lock."""
+"""Clumping at inference: how far the hairs of a lock stray from the motion of their lock."""
 
 from __future__ import annotations
 

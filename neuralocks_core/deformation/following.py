@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a groom's own vertices follow the network's.
 
-Coordinates come first in arrays here, (3, ...): three to a row leave a processor's vectors mostly empty.
+Coordinates come first in arrays here, (3, ...): rows of three would leave a processor's vector units mostly idle.
 """
 
 from __future__ import annotations

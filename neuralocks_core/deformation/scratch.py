@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory that a thread keeps from one chunk of work to the next."""
+"""Buffers that a thread keeps from one chunk of work to the next."""
 
 import math
 import threading

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Own vertices as weighted means of the network's vertices around them, so that they move as these do."""
+"""A groom's own vertices as weighted means of the network's vertices around them, so that they move along."""
 
 from __future__ import annotations
 

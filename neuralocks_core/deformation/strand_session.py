@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A strand model bound to one groom: what depends on its strands alone is computed once, and kept for all frames."""
+"""A strand model bound to one groom: what depends only on its strands is computed once and kept for all frames."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carrying what lies off the network's polyline, such as the turns of a coil, by the turns of its segments."""
+"""Turns detail off the network's polyline, such as the loops of a coil, with the segments of the polyline."""
 
 from __future__ import annotations
 

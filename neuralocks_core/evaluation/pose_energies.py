@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Energies of hair in a pose, per unit line density, in numpy for the report card (docs/architecture.md, Physics).
 
-What training minimises is `physics/energies.py`.
+Training minimises those of `physics/energies.py`.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colours that a hair file brings along. No bake asks for them, so a `Groom` has none: they go beside it."""
+"""The colours in a hair file. A bake does not need them, so they are kept beside the `Groom`, not in it."""
 
 from __future__ import annotations
 

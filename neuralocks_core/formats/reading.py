@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading a groom file of whatever kind into metres, Y up."""
+"""Reading a groom file of any kind, in metres, Y up."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The units and axes that users may name for a file that does not say its own."""
+"""The units and axes that users may give for a file that does not state them."""
 
 import math
 

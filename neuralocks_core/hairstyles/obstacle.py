@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What hair must not grow into: signed distance to head, neck and shoulders on a grid, quick to ask."""
+"""What hair must not grow into: signed distance to head, neck and shoulders, on a grid for fast lookup."""
 
 from __future__ import annotations
 

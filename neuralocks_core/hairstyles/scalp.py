@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The skin that hair grows from, and where on it the roots stand."""
+"""The skin that hair grows from, and where its roots are."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What makes grown strands hair: clumps that gather towards the tips, waves and curls, frizz, and clear skin."""
+"""What makes grown strands look like hair: clumps that gather towards the tips, waves and curls, frizz, and distance to skin."""
 
 from __future__ import annotations
 

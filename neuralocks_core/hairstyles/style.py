@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every hairstyle is: where it grows, which way its strands go, and what is done to them then."""
+"""What defines a hairstyle: where it grows, which way its strands go, and how they are shaped afterwards."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Styles tied in one place: hair runs tight over the head to the tie, and on from there."""
+"""Styles tied in one place: hair runs tightly over the head to the tie, and onwards from there."""
 
 from __future__ import annotations
 

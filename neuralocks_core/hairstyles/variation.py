@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variations of a style: cut, parted, waved and laid otherwise, by a number.
+"""Variations of a style, by number: with another cut, parting, waves and direction.
 
-Hair that somebody made is never quite one of the library's styles. A network that has seen each style in many
-variations errs less on it.
+Artists' hair is never quite one of the library's styles. A network that has seen many variations of each style
+makes smaller errors on it.
 """
 
 from __future__ import annotations

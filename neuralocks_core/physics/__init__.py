@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rod geometry and the potentials of the paper in torch, one a file. Nothing that runs a bake imports this."""
+"""Rod geometry and the potentials of the paper in torch, one per file. Nothing that a bake runs imports this."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the potentials need of a strand at rest: lengths, masses, edges and the force that holds it."""
+"""What the potentials need from a strand at rest: lengths, masses, edges and the force that supports it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From where a picture is seen."""
+"""The camera of a picture."""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coloured triangles and lines to an image, without a display."""
+"""Draws coloured triangles and lines to an image, without a display."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene of moving hair made ready to be drawn: which strands, in what colours, seen from where."""
+"""A scene of moving hair prepared for drawing: its strands, colours and camera."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

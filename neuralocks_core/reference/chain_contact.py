@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which points of mesh hair on joint chains meet the body in a simulation, and where the body is."""
+"""Which points of mesh hair on joint chains collide with the body in a simulation, and where the body is."""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The least error that a method without memory can have: the reference itself, when it forgets."""
+"""The lowest error that a method without memory can have: that of the reference itself, restarted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strands keep their distance as a crowd: smoothed density that may not rise above the groom's own.
+"""Strands keep their volume: a smoothed density that may not rise above the groom's own.
 
 The energy is that of `physics.self_collision` (paper section 3.4.2, equation 5, on relative density). It ties every
 strand to all around it, so the solver takes it as a force that is looked up anew between its Newton solves, with a

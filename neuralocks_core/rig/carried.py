@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How hair joints turn in a clip, each chain as what carries it moves: the head, or a bone of a hat between the two."""
+"""Rotations of hair joints in a clip; each chain follows what carries it, the head or a bone of a hat in between."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The hair joints of a rig: a forest of bones that hangs below the head.
+"""The hair joints of a rig: a forest of bones below the head.
 
 A *chain* is one tree of the forest; it may branch. Everything is kept in canonical space (origin at the head
 joint, Y up, +Z face, metres), where joint orients, units and up axes of the rig are gone.

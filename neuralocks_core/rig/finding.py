@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finding the hair chains of a rig: what hangs below the head and drives no body mesh."""
+"""Finding the hair chains of a rig: the joints below the head that drive no body mesh."""
 
 import fnmatch
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair joints measured: which of them move, where their bones end, and how they lie in the bind pose."""
+"""Measuring hair joints: which of them move, where their bones end, and how they lie in the bind pose."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tiny network of rigged mesh hair: what it reads, what it gives, and its file (paper section 4.4: two
+"""The tiny network of rigged mesh hair: its inputs, its outputs and its file (paper section 4.4: two
 layers of 16).
 
 It reads neck and upper chest relative to the head (the first two columns of each rotation), gravity in the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rig's hair and body apart: what moves, what it is skinned to, and what it must stay out of."""
+"""A rig's hair split from its body: what moves, what it is skinned to, and what it must stay out of."""
 
 from dataclasses import dataclass, replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair joint chains as rods: what they weigh, how stiff their joints are, what holds them at rest."""
+"""Hair joint chains as rods: their weight, the stiffness of their joints, the force that holds them at rest."""
 
 from dataclasses import dataclass
 

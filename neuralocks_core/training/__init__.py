@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training in torch: networks, losses, loops and the way into a model file. Nothing that runs a bake imports this."""
+"""Training in torch: networks, losses, loops and writing the model file. Nothing that a bake runs imports this."""

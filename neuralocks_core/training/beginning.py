@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A training that begins with what another has learned: from a model file back to torch modules."""
+"""Training that starts from another model: from a model file back to torch modules."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live gauge: do gravity and motion matter to the network yet?
+"""The live gauge: has the network learned gravity and motion yet?
 
-A loss cannot tell: hair that stays rigid has a small one. The gauge compares the network with the solver on motion and
-strands that training never sees, beside hair carried rigidly (= 1) and the network's own answer for each pose held
+The loss cannot tell: it is small even for rigid hair. The gauge compares the network with the solver on motion and
+strands that training never sees, beside hair carried rigidly (= 1) and the network's own output for each pose held
 still.
 """
 

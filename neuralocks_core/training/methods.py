@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two methods of training behind one face: regression on rollouts of the solver, and the physics of random moments."""
+"""The two training methods behind one interface: regression on rollouts of the solver, and the physics of random moments."""
 
 from __future__ import annotations
 

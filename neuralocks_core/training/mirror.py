@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair and motion seen in a mirror: bodies are alike on both sides, so each rollout is worth two.
+"""Mirrored hair and motion: bodies are alike on both sides, so each rollout is worth two.
 
-Without it a network learns a turn to the left and one to the right each for itself, and answers them differently.
+Without it, a network learns turns to the left and to the right separately, and treats them differently.
 """
 
 from __future__ import annotations

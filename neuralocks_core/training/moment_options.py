@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The choices of self-supervised training, the paper's and ours."""
+"""Options of self-supervised training: the paper's and ours."""
 
 from __future__ import annotations
 

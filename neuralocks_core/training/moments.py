@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random moments to train on without simulation: three frames with their history, a body in its pose, whole locks.
 
-The paper draws one such moment a step. Here a pool of them is kept, each body with its search tree, because building
-these would take longer than the step.
+The paper draws one such moment per step. Here a pool of them is kept, each body with its search tree, because building
+the tree would take longer than the step.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of a training: those that none can use, known before the simulations begin, and those that a resumed one changes."""
+"""Checks of training options: invalid ones, before the simulations begin, and those that a resumed training changes."""
 
 from __future__ import annotations
 

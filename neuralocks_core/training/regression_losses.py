@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a regression on rollouts punishes."""
+"""The losses of a regression on rollouts."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How rollouts are learned: weights of the losses, sizes of a step, the kind of network."""
+"""Options for learning from rollouts: weights of the losses, batch sizes, the kind of network."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training material made on the fly: short simulations of a few locks of hair on a moving body.
 
-No data from anyone is needed: the motion is random, the solver is our own. Rollout number i depends on the seed and on
-i alone, so any process can make any of them, and a run that was killed goes on where it stopped.
+No outside data is needed: the motion is random, the solver is our own. Rollout number i depends only on the seed and on
+i, so any process can make any rollout, and a run that was killed resumes where it stopped.
 """
 
 from __future__ import annotations

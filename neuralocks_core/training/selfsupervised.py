@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's own training: a network that minimises the physics of random moments, without any simulation.
+"""The paper's training: a network that minimises the physics of random moments, without any simulation.
 
 Three consecutive frames are predicted; the last is penalised, the two before give its inertia (paper section 3.4.5).
 `SelfSupervisedOptions.paper` has the paper's choices of network, bending, adhesion and damping together; the defaults

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many of torch's threads share the work."""
+"""The number of torch threads."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

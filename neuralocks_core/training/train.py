@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training a strand model in one command: strand codes, what is learned from, the network, the model file."""
+"""Training a strand model in one command: strand codes, training data, the network, the model file."""
 
 from __future__ import annotations
 

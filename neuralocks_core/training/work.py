@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The folder beside a model where its training keeps what it needs to go on after a kill."""
+"""The folder beside a model where its training keeps what it needs to resume after a kill."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What imported curves have beside their strands: primvars, purpose and visibility, their own or of the prims above."""
+"""What imported curves have besides their strands: primvars, purpose and visibility, their own or of the prims above."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which USD files were written here and may be written over, and of whom they are."""
+"""Which USD files this program wrote and may overwrite, and to which character they belong."""
 
 from pxr import Sdf, Tf
 

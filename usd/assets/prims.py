@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves, skeletons and skin bindings as prims of a new stage, out of arrays."""
+"""Curves, skeletons and skin bindings as prims of a new stage, from arrays."""
 
 from dataclasses import dataclass
 

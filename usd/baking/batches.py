@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which grooms of a shot are posed together: hair in hundreds of prims costs little more than hair in one."""
+"""Which grooms of a shot are posed together, so that hair in hundreds of prims costs little more than hair in one."""
 
 from collections.abc import Sequence
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The points beyond the ends of drawn curves, which a network does not see: each turns with the edge that it prolongs."""
+"""The points beyond the ends of drawn curves, which a network does not see: each turns with the edge next to it."""
 
 import numpy as np
 

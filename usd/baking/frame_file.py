@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One finished frame on disk: its points as float32, filled up to whole words of eight bytes, and a checksum."""
+"""One finished frame on disk: its points as float32, padded to eight bytes, and a checksum."""
 
 import os
 from pathlib import Path

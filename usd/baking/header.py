@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every layer over a shot begins with: the shot below it, what USD reads of the first layer only, and overs."""
+"""How every layer over a shot begins: the shot as sublayer, metadata that USD reads only from the first layer, and overs."""
 
 import os
 import unicodedata

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Join the bakes of parts of a range, as the machines of a farm make them, into the one bake of the whole range."""
+"""Join bakes of parts of a range, as the machines of a farm make them, into one bake of the whole range."""
 
 import os
 from collections.abc import Iterable, Iterator

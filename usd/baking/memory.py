@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Giving freed memory back to the system, which the GNU C library otherwise keeps."""
+"""Returns freed memory to the system, which the GNU C library otherwise keeps."""
 
 import ctypes
 from collections.abc import Iterator

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a model for the shot that it is asked to bake: what it never learned, and what of it is ignored."""
+"""Notes on a model for the shot to bake: what it did not learn, and which settings it ignores."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every way to make a bake begins and ends with, whatever moves its hair."""
+"""The start and end of every bake, whatever moves its hair."""
 
 import time
 from collections.abc import Callable

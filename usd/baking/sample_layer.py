@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A crate file that is written sample by sample: its memory does not grow with their number."""
+"""A crate file that is written sample by sample, so that memory does not grow with their number."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

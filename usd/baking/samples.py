@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writing all samples of a bake: computed in ascending order, kept frame by frame, assembled meanwhile.
+"""Writing all samples of a bake: computed in ascending order, stored frame by frame, and assembled at the same time.
 
-Each sample is a pure function of the shot and its time code. So order, chunks, jobs and interruptions leave no trace in
-the file.
+Each sample is a pure function of the shot and its time code. So order, chunks, jobs and interruptions do not change the
+file.
 """
 
 import hashlib

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What takes a crate file back to one of its saves after a kill in the midst of a later one, or a power cut.
+"""A log that takes a crate file back to one of its saves, after a kill during a later save or after a power cut.
 
-A save appends values where the tables of the save before began, writes new tables behind them, and then a new header that
-points there. So a file is what it was after a save once it is cut where that save's tables began, and gets these and the
-header again. A log keeps both of every save, a line each.
+A save appends values where the tables of the previous save began, writes new tables behind them, and then a new header that
+points there. So to restore a save, the file is cut where that save's tables began, and these and the header are written
+again. The log keeps both for every save, one line each.
 """
 
 import base64

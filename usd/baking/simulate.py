@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bake by the reference solver instead of the network: slow, from the first frame on, to compare with."""
+"""A bake by the reference solver instead of the network, for comparison: slow, and always from the first frame on."""
 
 import time
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished frames, and the layer that is made of them, on disk beside the output: a killed bake goes on where it stopped."""
+"""Finished frames, and the layer made of them, on disk beside the output: a killed bake resumes where it stopped."""
 
 import hashlib
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which frames the samples of a layer are made of, and from when on nothing needs them any more."""
+"""Which frames the samples of a layer are made of, and when these frames are no longer needed."""
 
 from collections.abc import Iterator, Sequence
 from itertools import count

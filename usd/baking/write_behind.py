@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work done behind the caller's back, in order, on one thread: writing while the next frame is computed."""
+"""Background work, in order, on one thread: writing while the next frame is computed."""
 
 import queue
 import threading

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where USD's world becomes ours and back: units, axes, arrays, times, paths."""
+"""The border to USD, in both directions: units, axes, arrays, times, paths."""

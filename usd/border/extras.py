@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Packages that only some work needs, asked for before it begins: else they are missed after minutes of it."""
+"""Packages that only some work needs, checked before it begins, not minutes later."""
 
 from importlib import import_module
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a prim stands: its local-to-world transform at any time, and at which times that is authored, in samples or as
-the knots of splines.
+"""A prim's local-to-world transform at any time, and the times at which it is authored, in samples or as the knots of
+splines.
 """
 
 from collections.abc import Callable, Iterator

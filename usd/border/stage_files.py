@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USD files: opening them, what may not be written over, and writing them whole."""
+"""USD files: opening them, refusing outputs that must not be overwritten, and writing them whole."""
 
 import os
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is the same of many prims, such as the characters of a crowd, told once."""
+"""Notes that are the same for many prims, such as the characters of a crowd, told once."""
 
 import re
 from collections.abc import Hashable, Iterable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of attributes as arrays. A file may declare an attribute with any type, and USD gives what it finds."""
+"""Values of attributes as arrays. A file may declare an attribute with any type, and USD returns what it finds."""
 
 import numpy as np
 from pxr import Usd, Vt

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an engine needs of a shot's grooms beside the graphs: everything about each strand that no frame changes.
+"""What an engine needs from a shot's grooms besides the graphs: all data of each strand that is the same in every frame.
 
-Locks, scalp frames, resampling and body measures are worked out once, here, so that a runtime elsewhere makes the boundary
-vector, runs two graphs a frame, and gets the very hair that a bake has.
+Locks, scalp frames, resampling and body measures are computed once, here, so that another runtime only makes the boundary
+vector and runs two graphs per frame, and gets the same hair as a bake.
 """
 
 import re

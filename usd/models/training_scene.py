@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `neuralocks train` learns from: a character, grooms and motion, out of files."""
+"""What `neuralocks train` learns from: a character, grooms and motion, read from files."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Looking at what there is: inspect, report card, pictures, demo."""
+"""Looking at files and bakes: inspect, report card, pictures, demo."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bending of strands that have fewer vertices than the network's, on their own vertices.
 
-Between two of them a displacement goes in a straight line, so that all of a strand's change of bend would fall on the few
-network vertices beside them: a circle of four vertices would store three times what it does.
+Between two of its vertices a displacement is linear, so all of a strand's change of bend would fall on the few network
+vertices next to them: a circle of four vertices would store three times its real bend energy.
 """
 
 import numpy as np

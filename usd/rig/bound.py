@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One character of a rig bake: the model on its chains, its samples, the turns of its hair joints, and what to tell of it."""
+"""One character of a rig bake: the model on its chains, its samples, the rotations of its hair joints, and notes on it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

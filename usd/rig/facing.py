@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way a character with hair on joints faces, where that is not what somebody expects."""
+"""Which way a character with hair on joints faces, if that is unexpected."""
 
 import numpy as np
 

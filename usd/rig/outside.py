@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joints that nothing moves, though they are hair or may be: those that do not hang from the head, and those of other names."""
+"""Joints that nothing moves, though they are or may be hair: those that are not below the head, and those with other names."""
 
 import numpy as np
 

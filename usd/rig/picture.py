@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigged mesh hair as a preview draws it: the skinned meshes of its character, hair told from skin."""
+"""Rigged mesh hair as a preview draws it: the skinned meshes of its character, hair separate from skin."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whose uneven scale it is that hair joints have in the bind pose: their own, or that of a prim above the skeleton."""
+"""Where the uneven scale of hair joints in the bind pose comes from: the joints, or a prim above the skeleton."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which of several bodies a groom belongs to that sits on all of them equally well: twins, or one person in two skeletons."""
+"""Which body a groom belongs to that sits on several equally well: twins, or one person in two skeletons."""
 
 import numpy as np
 from pxr import Sdf, Usd

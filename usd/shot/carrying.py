@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which joint of a rig carries hair, by what its own prim follows or the skin under it, and the character with that joint."""
+"""Which joint of a rig carries hair, by what the hair's prim follows or by the skin under it; and the character with that joint."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a character: whether it stands as it was bound, has a body, and one of a size that a network knows; and whether it
-is scaled evenly.
+"""Notes on a character: whether its bind pose stands upright, whether it has a body of a trained size, and whether it is
+scaled evenly.
 """
 
 from collections.abc import Sequence

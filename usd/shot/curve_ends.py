@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where curves begin and end as they are drawn: some have a point beyond each end, which steers the curve only.
+"""Where drawn curves begin and end: some have a point beyond each end, which only steers the curve.
 
 A Catmull-Rom curve that is not pinned goes from its second point to the last but one, and a B-spline begins and ends
-nearly there (UsdGeomBasisCurves, "Cubic Basis and Wrap"). Where the outer points are repeated, the end is at them. But not
-everybody who leaves the wrap as it is adds such points: `seat.begins_where_drawn` asks the skin.
+nearly there (UsdGeomBasisCurves, "Cubic Basis and Wrap"). If the outer points are repeated, the curve ends at them. But not
+all curves with the default wrap have such points: `seat.begins_where_drawn` checks against the skin.
 """
 
 from dataclasses import dataclass, replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors about a stage that lacks what a bake needs, with the likely cause: what it has in its place."""
+"""Errors about a stage that lacks what a bake needs, with the likely cause: what it has instead."""
 
 from contextlib import suppress
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a groom was baked from: told in the bake, and compared with what is there."""
+"""What a groom was baked from: recorded in the bake, and compared with the current shot."""
 
 from pxr import Usd
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on motion capture: what had to be guessed of it, and whether its performer lies."""
+"""Notes on motion capture: what had to be guessed, and whether its performer lies down."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes: what a user should know about a shot though the bake goes on. One line each: prim or file, fact, remedy."""
+"""Notes: what a user should know about a shot that can still be baked. One line each: prim or file, fact, remedy."""
 
 import os
 from collections.abc import Iterable, Sequence

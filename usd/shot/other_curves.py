@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair that nobody would find in a bake: curves of other kinds than BasisCurves, beside some of these."""
+"""Hair that a bake leaves out: curves of other types beside BasisCurves."""
 
 from collections.abc import Sequence
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The skeletons of a stage beside the one that its user named. To read a whole crowd takes as long as to bake one of it, so
-they are read where a groom may be theirs or they may be the same person, and not before.
+"""The skeletons of a stage besides the one that the user named. Reading a whole crowd takes as long as baking one of it, so
+they are only read if a groom may be theirs or they may be the same person.
 """
 
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves that are drawn for animators to pull at, as rigs are exported with, and no hair."""
+"""Curves that are a rig's controls, exported with it, and not hair."""
 
 from collections.abc import Sequence
 

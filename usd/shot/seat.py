@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where curves that nothing binds lie in a rig's bind pose, and on which skin.
+"""Where curves without a binding lie in a rig's bind pose, and on which skin.
 
-A file does not say what the place of such curves in the stage belongs to: the bind pose, a skin elsewhere in the stage,
-or the pose at one moment. For curves that move with the head or are a moving cache it is a moment; for the rest, the
-place at which their roots lie on skin.
+A file does not say what the transform of such curves refers to: the bind pose, a skin elsewhere in the stage, or the pose
+at one moment. For curves that move with the head or are a moving cache it is a moment; for the rest, it is whichever puts
+their roots on skin.
 """
 
 from collections.abc import Callable

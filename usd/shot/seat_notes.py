@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on how a groom sits on skin: off it, upside down, or drawn from above it; and on one too far away to be placed exactly."""
+"""Notes on how a groom sits on skin: off it, reversed, or drawn from above it; and on one too far away to be placed exactly."""
 
 import numpy as np
 from pxr import Usd

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The skeletons of a stage that can be used. Where names do not tell the head, it is the joint that carries the hair."""
+"""The skeletons of a stage that can be used. If names do not tell the head, it is the joint that carries the hair."""
 
 from dataclasses import replace
 

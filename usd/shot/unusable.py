@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Skeletons that cannot be used, and the hair that lies on their characters: without a binding it is as near to a neighbour's
-head as two people stand, and must not be taken for that one's.
+"""Skeletons that cannot be used, and the hair on their characters: without a binding it may be near a neighbour's head, but
+must not be taken as the neighbour's hair.
 """
 
 from contextlib import suppress

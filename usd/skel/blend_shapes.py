@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blend shapes of a skinned mesh, with the shapes that lie between rest and full weight.
 
-A shape with inbetweens is linear from knot to knot of its weight. Each knot is kept as a shape of its own, so that what
-reads a body has shapes that add up with weights, and nothing else.
+A shape with inbetweens is linear from knot to knot of its weight. Each knot is kept as a separate shape, so that a body has
+only shapes that add up by weight.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 """A UsdSkel skeleton and its animation as arrays in stage space: names, bind pose, and posed joints at any time.
 
 Evaluated here rather than by a UsdSkelSkeletonQuery, which exists only below a SkelRoot and takes one time at a time; a
-test holds the two together.
+test checks that both agree.
 """
 
 from functools import cached_property

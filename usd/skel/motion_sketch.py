@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What moves a skeleton, as a `sketch`: alike wherever a set puts the character, and whatever its prims are called there."""
+"""What moves a skeleton, as a `sketch`: the same wherever a set places the character, and whatever its prims are called."""
 
 from collections.abc import Iterator
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How near skin is: a tree of a mesh's points and, on faces so wide that hair on them is far from their corners, more points."""
+"""Distance to skin: a tree of a mesh's points, with extra points on faces so wide that hair on them is far from the corners."""
 
 import numpy as np
 from scipy.spatial import cKDTree

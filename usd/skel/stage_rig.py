@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One skeleton of a stage, as it was read."""
+"""One skeleton of a stage, as read."""
 
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What warp compiles for the solvers."""
+"""Warp kernels of the solvers."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A block-banded linear system, one a thread: 4x4 blocks, two to each side of the diagonal, vertices 0 and 1 held."""
+"""A block-banded linear system per thread: 4x4 blocks, two to each side of the diagonal, vertices 0 and 1 held."""
 
 import warp as wp
 

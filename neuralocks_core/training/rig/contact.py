@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies in poses or in motion to learn from, renewed all the while, and what the hair's answer costs there."""
+"""Bodies in poses or in motion to learn from, renewed continually, and the loss of hair that collides with them."""
 
 from dataclasses import dataclass
 

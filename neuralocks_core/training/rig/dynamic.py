@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training the dynamic variant of a rig's network: regression on simulations of its chains under random motion.
 
-The network stays a pure function of the boundary history; what it learns to answer is what the simulation did
-after the same history.
+The network stays a pure function of the boundary history; it learns to give the simulation's result after the same
+history.
 """
 
 import time

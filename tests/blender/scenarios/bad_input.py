@@ -219,7 +219,7 @@ def into_a_folder(folder: Path) -> None:
     (folder / "there").mkdir()
     for write in (operators.bake, operators.export_skel):
         for path in (f"{folder}/there", f"{folder}/there/", f"{folder}/other/"):
-            refused(lambda write=write, path=path: write(filepath=path), path, "folder", "name the file")
+            refused(lambda write=write, path=path: write(filepath=path), path, "folder", "name a file")
     assert [each.name for each in folder.iterdir()] == ["there"] and not any((folder / "there").iterdir())
 
 

@@ -200,7 +200,10 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
     ):
         with pytest.raises(NeuralocksError, match=fact):
             train_strands(other, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True)
-    with claimed(tmp_path / "hair.neuralocks.training"), pytest.raises(NeuralocksError, match="another training is running"):
+    with (
+        claimed(tmp_path / "hair.neuralocks.training"),
+        pytest.raises(NeuralocksError, match="another training is running"),
+    ):
         train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4)
     assert out.read_bytes() == before
     train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True, keep_work=True)
