@@ -24,7 +24,7 @@ GRAPHS = {
     "strand.onnx": f"once per groom: `strand` (S, {PLAIN_STRAND} or {STRAND}): root UV 2, own code {CODE}, mean code of its lock {CODE}, root normal 3, "
     f"length 1 [m], and if it reads {STRAND}, rest points from the root {SHAPE} [m, canonical space] -> `strand_part` (S, {HIDDEN})",
     "frame.onnx": f"once per frame: `frame` (1, F), the boundary vector -> `frame_part` (1, {HIDDEN}), and if the frame "
-    f"changes the weights of the later layers, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
+    f"changes later weights, `middle` ({HIDDEN}, {HIDDEN}) and `out` ({HIDDEN}, {SHAPE})",
     "tail.onnx": f"per strand and frame: `strand_part` (S, {HIDDEN}), all outputs of `frame.onnx`, `anchor` (S, {SHAPE}): the `offsets` "
     f"for the held bind pose (zeros if the model is not anchored), `edges` (S, {SHAPE}): rest[i] - rest[i-1] "
     f"with row 0 zero [m] -> `offsets` (S, {SHAPE}), `displacement` (S, {SHAPE}) in canonical space [m]",
@@ -43,11 +43,11 @@ _STEPS = {
 """What a step of the history may consist of."""
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
-    "end of the shot's range is a sample, too, if it lies after the last of them, and the start of the range if it lies "
-    f"{STAND:g} s or more before the first: the character stands still in between. A start less than that before the first adds nothing. Between two "
+    f"shot's range adds its end if that lies after the last of them, and its start if that lies {STAND:g} s or more before "
+    "the first: the character stands still in between. A start nearer than that adds nothing. Between two "
     f"samples farther apart than {CLOSE:g} s, each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
     f"or, if these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second and framesPerSecond differs, 1 / framesPerSecond "
-    f"seconds, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, and so does the later of the two sides of a "
+    f"seconds, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, as does the later of the two sides of a "
     f"step, which are less than {STEP:g} frames apart and more than {ALONE:g} times as far from the samples around them; no frame less than "
     f"{STEP:g} frames before a step is a sample"
 )
@@ -55,7 +55,7 @@ _BLOWS = (
     " The spline goes through the places of the samples, except where the velocity from sample to sample, (p_i+1 - p_i) / "
     "(t_i+1 - t_i), changes at a sample by a vector longer than "
     f"{BoundarySampler.GRAVITY_LIMIT:g} * 9.81 max((t_i+1 - t_i-1) / 2, dt): there the change is shortened to that length, "
-    "and the path continues from there as before. A loop stays as it is."
+    "and the path continues from there. A loop stays as it is."
 )
 _SPACES = "(3, 3), without scale: columns made of unit length, and the nearest rotation if they are sheared; world: metres, Y up; g = (0, -9.81, 0); T(m) is the transpose of m"
 _PLACE = "the place of the head joint"
@@ -96,7 +96,7 @@ SLIDERS = {
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
-    "with vertices 0 and 1 at rest, each further vertex follows the one before by an edge: the rest edge + what L + f (D - L) adds to "
+    "with vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
     "a game": "the clip is the motion so far: keep the samples of the last (steps + 2) dt seconds. Add one whenever the animation "
     "has been updated, with the time of that pose, and ask for the newest one's time: frames drawn between two updates would "
@@ -106,7 +106,7 @@ SLIDERS = {
     "a cut": "where a character jumps to another place, hair starts anew: the cut is the first sample of a new clip, before which the "
     "head moves in a straight line and does not turn. The sample before it is the last of the previous clip, after which the head "
     "stands still. A bake finds cuts, or is given them (`--cuts`)",
-    "the body": "nothing here keeps strands out of the body: that is a separate step of the bake (`--no-resolve` leaves it out)",
+    "the body": "nothing here keeps strands out of it: that is a separate step of the bake (`--no-resolve` leaves it out)",
 }
 """What an artist or a game changes, and its effect on the inputs and outputs above."""
 
@@ -154,12 +154,12 @@ def _history(spec: BoundarySpec, place: str) -> str:
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history follow a "
         "natural cubic spline through them, of the place and of the quaternion's components with continuous signs; `pose` and `gravity` are of the "
-        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} In animation on twos to fours, in which poses are held for two to four samples each, the "
+        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} In animation on twos to fours, whose poses are held for two to four samples each, "
         "samples that repeat a pose are left out, and at their times t is that of the pose's first sample (between two samples, t goes linearly "
-        "from that of the one to that of the other; after the last one it continues with time). A pose that shows for longer than "
-        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row; this rule only approximates that). Before the first sample "
-        "the head moves in a straight line, with its velocity there, and does not turn; after the last one it stands still. In a loop (`--loop`), "
-        "t wraps round instead, with the head ahead by its path in each round, and the spline continues over the seam on both sides"
+        "from one to the other; after the last one, on with time). A pose that shows for longer than "
+        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row; this is an approximation). Before the first sample "
+        "the head moves in a straight line, with its velocity there, and does not turn; after the last it stands still. In a loop (`--loop`), "
+        "t wraps round, with the head ahead by its path in each round, and the spline continues over the seam on both sides"
     )
 
 
