@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ctrl-C, or a farm's SIGTERM, ends a command at any time. While USD loads its modules, it swallows the signal or turns it
-into an error, and libraries that draw may crash.
+"""Ctrl-C, a farm's SIGTERM, or the SIGHUP of a terminal that is closed ends a command at any time. While USD loads its modules,
+it swallows the signal or turns it into an error, and libraries that draw may crash.
 """
 
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C; as shells have it, 128 and the signal's number."""
 _ENDS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 """Signals that end a command, and who handles them where nobody else does."""
+if hasattr(signal, "SIGHUP"):  # not on Windows; a job of nohup is deaf to it, and stays so
+    _ENDS[signal.SIGHUP] = signal.SIG_DFL
 
 _number = 0
 """Of the signal that came, 0 for none."""
@@ -21,8 +23,8 @@ _deferring = False
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Ctrl-C or SIGTERM in this block, and whatever error it led to, ends the program in one word; blocks may lie in each
-    other.
+    """A signal that ends a command, in this block, and whatever error it led to, ends the program in one word; blocks may lie
+    in each other.
     """
     global _number
     with _heeded():
@@ -33,7 +35,8 @@ def stoppable() -> Iterator[None]:
                 raise
             status = 128 + _number if _number else INTERRUPTED
             _number = 0  # the block around this one has nothing more to say
-            print("stopped", file=sys.stderr)
+            with suppress(OSError):  # the terminal may be gone
+                print("stopped", file=sys.stderr)
             raise SystemExit(status) from None
 
 
@@ -83,4 +86,10 @@ def _remember(number, frame) -> None:
     global _number
     _number = number
     if not _deferring:
-        raise KeyboardInterrupt
+        raise _Pressed
+
+
+class _Pressed(KeyboardInterrupt):
+    """Python itself looks for the plain one: where that leaves code that was given as text, as dataclasses are made, the process
+    later ends as if killed by Ctrl-C, whatever its exit status.
+    """

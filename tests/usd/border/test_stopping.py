@@ -61,19 +61,56 @@ def test_ctrl_c_ends_a_command_whatever_it_meets(work, capsys):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_farm_ends_a_command_as_ctrl_c_does(capsys):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_farm_or_a_closed_terminal_ends_a_command_as_ctrl_c_does(name, capsys):
     """So it has time to take away what is half written."""
+    number = getattr(signal, name, None)
+    if number is None:
+        pytest.skip(f"{name} is of Unix")
     app = typer.Typer()
 
     def work():
         """As a scheduler does that needs the machine."""
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), number)
 
     command_of(app)("work")(work)
-    with pytest.raises(SystemExit) as caught:
-        app([])
-    assert (caught.value.code, capsys.readouterr().err) == (128 + signal.SIGTERM, "stopped\n")
-    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    before = signal.signal(number, signal.SIG_DFL)
+    try:
+        with pytest.raises(SystemExit) as caught:
+            app([])
+        assert (caught.value.code, capsys.readouterr().err) == (128 + number, "stopped\n")
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="nohup is of Unix")
+def test_a_job_that_outlives_its_terminal_stays_deaf_to_that(capsys):
+    def work():
+        """As under nohup."""
+        os.kill(os.getpid(), signal.SIGHUP)
+        print("done")
+
+    app = typer.Typer()
+    command_of(app)("work")(work)
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with pytest.raises(SystemExit) as caught:
+            app([])
+        assert (caught.value.code, capsys.readouterr().out) == (0, "done\n")
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_terminal_that_is_gone_is_told_nothing(monkeypatch):
+    class Gone:
+        def write(self, text):
+            raise OSError("Input/output error")
+
+    monkeypatch.setattr(sys, "stderr", Gone())
+    with pytest.raises(SystemExit) as caught, stoppable():
+        _press()
+    assert caught.value.code == INTERRUPTED
 
 
 def test_ctrl_c_waits_while_modules_load(capsys):
@@ -112,19 +149,24 @@ def test_ctrl_c_while_the_command_line_is_read_is_one_word(monkeypatch, capsys):
     assert (caught.value.code, capsys.readouterr().err) == (INTERRUPTED, "stopped\n")
 
 
+@pytest.mark.parametrize("press", ["{}", "exec('{}')"])
 @pytest.mark.parametrize("module", ["usd.cli.app", "pxr.Gf"])
-def test_ctrl_c_is_one_word_from_the_beginning(module, tmp_path):
-    """While the command line is loaded, and while USD is."""
+def test_ctrl_c_is_one_word_from_the_beginning(module, press, tmp_path):
+    """While the command line is loaded, and while USD is; also within code in a string, as dataclasses are made, after which
+    Python would end as if killed.
+    """
     code = """import importlib.abc, os, signal, sys
 class Pressed(importlib.abc.MetaPathFinder):
     def find_spec(self, name, *_):
         if name == sys.argv[0]:
-            os.kill(os.getpid(), signal.SIGINT)
+            PRESS
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.meta_path.insert(0, Pressed())
 from usd.__main__ import main
 sys.argv = sys.argv[1:]
-main()"""
-    words = [module, "inspect", str(tmp_path / "none.usda")]
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+main()""".replace("PRESS", press.format("os.kill(os.getpid(), signal.SIGINT)"))
+    (tmp_path / "pressed.py").write_text(code)
+    words = ["-m", "pressed", module, "inspect", str(tmp_path / "none.usda")]
+    there = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(tmp_path)])}
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, env=there)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")
