@@ -21,6 +21,7 @@ from ..shot.gaps import gaps
 from ..shot.made_from import INPUTS, unlike
 from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
+from ..skel.rig_copy import SOURCE
 from .header import relative, repeat_metadata
 from .override import deliver
 from .sample_layer import SampleLayer, in_order
@@ -104,7 +105,7 @@ class _Part:
     """One part: its layer, and which grooms it has samples of."""
 
     def __init__(self, path: Path):
-        self.path = path
+        self.path, self.layer = path, None
         check_file(path)
         if path.suffix.lower() not in LAYERS:
             raise self._no_bake()
@@ -112,12 +113,21 @@ class _Part:
             self.layer = Sdf.Layer.FindOrOpen(str(path))
         if self.layer is None:
             raise NeuralocksError(f"{path}: cannot be read; bake that part again")
-        self.grooms = [prim.path for prim in _below(self.layer.pseudoRoot) if self._is_baked(prim)]
+        self.grooms = [prim.path for prim in self.prims() if self._is_baked(prim)]
         if not self.grooms:
             raise self._no_bake()
 
     def _no_bake(self) -> NeuralocksError:
+        if self.layer and any(SOURCE in prim.relationships for prim in self.prims()):
+            return NeuralocksError(
+                f"{self.path}: is a rig bake, and these are not joined from parts; bake all characters at once, or each over the "
+                "bake of the one before"
+            )
         return NeuralocksError(f"{self.path}: is not a bake; give files that neuralocks bake wrote")
+
+    def prims(self) -> Iterator[Sdf.PrimSpec]:
+        """All prims of the layer, as a stage has them."""
+        return _below(self.layer.pseudoRoot)
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -259,7 +269,7 @@ def _prims(parts: list[_Part], stage: Usd.Stage) -> list[Sdf.PrimSpec]:
     """All prims of parts in the order in which a bake writes them, that of the stage; each from the first part that has it."""
     found: dict[Sdf.Path, Sdf.PrimSpec] = {}
     for part in parts:
-        for prim in _below(part.layer.pseudoRoot):
+        for prim in part.prims():
             found.setdefault(prim.path, prim)
     every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate))
     place = {path: number for number, path in enumerate(prim.GetPath() for prim in every)}

@@ -13,7 +13,10 @@ from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.cli.app import app
 from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.rig.stage import read_rigged_hair
 
+from ..rig_shots import model_for, small_shot
 from ..shots import Recipe, samples, write_shot
 
 
@@ -168,6 +171,8 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
     (tmp_path / "broken.usdc").write_bytes(part.read_bytes()[:-300])
     (tmp_path / "folder.usdc").mkdir()
     (tmp_path / "groom.tfx").write_bytes(b"HairAsset Version 2.0")
+    rigged = small_shot(tmp_path / "rigged.usda")
+    bake_rig(rigged, tmp_path / "rig.usdc", model_for(read_rigged_hair(rigged)))
     elsewhere = write_shot(tmp_path, Recipe(bound="mesh", frames=12), "elsewhere")
     for frames_of, options, said in (
         (
@@ -186,6 +191,7 @@ def test_what_does_not_belong_together_is_refused(shot, tmp_path, model):
         (None, "missing.usdc", "missing.usdc: no such file; check the path"),
         (None, "folder.usdc", "folder.usdc: is a folder; name"),
         (None, "groom.tfx", "groom.tfx: is not a bake; give files that neuralocks bake wrote"),
+        (None, "rig.usdc", "rig.usdc: is a rig bake, and these are not joined from parts; bake all"),
     ):
         second = (
             tmp_path / options if frames_of is None else bake(frames_of, other, model, frames="5:6", **options).path
