@@ -15,7 +15,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import first_line, named
-from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_input, one_file, open_stage
+from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_over, one_file, open_stage
 from ..border.units import Border
 from ..shot.gaps import gaps
 from ..shot.made_from import INPUTS, unlike
@@ -73,7 +73,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         part.check_alike(every[:number])
         if one_file(out, part.path):
             raise NeuralocksError(f"{out}: is one of the parts; choose another name")
-    check_not_input(out, stage)
+    check_not_over(out, stage)
     frame = Border.of(stage).frame
     prims = _prims(every, stage)
     plan = {prim.path: _sources(prim.path, every) for prim in prims if any(prim.path in part.grooms for part in every)}

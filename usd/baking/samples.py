@@ -23,7 +23,7 @@ from neuralocks_core.errors import CannotWrite
 from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import named, names_damage
-from ..border.stage_files import check_not_input, unsaved, used_files
+from ..border.stage_files import check_not_over, unsaved, used_files
 from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
@@ -79,7 +79,7 @@ def write_samples(
         NeuralocksError: it cannot be made. Nothing is left then, neither under its name nor beside it; only a stop by the user, or
             a file system that refuses, as of a full disk (CannotWrite), leaves the finished frames, to go on from.
     """
-    check_not_input(out, shot.stage)
+    check_not_over(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
     inputs["unsaved"] = unsaved_digest(unsaved(shot.stage))
     batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]

@@ -98,6 +98,23 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
         raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
 
 
+def check_not_over(out: Path, stage: Usd.Stage) -> None:
+    """Refuse to write a layer over a shot under the name of what is part of that shot, or will be once it is there.
+
+    Raises:
+        NeuralocksError: `out` is one of its files, or the name of a missing one of its layers.
+    """
+    check_not_input(out, stage)
+    for layer in stage.GetUsedLayers():
+        folder = os.path.dirname(layer.realPath)
+        named_there = [os.path.realpath(os.path.join(folder, name)) for name in layer.subLayerPaths if folder]
+        if os.path.realpath(out) in named_there:
+            raise NeuralocksError(
+                f"{out}: {layer.GetDisplayName()} has it as a layer, and what is written lies over that file; take it out there, "
+                "or choose another name"
+            )
+
+
 def one_file(out: Path, path: str | Path) -> bool:
     """Whether a file that will be written is one that there is; folders on the way to it may still be missing."""
     if not os.path.exists(path):

@@ -15,7 +15,7 @@ from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
-from ..border.stage_files import check_layer_name, check_not_input
+from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.notes import asked_notes, left_out, out_of_place
@@ -105,7 +105,7 @@ def bake_rig(
         shot, skeleton=skeleton, head=head, joints=joints, cuts=cuts, unbaked=True, model=model.chains
     )
     stage = found[0].stage
-    check_not_input(out, stage)
+    check_not_over(out, stage)
     bound = _each(found, lambda hair: BoundHair.of(hair, model, frames, subframes), left)
     check_cuts(cuts, [one.hair.source for one in bound])
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]

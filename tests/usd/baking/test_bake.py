@@ -10,11 +10,15 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
+from usd.baking.join import join
 from usd.border.stage_files import open_stage
 from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.rig.stage import read_rigged_hair
 from usd.shot.stage import read_shot
 from usd.skel.surface import FORMER
 
+from ..rig_shots import model_for, small_shot
 from ..shots import CENTRE, HEAD, Recipe, samples, strand_points, world_points, write_shot
 
 
@@ -228,3 +232,20 @@ def test_a_bake_over_its_own_shot_is_refused(tmp_path, model):
     read = read_shot(shot)
     assert np.abs(read.grooms[0].groom.points.mean(0) - CENTRE).max() < 0.2
     assert os.listdir(tmp_path) == ["shot.usda"]
+
+
+def test_what_lies_over_a_shot_is_not_written_under_the_name_of_a_missing_layer_of_it(tmp_path, model):
+    """Each would lie over the other: USD opens such files with an error, and the next bake would be of part of its own shot."""
+    part = bake(write_shot(tmp_path, name="anim"), tmp_path / "part.usdc", model, frames=[2]).path
+    shot, rig, out = tmp_path / "shot.usda", small_shot(tmp_path / "rig.usda"), tmp_path / "hair.usdc"
+    shot.write_text(
+        "#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@./hair.usdc@, @./anim.usda@, @./rig.usda@]\n)\n"
+    )
+    stage = Usd.Stage.Open(str(part))
+    stage.GetRootLayer().subLayerPaths[0] = "./shot.usda"
+    stage.GetRootLayer().Save()
+    rig_model = model_for(read_rigged_hair(rig))
+    for work in (lambda: bake(shot, out, model), lambda: bake_rig(shot, out, rig_model), lambda: join([part], out)):
+        with pytest.raises(NeuralocksError, match=r"hair\.usdc: shot\.usda has it as a layer, and"):
+            work()
+    assert not out.exists() and not list(tmp_path.glob(".*"))
