@@ -6,13 +6,11 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.body.tree_search import search
 from neuralocks_core.errors import NeuralocksError
 
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
-THREADED = 2_000
-"""From so many points on, a search is shared with other threads."""
-
 CANDIDATES = 160_000
 """Triangles looked at together, those of some points, to bound the memory: a grid around a giant's head has millions."""
 
@@ -73,7 +71,7 @@ class Collider:
         shape, points = np.shape(points)[:-1], np.asarray(points, float).reshape(-1, 3)
         if not len(points):
             return np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape, int)
-        rough, sample = self._tree.query(points, workers=_workers(points))
+        rough, sample = search(self._tree, points)
         triangle = self._owner[sample]
         closest = self._tree.data[sample]
         normal = self._normals[triangle]
@@ -85,7 +83,7 @@ class Collider:
         while len(pending):
             count, left = min(k, self._tree.n), []
             for here in np.split(pending, range(0, len(pending), max(1, CANDIDATES // count))[1:]):
-                far, found = self._tree.query(points[here], k=np.arange(1, count + 1), workers=_workers(here))
+                far, found = search(self._tree, points[here], np.arange(1, count + 1))
                 closest[here], normal[here], triangle[here], best = self._nearest(points[here], self._owner[found])
                 done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
                 left.append(here[~done])
@@ -130,11 +128,6 @@ class Collider:
         at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
         result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
         return result
-
-
-def _workers(points: np.ndarray) -> int:
-    """Threads for a tree's query: of few points it is done before others have started."""
-    return -1 if len(points) >= THREADED else 1
 
 
 def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

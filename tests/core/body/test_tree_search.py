@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Searches of a k-d tree that several threads share."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from neuralocks_core.body.tree_search import SHARE, search
+
+
+@pytest.mark.parametrize("k", [1, np.arange(1, 4)])
+@pytest.mark.parametrize("count", [0, 5, 4 * SHARE + 1])
+def test_the_threads_find_what_one_finds(count, k, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    rng = np.random.default_rng(1)
+    tree, points = cKDTree(rng.normal(size=(500, 3))), rng.normal(size=(count, 3))
+    for found, wanted in zip(search(tree, points, k), tree.query(points, k), strict=True):
+        assert found.dtype == wanted.dtype
+        np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no signal reaches one process alone")
+def test_ctrl_c_waits_for_the_threads(monkeypatch):
+    """Else they go on in memory that is given back."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    ended = []
+
+    class Slow:
+        def query(self, points, k):
+            time.sleep(0.5)
+            ended.append(len(points))
+            return np.zeros(len(points)), np.zeros(len(points), int)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            search(Slow(), np.zeros((3 * SHARE, 3)))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended == [SHARE] * 3
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no signal reaches one process alone")
+def test_hair_that_is_grown_is_stopped_without_a_crash():
+    code = """import os, signal, threading
+import numpy as np
+from neuralocks_core.hairstyles.obstacle import _to_surface
+signal.signal(signal.SIGINT, signal.default_int_handler)
+rng = np.random.default_rng(1)
+body, grid = rng.uniform(size=(20_000, 3)), rng.uniform(size=(400_000, 3))
+threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    _to_surface(grid, body, np.arange(19_998).reshape(-1, 3))
+except KeyboardInterrupt:
+    raise SystemExit(130) from None"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "")
