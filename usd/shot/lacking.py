@@ -22,9 +22,11 @@ MOST_VARIANTS = 64
 def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
     """The error for a stage without BasisCurves."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
-    remedy = _in_a_variant(stage) or _on_joints(stage) or "add one, or import a hair file with 'neuralocks import'"
-    if other:
+    switched_off = _switched_off(stage, UsdGeom.BasisCurves)
+    remedy = _in_a_variant(stage) or switched_off or _on_joints(stage)
+    if other and not switched_off:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
+    remedy = remedy or "add one, or import a hair file with 'neuralocks import'"
     return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
 
 
@@ -35,7 +37,7 @@ def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
         remedy = (
             "if it holds hair alone, sublayer or reference it in the shot of its character, on the head; else " + remedy
         )
-    return nothing_found(stage, path, "UsdSkel skeleton", remedy)
+    return nothing_found(stage, path, "UsdSkel skeleton", _switched_off(stage, UsdSkel.Skeleton) or remedy)
 
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
@@ -67,6 +69,16 @@ def _on_joints(stage: Usd.Stage) -> str:
     if hairy is None:
         return ""
     return f"strands are needed here; the hair that is joints of {hairy.GetPath()} is moved by 'neuralocks rig bake', and measured by 'rig evaluate'"
+
+
+def _switched_off(stage: Usd.Stage, kind: type) -> str:
+    """Which prim of this kind would be there if it were active, or no class, and what to do then; '' if there is none."""
+    for prim in (prim for prim in stage.TraverseAll() if prim.IsA(kind)):
+        if not prim.IsActive():
+            return f"{prim.GetPath()} is inactive: activate it"
+        if prim.IsAbstract():
+            return f"{prim.GetPath()} is part of a class: let a prim inherit that"
+    return ""
 
 
 def _in_a_variant(stage: Usd.Stage) -> str:

@@ -179,6 +179,24 @@ def test_a_groom_in_a_variant_that_is_not_chosen_is_named(tmp_path):
     assert any("variant 'long'" in line for line in inspect(path)["stops"])
 
 
+@pytest.mark.parametrize("prim", ["/Hero/Hair", "/Hero/Rig"])
+def test_what_is_switched_off_is_named(tmp_path, prim):
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath(prim).SetActive(False)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match=f"holds no .*; {prim} is inactive: activate it"):
+        read_shot(path)
+    assert any("is inactive" in line for line in inspect(path)["stops"])
+    stage.GetPrimAtPath(prim).SetActive(True)
+    stage.GetPrimAtPath("/Hero").SetSpecifier(Sdf.SpecifierClass)
+    stage.Save()
+    with pytest.raises(
+        NeuralocksError, match="holds no groom .*; /Hero/Hair is part of a class: let a prim inherit that"
+    ):
+        read_shot(path)
+
+
 def test_strands_too_short_to_move_are_counted_alike_everywhere():
     step = np.array([0.05, 0.05, 5e-6, 0.0])[:, None] * [0, -1, 0]
     points = np.array([0, 1.7, 0.1]) + np.arange(3)[None, :, None] * step[:, None]
