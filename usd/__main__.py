@@ -4,7 +4,7 @@
 import os
 import sys
 
-from .border.stopping import stoppable
+from .border.stopping import end_at_once, stoppable
 
 
 def main() -> None:
@@ -13,10 +13,13 @@ def main() -> None:
     # Strands, frames and pictures share the cores. OpenBLAS would start threads of its own for every small product, and
     # they wait for the next one by spinning: a clip takes a third longer with them. It reads this when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with stoppable():
-        from .cli.app import main as run
+    try:
+        with stoppable():
+            from .cli.app import main as run
 
-        run()
+            run()
+    finally:
+        end_at_once()
 
 
 def _never_none() -> None:

@@ -54,6 +54,13 @@ def deferred() -> Iterator[None]:
     check()
 
 
+def end_at_once() -> None:
+    """From here on Ctrl-C kills: what is left is the ending of Python, which tells it in a traceback."""
+    main = threading.current_thread() is threading.main_thread()
+    if main and signal.getsignal(signal.SIGINT) == signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def stopped() -> bool:
     """Whether Ctrl-C was pressed in a stoppable block."""
     return _number != 0

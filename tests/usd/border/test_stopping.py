@@ -170,3 +170,22 @@ main()""".replace("PRESS", press.format("os.kill(os.getpid(), signal.SIGINT)"))
     there = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(tmp_path)])}
     done = subprocess.run([sys.executable, *words], capture_output=True, text=True, env=there)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "stopped\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no signal reaches one process alone")
+def test_ctrl_c_pressed_again_tells_no_traceback():
+    """Threads that still compute are waited for after the command, by Python itself."""
+    code = """import os, signal, sys, threading, time
+def press():
+    time.sleep(0.3)
+    os.kill(os.getpid(), signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from usd.__main__ import main
+from usd.cli import app
+def stop(words):
+    threading.Thread(target=press).start()
+    raise KeyboardInterrupt
+app.app = stop
+main()"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "stopped\n")
