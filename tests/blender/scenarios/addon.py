@@ -10,7 +10,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 from tests.blender import scenes
 from tests.blender.checks import make_live, messages, own_handlers
-from tests.blender.panel import drawn
+from tests.blender.panel import drawn, preferences
 
 
 def lifecycle(folder: Path) -> None:
@@ -131,7 +131,8 @@ def told_of_what_is_there(_folder: Path) -> None:
 def words(_folder: Path) -> None:
     """Every operator is found by Blender's search, and everything has a name and a tooltip."""
     import dcc_addon
-    from dcc_addon import operators, preferences, properties
+    from dcc_addon import operators, properties
+    from dcc_addon.preferences import Preferences
 
     assert dcc_addon.bl_info["name"] == "Neuralocks"
     for cls in operators.CLASSES:
@@ -142,7 +143,7 @@ def words(_folder: Path) -> None:
         assert operator.poll(), "search hides what cannot run, and then nobody hears why"
         for prop in described.properties:
             assert prop.identifier == "rna_type" or prop.description, (cls.bl_idname, prop.identifier)
-    for cls in (*properties.CLASSES, *preferences.CLASSES):
+    for cls in (*properties.CLASSES, Preferences):
         for prop in cls.bl_rna.properties:
             if prop.identifier in cls.__annotations__:
                 assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
@@ -153,14 +154,11 @@ def words(_folder: Path) -> None:
 
 def remedy_in_full(_folder: Path) -> None:
     """The preferences break what training lacks into lines: one label would be cut off before the command to run."""
-    from dcc_addon.preferences import Preferences
-
-    layout, said = MagicMock(), " ".join(["Training needs a Python with torch"] * 6)
+    said = " ".join(["Training needs a Python with torch"] * 6)
     with patch("dcc_addon.preferences.known_problem", return_value=said):
-        Preferences.draw(SimpleNamespace(layout=layout), None)
-    lines = [call.kwargs["text"] for call in layout.mock_calls if call[0].endswith(".label")]
+        *lines, button = preferences()
     assert " ".join(lines) == said and max(map(len, lines)) <= 40, lines
-    assert [call.args[0] for call in layout.mock_calls if call[0].endswith(".operator")] == ["neuralocks.copy_install"]
+    assert button == "Copy Install Command"
 
 
 def command_is_copied(_folder: Path) -> None:
