@@ -16,6 +16,7 @@ class NEURALOCKS_MT_menu(bpy.types.Menu):
     def draw(self, _context):
         for cls in operators.CLASSES:
             self.layout.operator(cls.bl_idname)
+        self.layout.operator("neuralocks.train", text="Train Hair Bones for This Character").kind = "rig"
 
 
 CLASSES = (NEURALOCKS_MT_menu,)

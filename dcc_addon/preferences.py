@@ -14,7 +14,7 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     python: StringProperty(
-        name="Python for training",
+        name="Python for Training",
         description="A Python with torch, in which Neuralocks trains",
         subtype="FILE_PATH",
     )

@@ -141,7 +141,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         **SETTING,
     )
     head_bone: StringProperty(
-        name="Head bone",
+        name="Head Bone",
         description="The bone that carries the hair; found by name if empty",
         update=_character_changed,
         **SETTING,

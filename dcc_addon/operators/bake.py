@@ -18,7 +18,7 @@ from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.muting import on_top
-from ..scene.paths import FILE, absolute
+from ..scene.paths import absolute
 from ..scene.shown import in_renders
 from ..services.names import file_label
 from ..services.overwriting import check_ours, untaken
@@ -27,7 +27,7 @@ from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
-from .base import Stepwise, sampling, shown_armature, shown_hair, tell
+from .base import FILE_ONCE, Stepwise, sampling, shown_armature, shown_hair, tell
 
 
 def output_path(path: str) -> str:
@@ -160,7 +160,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
     bl_label = "Bake to USD"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE)
+    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE_ONCE)
 
     def steps(self, context):
         armature = shown_armature(context)
@@ -179,7 +179,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
     bl_idname = "neuralocks.bake_attach"
     bl_label = "Bake and Attach"
 
-    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE)
+    filepath: StringProperty(name="File", description="USD file to write; if empty, the panel's output", **FILE_ONCE)
 
     def steps(self, context):
         armature = shown_armature(context)

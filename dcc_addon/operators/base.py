@@ -12,6 +12,7 @@ from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
+from ..scene.paths import FILE
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
 from ..services.remaining import in_words
@@ -21,6 +22,9 @@ SLICE = 0.06
 """Time after which there is a chance to cancel [s]."""
 SAMPLED = 0.1
 """The same while frames are stepped [s]: to the artist's frame and back takes two frames more each time."""
+ONCE = {"options": {"SKIP_SAVE"}}
+"""How a property is made that names what one run is about: Blender would give the next button the name of the last run."""
+FILE_ONCE = FILE | {"options": FILE["options"] | ONCE["options"]}
 
 _running: list["Stepwise"] = []
 """The operator at work over several slices, one at most."""

@@ -16,7 +16,7 @@ from ..scene import actions
 from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import named
-from ..scene.paths import FILE, absolute
+from ..scene.paths import absolute
 from ..scene.up_to_date import ensure
 from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
@@ -27,7 +27,7 @@ from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range, is_anothers, output_path, shot_beside
-from .base import Hardened, Stepwise, sampling, shown_armature, tell
+from .base import FILE_ONCE, Hardened, Stepwise, sampling, shown_armature, tell
 
 
 class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
@@ -106,7 +106,9 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     bl_label = "Export USD Animation"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(name="File", description="USD file to write; if empty, beside the panel's output", **FILE)
+    filepath: StringProperty(
+        name="File", description="USD file to write; if empty, beside the panel's output", **FILE_ONCE
+    )
 
     def steps(self, context):
         armature, scene = shown_armature(context), context.scene
@@ -145,7 +147,9 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(
-        name="File", description="Header to write; if empty, beside this file and named after the character", **FILE
+        name="File",
+        description="Header to write; if empty, beside this file and named after the character",
+        **FILE_ONCE,
     )
 
     def work(self, context):

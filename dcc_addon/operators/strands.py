@@ -9,7 +9,7 @@ from ..scene import particles
 from ..scene.attach import check_own
 from ..scene.binding import carrier
 from ..services.sliders import SLIDERS
-from .base import Hardened, shown_armature, shown_hair
+from .base import ONCE, Hardened, shown_armature, shown_hair
 
 
 class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
@@ -21,6 +21,7 @@ class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
     system: StringProperty(
         name="System",
         description="Name of the particle system; if empty, the active one, or the next that is not converted yet",
+        **ONCE,
     )
     children: BoolProperty(
         name="Children",

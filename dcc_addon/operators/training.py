@@ -28,7 +28,7 @@ from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
 from ..services.training_job import TrainingJob, default_python, installing
 from ..session import session
-from .base import Hardened, Stepwise, sampling, shown_armature, shown_hair
+from .base import ONCE, Hardened, Stepwise, sampling, shown_armature, shown_hair
 
 _running: list["_Training"] = []
 """One at most. Not of the session, which ends with its file: a training goes on while other files are opened."""
@@ -105,6 +105,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         description="What the model is for",
         items=[("strands", "Strands", "Strand hair"), ("rig", "Bones", "Hair bones")],
         default="strands",
+        **ONCE,
     )
 
     def steps(self, context):

@@ -143,10 +143,14 @@ def words(_folder: Path) -> None:
         assert operator.poll(), "search hides what cannot run, and then nobody hears why"
         for prop in described.properties:
             assert prop.identifier == "rna_type" or prop.description, (cls.bl_idname, prop.identifier)
+            names = prop.type in ("STRING", "ENUM")  # what a run is about, and the next one is not
+            assert prop.is_skip_save or not names, (cls.bl_idname, prop.identifier)
     for cls in (*properties.CLASSES, Preferences):
         for prop in cls.bl_rna.properties:
             if prop.identifier in cls.__annotations__:
                 assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
+                capital = prop.name if prop.is_hidden else prop.name.title()
+                assert all(a == b for a, b in zip(prop.name.split(), capital.split()) if len(a) > 3), prop.name
                 assert "--" not in prop.description, prop.identifier
                 if prop.type == "ENUM":
                     assert all(item.description for item in prop.enum_items), prop.identifier

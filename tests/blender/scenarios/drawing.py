@@ -138,6 +138,7 @@ def drawn_at_training(_folder: Path) -> None:
                 == (drawn().count("Copy Install Command") == 3)
                 == bool(answer)
             )
+    assert drawn().count("Train for This Character") == 3 and "Train Hair Bones for This Character" in drawn()
     for done, left in ((0.0, None), (0.4, 200.0), (1.0, 0.0)):
         job = SimpleNamespace(
             done=done, seconds_left=left, message="Motion error 0.25, learned", lines=0, notes=["Rig: has no neck"]

@@ -45,7 +45,7 @@ def notes_of_a_training(folder: Path) -> None:
     from dcc_addon.session import session
 
     said = ("/Character/Hair_Hair: name it with --head JOINT", "/Character/Rig: has no neck")
-    shown = ("Hair: choose it as Head bone", "Rig: has no neck")
+    shown = ("Hair: choose it as Head Bone", "Rig: has no neck")
     strands = _in_training(folder, said)
     end = time.monotonic() + 60
     while not operator.notes() and time.monotonic() < end:
