@@ -59,7 +59,8 @@ def stage(armature) -> None:
     """A soft grey room, a key light, a rim light that shows the hair, a camera."""
     scene = bpy.context.scene
     world = bpy.data.worlds.new("World")
-    world.use_nodes = True
+    if bpy.app.version < (5, 0):  # later ones always do
+        world.use_nodes = True
     background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
     background.inputs[0].default_value = (0.055, 0.06, 0.075, 1)
     background.inputs[1].default_value = 1.0

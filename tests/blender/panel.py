@@ -54,20 +54,20 @@ def shown(draw, icon: str = "") -> list[str]:
     """What `draw(layout)` says in a panel that Blender draws, in a copy of this process that ends there. What Blender does
     not know, or forbids while it draws, is an error.
     """
-    answer, complaints = TemporaryFile("w+"), TemporaryFile("w+")
     bpy.context.view_layer.update()  # as before any drawing
     _write_out()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which the copy does not have
-        copy = os.fork()
-    if not copy:
-        _draw_and_leave(draw, icon, answer, complaints)
-    _, status = os.waitpid(copy, 0)
-    answer.seek(0)
-    complaints.seek(0)
-    wrong = "".join(line for line in complaints if NOISE not in line)
-    assert not status and not wrong, f"drawing ended with status {status}\n{wrong}"
-    return json.load(answer)
+    with TemporaryFile("w+") as answer, TemporaryFile("w+") as complaints:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which the copy does not have
+            copy = os.fork()
+        if not copy:
+            _draw_and_leave(draw, icon, answer, complaints)
+        _, status = os.waitpid(copy, 0)
+        answer.seek(0)
+        complaints.seek(0)
+        wrong = "".join(line for line in complaints if NOISE not in line)
+        assert not status and not wrong, f"drawing ended with status {status}\n{wrong}"
+        return json.load(answer)
 
 
 def _draw_and_leave(draw, icon: str, answer, complaints) -> None:
