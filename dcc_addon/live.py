@@ -9,7 +9,7 @@ from . import live_rig, live_strands
 from .scene.guests import guests
 from .scene.layers import elsewhere, graph_of, layer_of
 from .scene.lively import lively
-from .scene.lookup import find
+from .scene.lookup import find, in_scene
 from .scene.sampling import key_of
 from .session import session
 
@@ -112,7 +112,7 @@ def carriers(scene) -> list:
     """Armatures of the scene with something live on them, by name."""
     own = lively(scene.objects)
     wanted = {*(hair.neuralocks_hair.armature for hair in own.hairs), *own.armatures}
-    return sorted((a for a in wanted if a is not None and a.name in scene.objects), key=lambda a: a.name_full)
+    return sorted((a for a in wanted if a is not None and in_scene(a, scene)), key=lambda a: a.name_full)
 
 
 def needs_sampling(scene) -> list:

@@ -18,7 +18,7 @@ from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
 from .scene.lively import lively
-from .scene.lookup import find, identity
+from .scene.lookup import find, identity, in_scene
 from .scene.muting import mute_deformers, unmute_deformers
 from .scene.placing import world
 from .scene.sampling import shown_frame
@@ -60,7 +60,7 @@ def at_once(graph) -> bool:
 
 def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     armature = hair.neuralocks_hair.armature
-    if armature is None or armature.name not in home.objects:
+    if armature is None or not in_scene(armature, home):
         raise NeuralocksError(
             f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
         )

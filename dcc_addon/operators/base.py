@@ -12,6 +12,7 @@ from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
+from ..scene.lookup import in_scene
 from ..scene.paths import FILE
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
@@ -178,7 +179,7 @@ def shown_armature(context):
         NeuralocksError: there is none.
     """
     armature = context.scene.neuralocks.armature
-    if armature is None or armature.name not in context.scene.objects:
+    if armature is None or not in_scene(armature, context.scene):
         raise NeuralocksError("Character: no armature chosen; choose the armature of your character in the panel")
     return armature
 
@@ -190,7 +191,7 @@ def shown_hair(context, armature=None):
         NeuralocksError: there is none, it was converted to something else, or it belongs to another character.
     """
     hair = context.scene.neuralocks.hair
-    if hair is None or hair.name not in context.scene.objects:
+    if hair is None or not in_scene(hair, context.scene):
         raise NeuralocksError("Strands: no hair chosen; choose a hair Curves object, or convert a particle system")
     if hair.type != "CURVES":
         raise NeuralocksError(

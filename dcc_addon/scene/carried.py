@@ -2,6 +2,7 @@
 """What an armature carries: its hair, and the body that the hair is kept out of."""
 
 from . import body as body_reader
+from .lookup import in_scene
 
 
 def hairs_of(armature, scene) -> list:
@@ -12,6 +13,6 @@ def hairs_of(armature, scene) -> list:
 def bodies_of(armature, scene) -> list:
     """The body mesh chosen by the artist, else all that the armature deforms."""
     chosen = armature.neuralocks_character.body
-    if chosen is not None and chosen.type == "MESH" and chosen.name in scene.objects:
+    if chosen is not None and chosen.type == "MESH" and in_scene(chosen, scene):
         return [chosen]
     return body_reader.find(armature, scene.objects)

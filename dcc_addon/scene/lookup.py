@@ -14,6 +14,12 @@ def find(name_full: str):
     return next((o for o in bpy.data.objects if o.name_full == name_full), None)
 
 
+def in_scene(thing, scene) -> bool:
+    """Whether a scene has this very object: one of another file may have its name."""
+    found = scene.objects.get(thing.name)
+    return found == thing or (found is not None and thing in scene.objects.values())
+
+
 def identity(thing):
     """What tells a data block from all others that this Blender has had, also from a later one of its name; oldest
     Blenders number none, and there an undo may change it.

@@ -234,3 +234,29 @@ def appended(folder: Path) -> None:
     strands.make_local()
     strands = next(o for o in bpy.data.objects if o.type == "CURVES" and o.library is None)
     refused(lambda: model_path(strands), str(shots / "mine.neuralocks"), "beside library.blend", str(model))
+
+
+def of_one_name(folder: Path) -> None:
+    """What was taken out of the scene is not taken for what another file has under its name, and is in the scene."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 10)
+    scenes.collect("Character")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    scenes.empty()
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    scene = bpy.context.scene
+    scene.collection.children.link(bpy.data.collections["Character"])
+    linked, strands = (next(o for o in scene.objects if o.type == kind) for kind in ("ARMATURE", "CURVES"))
+    rig, own = linked.copy(), strands.copy()
+    assert (rig.name, own.name) == ("Rig", "Hair") and not rig.library and not own.library
+    out = str(folder / "hair.usdc")
+    scene.neuralocks.armature, scene.neuralocks.hair = linked, own
+    refused(bpy.ops.neuralocks.report_card, "no hair chosen")
+    scene.collection.objects.link(own)
+    assert bpy.ops.neuralocks.report_card() == {"FINISHED"} and bpy.ops.neuralocks.bake(filepath=out) == {"FINISHED"}
+    scene.neuralocks.armature = own.neuralocks_hair.armature = rig
+    refused(bpy.ops.neuralocks.sample_motion, "no armature chosen")
+    scene.collection.objects.link(rig)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
