@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from pxr import UsdSkel
+from pxr import Usd, UsdSkel
 
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -21,16 +21,18 @@ from ..border.placement import Placement
 from ..border.stage_files import open_stage
 from ..border.units import Border
 from ..border.values import as_names
-from ..shot.attach import attach
+from ..shot.alike import one_person
+from ..shot.attach import attach, of_another
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves
 from ..shot.lacking import nothing_found
 from ..shot.motion_notes import motion_notes
-from ..shot.notes import first_of, unfound, unlikely_head, without_turn
+from ..shot.notes import few, first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import StageRig, read_rigs
 from ..skel.source import find_skeletons
+from ..skel.surface import bound_skeleton
 
 LIBRARY = "library"
 """A groom of this name stands for every style of the procedural library, grown on the character."""
@@ -60,7 +62,7 @@ def training_scene(
     Args:
         character: a USD file with a skeleton and skinned meshes.
         grooms: USD files with BasisCurves that lie on the character's bind pose, or "library"; the character's own if
-            none.
+            none, without those of others in its file.
         motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
         skeleton: prim path of the skeleton wanted, where there are several.
         head: joint that is the head, where its name does not tell.
@@ -91,7 +93,7 @@ def training_scene(
         if source == LIBRARY:
             found += _library(rig.character, seed, variations, progress or silent)
         else:
-            found += _file(source, rig, head, notes)
+            found += _file(source, rig, head, joints, notes)
     clips = tuple(read_clip(path, rig.character, notes) for path in motion)
     if tell:
         tell(list(dict.fromkeys(notes)))
@@ -99,12 +101,16 @@ def training_scene(
 
 
 @names_damage
-def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> list[StrandSet]:
+def _file(
+    source: str, rig: StageRig, head: str | None, joints: dict[str, str] | None, notes: list[str]
+) -> list[StrandSet]:
     stage = open_stage(source)
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
     prims = [prim for prim in prims if not is_closed(prim)] or prims
+    if stage.GetRootLayer() == rig.source.prim.GetStage().GetRootLayer():
+        prims = _own(prims, rig, head, joints, notes)
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
     # Beside hair, the grass of a set is none, as controls of the rig are none.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
@@ -112,6 +118,33 @@ def _file(source: str, rig: StageRig, head: str | None, notes: list[str]) -> lis
     if not any(strands.valid.any() for strands in found):
         raise NeuralocksError(f"{source}: no strand has two distinct points; there is nothing to learn from")
     return [strands for strands in found if strands.valid.any()]
+
+
+def _own(prims, rig: StageRig, head: str | None, joints: dict[str, str] | None, notes: list[str]) -> list[Usd.Prim]:
+    """The curves in the character's own file that are not those of another character in it, with a note on the others.
+
+    Raises:
+        NeuralocksError: all are another's.
+    """
+    stage = rig.source.prim.GetStage()
+    skeletons = find_skeletons(stage)
+    if len(skeletons) < 2:
+        return prims
+    read = read_each_rig(stage, skeletons, rig.border, head, joints=joints)[0]
+    others = [other for other in read if other.path != rig.path and not one_person(rig, other)]
+    strangers = {str(prim.GetPath()) for prim in skeletons} - {each.path for each in read if each not in others}
+    carriers = {}
+    for prim in prims:
+        if (bound := bound_skeleton(prim)) in strangers:
+            carriers[prim] = bound
+        elif bound is None and (other := of_another(prim, [rig], others, Placement(prim), head)):
+            carriers[prim] = other.path
+    facts = [f"{prim.GetPath()}: is hair of {other}, not of {rig.path}" for prim, other in carriers.items()]
+    if len(facts) == len(prims):
+        raise NeuralocksError(f"{facts[0]}; choose its character with --skeleton PRIM, or give another groom")
+    left = [f"{fact}; left out: train a model of its own for that character, with --skeleton PRIM" for fact in facts]
+    notes += few(left, "grooms are other characters' hair")
+    return [prim for prim in prims if prim not in carriers]
 
 
 def _library(character: Character, seed: int, variations: int, progress: Progress) -> list[StrandSet]:

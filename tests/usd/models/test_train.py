@@ -2,7 +2,7 @@
 """What `neuralocks train` begins with, decided before anything large is read."""
 
 import pytest
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
@@ -18,7 +18,7 @@ from usd.models.train import _command, begins_with
 from usd.models.training_scene import MOST_STRANDS, read_clip, training_scene
 from usd.shot.stage import read_rigs
 
-from ..shots import Recipe, write_shot
+from ..shots import HAIR, Recipe, write_shot
 
 SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
 LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSupervisedOptions.paper()
@@ -71,6 +71,34 @@ def test_what_a_training_should_know_is_told_before_it(tmp_path):
     stage.GetPrimAtPath("/Hero/Rig").GetRelationship("skel:animationSource").SetTargets([])
     layer.Save()
     assert len(read_clip(str(path), scene.character).times) > 1
+
+
+def test_of_a_shot_of_several_characters_only_the_own_hair_is_learned(tmp_path):
+    """As a bake with --skeleton has it; all at once they would be hair that floats beside the head."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    apart = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    for name, x in (("Anna", -1.0), ("Bert", 1.0)):
+        prim = apart.DefinePrim(f"/{name}")
+        prim.GetReferences().AddReference(layer.identifier, "/Hero")
+        UsdGeom.XformCommonAPI(prim).SetTranslate((x, 0, 0))
+    UsdSkel.BindingAPI(apart.GetPrimAtPath("/Bert/Hair")).CreateSkeletonRel().SetTargets(["/Bert/Rig"])
+    Sdf.CopySpec(layer, HAIR, apart.GetRootLayer(), "/Anna/Bun")
+    apart.Save()
+    told = []
+    assert len(training_scene(apart.GetRootLayer().realPath, tell=told.extend).grooms) == 2
+    assert [note for note in told if "/Bert/Hair: is hair of /Bert/Rig, not of /Anna/Rig; left out" in note]
+    told.clear()
+    assert len(training_scene(apart.GetRootLayer().realPath, skeleton="/Bert/Rig", tell=told.extend).grooms) == 1
+    assert sum("is hair of /Anna/Rig, not of /Bert/Rig; left out" in note for note in told) == 2
+    for hair in ("/Anna/Hair", "/Anna/Bun"):
+        apart.RemovePrim(hair)
+    apart.OverridePrim("/Anna/Hair").SetActive(False)
+    apart.Save()
+    with pytest.raises(
+        NeuralocksError, match="/Bert/Hair: is hair of /Bert/Rig, not of /Anna/Rig; choose its character"
+    ):
+        training_scene(apart.GetRootLayer().realPath)
 
 
 def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(tmp_path):
