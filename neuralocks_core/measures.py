@@ -83,12 +83,24 @@ def another_body(character: Character, shape: np.ndarray, learned) -> str:
         character, shape: as for `body_measures`.
         learned: lowest and highest measures, as in a model's card: that comes out of a file, and may hold anything.
     """
-    try:
-        lowest, highest = (np.asarray(learned[name], float).reshape(len(MEASURES)) for name in ("lowest", "highest"))
-    except (TypeError, KeyError, ValueError, OverflowError):
+    bounds = _bounds(learned)
+    if bounds is None or character.head_skin is None:  # of that, an average is told
         return ""
-    if character.head_skin is None:  # an average is told
-        return ""
+    lowest, highest = bounds
     measures = body_measures(character, shape)
     far = far_off(measures, lowest, highest)
     return "".join(f"{MEASURES[i]} {measures[i]:.3g} m (trained: {lowest[i]:.3g} to {highest[i]:.3g})" for i in far[:1])
+
+
+def known_body(character: Character, shape: np.ndarray | None, learned) -> bool:
+    """Whether a model's card tells its measures, and a body is like those; arguments are as for `another_body`."""
+    return _bounds(learned) is not None and not another_body(character, shape, learned)
+
+
+def _bounds(learned) -> tuple[np.ndarray, np.ndarray] | None:
+    """Lowest and highest measures (10,) of a model's card; None where it tells none."""
+    try:
+        lowest, highest = (np.asarray(learned[name], float).reshape(len(MEASURES)) for name in ("lowest", "highest"))
+    except (TypeError, KeyError, ValueError, OverflowError):
+        return None
+    return lowest, highest

@@ -17,7 +17,7 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
-from neuralocks_core.measures import another_body
+from neuralocks_core.measures import another_body, known_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
 
@@ -89,6 +89,10 @@ class StrandModel:
         them, or the card does not tell.
         """
         return another_body(character, clip.shape[0], self.meta["training"].get("measures"))
+
+    def knows(self, character: Character, clip: Clip) -> bool:
+        """Whether the card tells that a body in a clip is like one that this model has learned."""
+        return known_body(character, clip.shape[0], self.meta["training"].get("measures"))
 
     def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
         """One output of one graph, float32, of arrays by the names of its inputs: graphs, names and shapes are those of

@@ -18,7 +18,7 @@ from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
-from .model_notes import model_notes
+from .model_notes import learned, model_notes
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
 
@@ -86,8 +86,10 @@ def bake(
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
     facts |= given_facts(cuts, joints)
+    untrue = learned(strand_model, shot)
+    known = known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins)
     notes = [
-        *known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins),
+        *(note for note in known if note not in untrue),
         *model_notes(strand_model, look, shot),
     ]
     how = {"together": True, "velocities": velocities, "progress": progress}

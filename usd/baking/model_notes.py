@@ -7,12 +7,20 @@ from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 
 from ..shot.attach import off_head
+from ..shot.character_notes import untrained
 from ..shot.stage import Shot
 
 
 def model_notes(model: StrandModel, material: Material, shot: Shot) -> list[str]:
     """What a user of a model should know: its report, and how material and characters differ from what it learned."""
     return [*_unheard(model, material), *_other_bodies(model, shot), *model.file.shortcomings()]
+
+
+def learned(model: StrandModel, shot: Shot) -> list[str]:
+    """Those of a shot's notes that do not hold for a model: of characters whose measures it was trained on."""
+    found = [item.attachment for item in shot.grooms if not off_head(item.attachment)]
+    known = [each for each in found if model.knows(each.character, each.rig.clip)]
+    return [note for each in known for note in untrained(replace(each.rig, character=each.character))]
 
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:

@@ -3,12 +3,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from neuralocks_core.materials import Material
 from neuralocks_core.measures import body_measures
 from neuralocks_core.runtime import StrandModel
+from usd.baking.bake import bake
 from usd.baking.model_notes import model_notes
+from usd.shot import character_notes
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, write_shot
@@ -49,6 +52,17 @@ def test_a_model_of_another_body_is_told(model, shot):
     assert _notes(model, shot, _learned(shot, highest={6: arms - 0.02})) == []
     (note,) = _notes(model, shot, _learned(shot, highest={6: arms - 0.05}))
     assert "upper arm half distance" in note
+
+
+def test_a_character_that_the_model_was_trained_on_is_none_that_no_model_knows(model, tmp_path, monkeypatch):
+    """Training on it is what that note advises: with such a model it must be gone."""
+    monkeypatch.setattr(character_notes, "HIGHEST", np.full(10, 0.01))
+    path = write_shot(tmp_path)
+    plain, told = StrandModel.load(model).file, []
+    for card in ({}, _learned(read_shot(path)), _learned(read_shot(path), highest={1: 0.05})):
+        mine = StrandModel(replace(plain, meta=plain.meta | {"training": card}))
+        told.append(sum("(trained: " in n for n in bake(path, tmp_path / "hair.usda", mine, frames="1:1").notes))
+    assert told == [1, 0, 2]
 
 
 @pytest.mark.parametrize(
