@@ -47,6 +47,24 @@ def test_the_headers_history_is_that_of_the_bake(tmp_path, rate):
     assert error < 0.03, error
 
 
+@pytest.mark.parametrize("rate", [60, 144, 300])
+def test_of_a_head_that_turns_accelerations_are_felt_in_the_axes_of_a_bake(tmp_path, rate):
+    """The network reads what was felt in the axes that the head had a step later: a fast turn in a fast sway is off by that."""
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    who, t = character(), np.arange(0, 4, 1 / rate)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.7 * np.sin(6 * t), [0, 1, 0.3]))
+    joints[:, who.head, 0, 3] += 0.1 * np.sin(8 * t)
+    wanted = RigSampler(model.spec, who, Clip(t, joints)).features(t)[:, 15:]
+    quaternions = to_quaternion(joints[:, who.head, :3, :3])
+    rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
+    ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, wanted.shape[1])
+    felt, asked = (values.reshape(len(t), -1, 2, 3)[t > 2][:, :, 0] for values in (ours, wanted))
+    error = np.sqrt(np.square(felt - asked).mean() / np.square(asked).mean())
+    assert error < 3.5 / rate + 0.02, error
+
+
 @pytest.mark.parametrize(
     ("compiler", "options"),
     [(COMPILERS[0], ()), (COMPILERS[0], ("-ffast-math",)), (COMPILERS[2], ("-ffast-math",))],
