@@ -129,7 +129,8 @@ def described(file: model_file.ModelFile) -> dict:
         result["features"]["how"]["history"] += (
             ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
         )
-    return result | {"model": file.meta | {"training": training}}
+    meta = {name: value for name, value in file.meta.items() if name != "layers"}  # the weights, which rig.onnx has
+    return result | {"model": meta | {"training": training}}
 
 
 def _input(spec: BoundarySpec, parts: list[str], how: dict, place: str) -> dict:

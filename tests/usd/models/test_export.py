@@ -63,6 +63,13 @@ def test_all_that_the_history_names_is_in_the_description(tmp_path, kind, entry)
     assert all(word in history for word in ("between two samples, t goes linearly", "`--loop`", "stands still"))
 
 
+def test_the_description_of_a_rig_holds_no_weights(tmp_path):
+    """They are in rig.onnx; in the text they were most of ten thousand lines."""
+    _, path = sorted(export_model(model_file.shipped("rig"), tmp_path), key=lambda path: path.suffix == ".json")
+    described = json.loads(path.read_text("utf-8"))
+    assert "layers" not in described["model"] and len(described["model"]["chains"]["axes"]) == len(RigModel.load().chains)
+
+
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
     """A held pose, from the text alone: the first two columns of what neck and upper chest are turned against the head."""
     export_model(model_file.shipped("rig"), tmp_path)
