@@ -203,6 +203,9 @@ def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float
         sys.exit(f"{folder}: holds no groom; let neuralocks export write it with --shot SHOT")
     files = described["grooms"]["files"]
     stage, result, found = Usd.Stage.Open(str(shot)), Usd.Stage.Open(str(baked)), []
+    unit, up = UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)
+    if unit != 1 or up != UsdGeom.Tokens.y:
+        sys.exit(f"{shot}: counts in {unit:g} m and has {up} up; this example reads stages in metres with Y up alone")
     for name, facts in files.items():
         at, curves = shares(curves_at(stage, facts["prim"])), curves_at(result, facts["prim"])
         runtime = Runtime(folder, name, material)

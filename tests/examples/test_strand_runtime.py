@@ -126,6 +126,17 @@ def test_it_has_it_too_on_a_body_of_another_shape_than_it_was_groomed_on(tmp_pat
         assert differences(tmp_path / "onnx", shot, baked, {"clumping": clumping}).max() < 1e-5
 
 
+@pytest.mark.parametrize(
+    ("recipe", "told"), [(Recipe(unit=0.01), "0.01 m and has Y up"), (Recipe(up="Z"), "1 m and has Z up")]
+)
+def test_a_stage_of_another_unit_or_axis_is_refused(tmp_path, recipe, told):
+    """Its answer would be metres off, and look like a fault of the export."""
+    path = write_shot(tmp_path, recipe)
+    export_model(model_file.shipped(), tmp_path / "onnx", path)
+    with pytest.raises(SystemExit, match=f"counts in {told}"):
+        differences(tmp_path / "onnx", path, path, {})
+
+
 def test_every_array_of_a_groom_is_described(tmp_path, shot):
     export_model(model_file.shipped("strands"), tmp_path, shot)
     described = json.loads((tmp_path / "description.json").read_text())["grooms"]

@@ -67,7 +67,8 @@ def test_the_description_of_a_rig_holds_no_weights(tmp_path):
     """They are in rig.onnx; in the text they were most of ten thousand lines."""
     _, path = sorted(export_model(model_file.shipped("rig"), tmp_path), key=lambda path: path.suffix == ".json")
     described = json.loads(path.read_text("utf-8"))
-    assert "layers" not in described["model"] and len(described["model"]["chains"]["axes"]) == len(RigModel.load().chains)
+    model = described["model"]
+    assert "layers" not in model and len(model["chains"]["axes"]) == len(RigModel.load().chains)
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
