@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Energies of hair in a pose, per unit line density, in numpy for the report card (docs/architecture.md, Physics).
 
-Training minimises those of `physics/energies.py`.
+Self-supervised training minimises those of `physics/energies.py`; the solver has its own in `reference/kernels/energy.py`.
 """
 
 import numpy as np

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The potentials, each by name, of which training minimises the sum (paper section 3.4, equation 1)."""
+"""The potentials, each by name, of which self-supervised training minimises the sum (paper section 3.4, equation 1). The
+solver that other trainings learn from has its own form of them, `reference/kernels/energy.py`.
+"""
 
 from __future__ import annotations
 
