@@ -128,6 +128,12 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
                 f"The model was trained on another body: {fact}; if it shows, train one for this character",
                 "INFO",
             )
+        if prepared is not None and (far := prepared.hair.off_skin):
+            words(
+                layout,
+                f"Its roots are {far:.2g} m from the skin; put its object where the head is in the rest pose",
+                "INFO",
+            )
         if off := off_meanwhile(hair):
             words(layout, f"Off while Live, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)

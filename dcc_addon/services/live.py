@@ -2,6 +2,7 @@
 """One hairstyle on one character, ready to compute its points at any time: what the live view draws."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.character import Character
@@ -16,6 +17,12 @@ from neuralocks_core.strands.strand_set import strands_on
 
 from .history import SampledBoundary
 
+ASTRAY = 0.3
+"""Roots farther from skin than this [m], on a person, are not where an artist has put them: hats and wigs are nearer. A bake says
+so, too."""
+SOME = 500
+"""So many roots tell where all are."""
+
 
 class LiveHair:
     """A groom bound to a character and a model; keeps no state from one frame to the next.
@@ -28,11 +35,12 @@ class LiveHair:
 
     Attributes:
         another_body: by which measure the character differs from those that the model has learned, "" where it does not.
+        off_skin: how far the roots lie from the skin [m], in the median, where that is beyond `ASTRAY`; else 0.
     """
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
         self.groom, self.character, self.model = groom, character, model
-        self.another_body = ""
+        self.another_body, self.off_skin = "", _off_skin(groom, character)
         self._strands = strands_on(character, groom)
         say(0.4)
         self._carrier = Carrier(groom, self._strands)
@@ -121,3 +129,13 @@ class LiveHair:
 
         self._skin.carry(result, shape, push if resolve else None)
         return result
+
+
+def _off_skin(groom: Groom, character: Character) -> float:
+    if character.body is None or not len(groom.starts):
+        return 0.0
+    roots = groom.points[groom.starts[:: max(1, len(groom.starts) // SOME)]]
+    far = float(np.median(cKDTree(character.body.points).query(roots)[0]))
+    # A body may end at the neck.
+    head = float(np.median(np.linalg.norm(roots - character.canonical_to_bind[:3, 3], axis=1)))
+    return far if min(far, head) > ASTRAY * character.times_human else 0.0

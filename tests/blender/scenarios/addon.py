@@ -97,6 +97,21 @@ def model_of_another_body(folder: Path) -> None:
         assert ("was trained on another body: " in said and "(trained: 0.5 to 0.6)" in said) == told, said
 
 
+def hair_beside_its_character(_folder: Path) -> None:
+    """Hair that lies far from the skin swings there: the panel says so at once, and not only a bake."""
+    rig = scenes.armature()
+    scenes.body(rig)
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 10)
+    for x, told in ((0.0, False), (2.0, True), (0.1, False)):
+        strands.neuralocks_hair.live = False
+        strands.location.x = x
+        bpy.context.view_layer.update()
+        make_live(rig, strands)
+        said = " ".join(drawn())
+        assert ("m from the skin; put its object where the head is" in said) == told, (x, said)
+
+
 def told_of_what_is_there(_folder: Path) -> None:
     """What is told of an object goes with it: after it is renamed or deleted, another one that gets its name is not told of
     by it, and the same hair is under its new name.
