@@ -186,7 +186,7 @@ def preview_command(
     from .progress import progress_bar
 
     with progress_bar("drawing") as progress:
-        preview(baked, out, grooms=groom or None, skeleton=skeleton, head=head, progress=progress)
+        preview(baked, out, grooms=groom or None, skeleton=skeleton, head=head, tell=note, progress=progress)
     typer.echo(str(out))
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -19,7 +20,17 @@ from .baked import Baked, read_baked
 
 
 @names_damage
-def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, progress: Progress | None = None) -> Path:
+def preview(
+    baked,
+    path,
+    *,
+    grooms=None,
+    skeleton=None,
+    head=None,
+    size=None,
+    tell: Callable[[list[str]], None] | None = None,
+    progress: Progress | None = None,
+) -> Path:
     """Draw a bake without a display; mesh hair on joints where the stage has no strands.
 
     Args:
@@ -27,24 +38,35 @@ def preview(baked, path, *, grooms=None, skeleton=None, head=None, size=None, pr
         path: .png for a strip of pictures, .mp4 or .gif for a clip.
         grooms, skeleton, head: as for `bake`.
         size: width and height of one picture in pixels.
+        tell: called with the note on characters whose hair is not drawn.
         progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: the file is no bake, or the picture cannot be made.
     """
     if isinstance(baked, Baked):
-        scene, border = baked.scene(), baked.shot.border
+        scene, border = _strands(baked, tell)
     else:
-        scene, border = _scene(baked, grooms, skeleton, head)
+        scene, border = _scene(baked, grooms, skeleton, head, tell)
     with deferred():  # what draws loads its modules at any time; the progress checks after each picture
         return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
 
 
-def _scene(path, grooms, skeleton, head) -> tuple[drawing.Scene, Border]:
+def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:
+    rigs = list(dict.fromkeys(item.attachment.rig.path for item in baked.shot.grooms))
+    if tell and len(rigs) > 1:
+        tell(
+            [
+                f"{rigs[0]}: the first of {len(rigs)} characters is drawn; choose another, such as {rigs[1]}, with --skeleton PRIM"
+            ]
+        )
+    return baked.scene(), baked.shot.border
+
+
+def _scene(path, grooms, skeleton, head, tell) -> tuple[drawing.Scene, Border]:
     """Strands where any move, else mesh hair: a character with mesh hair may have brows, or stand on grass."""
     try:
-        baked = read_baked(path, grooms, skeleton, head)
-        return baked.scene(), baked.shot.border
+        return _strands(read_baked(path, grooms, skeleton, head), tell)
     except NeuralocksError as error:
         no_strands = error
     try:
