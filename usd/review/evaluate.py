@@ -80,9 +80,9 @@ def evaluate(
     each = {item.path: baked.alone(item) for item in baked.shot.grooms}
     if min(len(own.codes) for own in each.values()) < 3:
         notes.append("fewer than three frames: motion is neither measured nor compared")
-    for item in baked.shot.grooms:
+    for number, item in enumerate(baked.shot.grooms, 1):
         own = each[item.path]
-        subject = _Subject(own, item, say)
+        subject = _Subject(own, item, _numbered(say, number, len(each)))
         look = material or recorded_material(item.prim) or Material()
         measured[item.path] = subject.measures(look)
         if not len(subject.chosen):
@@ -95,6 +95,13 @@ def evaluate(
             compared[item.path] = rows
             curves[item.path] |= tips
     return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
+
+
+def _numbered(say: Progress, number: int, count: int) -> Progress:
+    """Progress of one of several grooms, each of which begins anew: share and time left are of that one's step."""
+    if count == 1:
+        return say
+    return lambda done, total, message="": say(done, total, f"groom {number} of {count}: {message}")
 
 
 def _model_beside(given) -> StrandModel | None:

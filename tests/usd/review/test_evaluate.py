@@ -185,6 +185,20 @@ def test_each_groom_is_measured_at_its_own_samples(tmp_path, model):
     assert card.grooms["/Hero/Beard"]["stretch_percent_max"] < 0.01
 
 
+def test_of_several_grooms_progress_says_which_is_measured(tmp_path, model):
+    """Share and time left begin anew with each."""
+    stage = Usd.Stage.Open(str(write_shot(tmp_path)))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Brows")
+    stage.GetRootLayer().Save()
+    bake(tmp_path / "shot.usda", tmp_path / "both.usda", model, frames="1:3")
+    said = []
+    evaluate(tmp_path / "both.usda", progress=lambda done, total, message: said.append(message))
+    assert {message.partition(":")[0] for message in said} == {"groom 1 of 2", "groom 2 of 2"}
+    said.clear()
+    evaluate(tmp_path / "both.usda", grooms=["/Hero/Brows"], progress=lambda done, total, message: said.append(message))
+    assert said and not any("groom" in message for message in said)
+
+
 def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
     """Through a layer on top, too; a given one wins, and one that is none is told."""
     shot, out, above = write_shot(tmp_path), tmp_path / "hair.usdc", tmp_path / "above.usda"
