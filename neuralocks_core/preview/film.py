@@ -8,10 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.mesh import connected_pieces, vertex_normals
 from neuralocks_core.preview import shading
 from neuralocks_core.preview.camera import ANGLE, Camera
 from neuralocks_core.preview.canvas import open_canvas
+
+AZIMUTH, RAISED = 32.0, 0.085
+"""Usual direction of the camera from the face to the character's left [degrees], and how far it looks down [rad]."""
+LOCK_TONE = 0.15
+"""Standard deviation of the logarithm of how light a piece of mesh hair is."""
 
 
 @dataclass(frozen=True)
@@ -82,40 +87,44 @@ class Film:
         self.scene, self.detail, self._calm = scene, detail, calm
         self._pick(detail.strands)
         self._albedo = None if scene.body_rest is None else self._dress()
-        self._cameras = self._follow()
+        self._follow()
         triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
         self._canvas = canvas(width, height, triangles, len(self._tone), detail)
 
-    def shoot(self, frames, say: Callable[[int], None] = lambda done: None) -> Iterator[np.ndarray]:
-        """Pictures (height, width, 3) uint8 of frames; two are lit while the one before is drawn."""
+    def shoot(self, frames, azimuth=AZIMUTH, say: Callable[[int], None] = lambda done: None) -> Iterator[np.ndarray]:
+        """Pictures (height, width, 3) uint8 of frames (n,), each seen from its azimuth (n,), or all from one: degrees from the
+        face to the character's left. Two are lit while the one before is drawn.
+        """
+        views = list(zip(map(int, frames), np.broadcast_to(azimuth, len(frames)), strict=True))
         with ThreadPoolExecutor(2) as pool:
-            ahead = [pool.submit(self.light, int(frame)) for frame in frames[:2]]
-            for i, frame in enumerate(frames):
+            ahead = [pool.submit(self.light, *view) for view in views[:2]]
+            for i, view in enumerate(views):
                 lit = ahead.pop(0).result()
-                ahead += [pool.submit(self.light, int(after)) for after in frames[i + 2 : i + 3]]
-                yield self._canvas.draw(self._cameras[frame], *lit)
+                ahead += [pool.submit(self.light, *after) for after in views[i + 2 : i + 3]]
+                yield self._canvas.draw(self._camera(*view), *lit)
                 say(i + 1)
 
-    def light(self, frame: int) -> tuple:
+    def light(self, frame: int, azimuth: float) -> tuple:
         """Body, its colours, hair and its colours: everything about a frame but the drawing itself."""
-        scene, camera, shadow = self.scene, self._cameras[frame], None
+        scene, shadow = self.scene, None
+        to_eye, lights = self._camera(frame, azimuth).to_eye, self._towards(azimuth - AZIMUTH)
         hair = tint = np.zeros((0, 3))
         if len(self._low):
-            hair, tint, shadow = self._strands(frame)
+            hair, tint, shadow = self._strands(frame, to_eye, lights)
         body, body_tint = None, np.zeros((0, 3))
         if scene.body is not None:
             body = np.asarray(scene.body(frame), float)
             normals = vertex_normals(body, scene.triangles)
-            body_tint = shading.body_colours(body, normals, self._albedo, shadow, camera.to_eye, self._axes)
+            body_tint = shading.body_colours(body, normals, self._albedo, shadow, to_eye, lights)
         return body, body_tint, hair, tint
 
-    def _strands(self, frame: int) -> tuple:
+    def _strands(self, frame: int, to_eye: np.ndarray, lights: np.ndarray) -> tuple:
         """Points and colours of all strands that are drawn, and the shadow that they throw."""
-        scene, camera, head = self.scene, self._cameras[frame], self.scene.head[frame]
+        scene, head = self.scene, self.scene.head[frame]
         own = self._own(scene.hair(frame))
         centre = head[:3, :3] @ scene.centre + head[:3, 3]
         counts = np.full(len(own), self.detail.vertices)
-        tint, shadow = shading.hair_colours(own.reshape(-1, 3), counts, camera.to_eye, centre, self._axes, scene.look)
+        tint, shadow = shading.hair_colours(own.reshape(-1, 3), counts, to_eye, centre, lights, scene.look)
         hair = np.repeat(own, self._copies, axis=0) + self._beside @ head[:3, :3].T
         tint = np.repeat(tint.reshape(own.shape), self._copies, axis=0) * self._tone
         return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
@@ -156,11 +165,23 @@ class Film:
         cloth = np.clip(below, 0, 1)[:, None]
         result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
         if scene.mesh_hair is not None:
-            result[scene.mesh_hair] = scene.look.tip
+            result[scene.mesh_hair] = self._locks()[scene.mesh_hair]
         return result
 
-    def _follow(self) -> list[Camera]:
-        """One camera a frame: it goes along with the head's path, smoothed, and does not turn."""
+    def _locks(self) -> np.ndarray:
+        """Mesh hair, darker near the head, each piece in a tone of its own: linear RGB (V, 3)."""
+        scene = self.scene
+        far = np.linalg.norm(scene.body_rest - scene.centre, axis=1)
+        near, farthest = np.percentile(far[scene.mesh_hair], [0, 100])
+        light = 0.3 + 0.7 * ((far - near) / max(farthest - near, 1e-6))[:, None].clip(0, 1)
+        piece = connected_pieces(scene.triangles, len(far))
+        tone = np.exp(np.random.default_rng(5).normal(0, LOCK_TONE, piece.max() + 1))[piece, None]
+        return tone * ((1 - light) * np.array(scene.look.root) + light * np.array(scene.look.tip))
+
+    def _follow(self) -> None:
+        """Where cameras look, how far away they are, and where the face looks on average. Cameras go along with the head's
+        smoothed path but do not turn with it.
+        """
         scene = self.scene
         centre = np.einsum("tij,j->ti", scene.head[:, :3, :3], scene.centre) + scene.head[:, :3, 3]
         reach = np.linalg.norm(scene.rest - scene.centre, axis=1).max()
@@ -173,15 +194,22 @@ class Film:
         front /= np.linalg.norm(front)
         # Where the face looks on average, so that a shot of somebody's back does not show the back only.
         turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]
-        front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
-        right = np.cross([0, 1.0, 0], front)
-        self._axes = np.stack([right, [0, 1.0, 0], front], axis=1)
-        direction = front + 0.62 * right + np.array([0, 0.10, 0])
-        direction /= np.linalg.norm(direction)
-        far = high / np.tan(np.radians(ANGLE) / 2)
-        up = np.array([0, 1.0, 0])
-        aim = smooth - up * 0.36 * min(reach, 0.6)
-        return [Camera(a + far * direction, a, up) for a in aim]
+        self._front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
+        self._aims = smooth - [0, 0.36 * min(reach, 0.6), 0]
+        self._far = high / np.tan(np.radians(ANGLE) / 2)
+
+    def _camera(self, frame: int, azimuth: float) -> Camera:
+        up, aim = np.array([0, 1.0, 0]), self._aims[frame]
+        direction = self._towards(azimuth)[:, 2] + RAISED * up
+        return Camera(aim + self._far * direction / np.linalg.norm(direction), aim, up)
+
+    def _towards(self, azimuth: float) -> np.ndarray:
+        """Axes (3, 3), columns right, up and towards somebody at that azimuth. Lights go round with the camera, so that no side
+        is in the dark.
+        """
+        aside, up = np.radians(azimuth), np.array([0, 1.0, 0])
+        towards = np.cos(aside) * self._front + np.sin(aside) * np.cross(up, self._front)
+        return np.stack([np.cross(up, towards), up, towards], axis=1)
 
 
 def _blurred(values: np.ndarray, width: float) -> np.ndarray:

@@ -3,7 +3,7 @@
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
@@ -12,10 +12,14 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.preview.film import Detail, Film, Scene
+from neuralocks_core.preview.film import AZIMUTH, Detail, Film, Scene
 from neuralocks_core.progress import Progress, silent
 
 SUFFIXES = (".png", ".mp4", ".gif")
+PANELS, MOST_PANELS = 6, 12
+"""Pictures of a strip, spread over its frames, and the most frames that are all shown."""
+STANDING = 4.0
+"""Seconds that the camera takes to go round a single frame."""
 PALETTE, DITHER = 5, 6.0
 """A .gif takes its colours from so many frames of the clip; they are dithered by so much of 255."""
 
@@ -29,9 +33,12 @@ def render(
     path: str | os.PathLike,
     *,
     size: tuple[int, int] | None = None,
-    panels: int = 6,
+    frames: np.ndarray | None = None,
+    azimuth: float = AZIMUTH,
+    turntable: bool = False,
     rate: float = 24.0,
     detail: Detail | None = None,
+    name: Callable[[float], str] = "{:.2f} s".format,
     progress: Progress | None = None,
 ) -> Path:
     """Write a strip of pictures (.png) or a clip (.mp4, .gif).
@@ -40,9 +47,13 @@ def render(
         scene: what is to be seen.
         path: the file to write; its ending chooses the kind.
         size: width and height of one picture in pixels.
-        panels: pictures in a strip, evenly over the time.
-        rate: frames a second of a clip; in real time.
+        frames: numbers of the scene's frames: a strip shows these, or PANELS of them if there are more than MOST_PANELS; a clip
+            goes from the first to the last. All if left out.
+        azimuth: where the camera is: degrees from the face to the character's left.
+        turntable: whether the camera goes round once, beginning there; round a single frame, too.
+        rate: frames per second of a clip, which plays in real time.
         detail: how finely; PICTURE or CLIP if left out.
+        name: what a strip calls a time [s].
         progress: called with (done, total, message).
 
     Raises:
@@ -54,33 +65,55 @@ def render(
     kind = path.suffix.lower()
     _need("imageio_ffmpeg" if kind == ".mp4" else "PIL")
     still = kind == ".png"
-    if still:
-        frames = np.unique(np.linspace(0, len(scene.times) - 1, panels + 2)[1:-1].round().astype(int))
-    else:
-        clock = np.arange(scene.times[0], scene.times[-1] + 0.5 / rate, 1 / rate)
-        frames = _nearest(scene.times, clock)
+    chosen = _still(scene, frames, turntable) if still else _played(scene, frames, rate, turntable)
+    seen_from = azimuth + turntable * 360 * np.arange(len(chosen)) / len(chosen)
     if kind == ".gif":
-        frames = np.concatenate([frames[np.linspace(0, len(frames) - 1, PALETTE).astype(int)], frames])
+        first = np.linspace(0, len(chosen) - 1, PALETTE).astype(int)
+        chosen, seen_from = (np.concatenate([each[first], each]) for each in (chosen, seen_from))
     width, height = size or ((440, 620) if still else (480, 600))
     # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
     say = progress or silent
     with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
-        say(0, len(frames), f"drawing {path.name}")
-        with closing(film.shoot(frames, lambda done: say(done, len(frames), f"drawing {path.name}"))) as images:
-            _WRITERS[kind](part, images, scene.times[frames], rate)
-            say(len(frames), len(frames), f"writing {path.name}")  # the last moment at which a caller may stop it
+        say(0, len(chosen), f"drawing {path.name}")
+        images = film.shoot(chosen, seen_from, lambda done: say(done, len(chosen), f"drawing {path.name}"))
+        with closing(images):
+            if still:
+                _strip(part, images, [name(time) for time in scene.times[chosen]])
+            else:
+                _CLIPS[kind](part, images, len(chosen), rate)
+            say(len(chosen), len(chosen), f"writing {path.name}")  # the last moment at which a caller may stop it
     return path
 
 
-def _nearest(times: np.ndarray, clock: np.ndarray) -> np.ndarray:
+def _still(scene: Scene, frames, turntable: bool) -> np.ndarray:
+    """Frames of a strip, of those that are asked for."""
+    if frames is None:  # but the first and the last, which often show the rest pose
+        places = np.linspace(0, len(scene.times) - 1, PANELS + 2)[1:-1]
+        return np.unique(places.round().astype(int))
+    if turntable and len(frames) == 1:
+        return np.full(PANELS, frames[0])
+    if len(frames) <= MOST_PANELS:
+        return np.asarray(frames)
+    return np.asarray(frames)[np.linspace(0, len(frames) - 1, PANELS).round().astype(int)]
+
+
+def _played(scene: Scene, frames, rate: float, turntable: bool) -> np.ndarray:
+    """Frames of a clip in real time from the first to the last of those that are asked for."""
+    first, last = scene.times[[0, -1] if frames is None else [frames[0], frames[-1]]]
+    if turntable and first == last:
+        return np.full(round(STANDING * rate), 0 if frames is None else frames[0])
+    return nearest(scene.times, np.arange(first, last + 0.5 / rate, 1 / rate))
+
+
+def nearest(times: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """Numbers (n,) of the ascending times (T,) that lie nearest to those of a clock (n,); the earlier of two as near."""
     after = np.searchsorted(times, clock).clip(max=len(times) - 1)
     before = np.maximum(after - 1, 0)
     return np.where(clock - times[before] <= np.abs(times[after] - clock), before, after)
 
 
-def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, _rate: float | None) -> None:
+def _strip(part: Path, images: Iterator[np.ndarray], names: list[str]) -> None:
     from PIL import Image, ImageDraw
 
     images = list(images)
@@ -88,12 +121,12 @@ def _strip(part: Path, images: Iterator[np.ndarray], times: np.ndarray, _rate: f
     row = [piece for image in images for piece in (gap, image)][1:]
     strip = Image.fromarray(np.concatenate(row, axis=1))
     pen, wide = ImageDraw.Draw(strip), images[0].shape[1] + 4
-    for i, time in enumerate(times):
-        pen.text((wide * i + 10, strip.height - 20), f"{time:.2f} s", fill=(230, 230, 230))
+    for i, text in enumerate(names):
+        pen.text((wide * i + 10, strip.height - 20), text, fill=(230, 230, 230))
     strip.save(part)
 
 
-def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+def _gif(part: Path, images: Iterator[np.ndarray], count: int, rate: float) -> None:
     """The first PALETTE pictures give the colours that all others share: so what stands still stays still."""
     from PIL import Image
 
@@ -108,7 +141,7 @@ def _gif(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: floa
         dithered = image + pattern[:height, :width]
         return Image.fromarray(dithered.clip(0, 255).astype(np.uint8)).quantize(palette=palette, dither=0)
 
-    ends = np.round(np.arange(1, len(times) - PALETTE + 1) * 100 / rate)  # a file counts hundredths of a second
+    ends = np.round(np.arange(1, count - PALETTE + 1) * 100 / rate)  # a file counts hundredths of a second
     durations = (10 * np.diff(ends, prepend=0)).astype(int).tolist()
     frames = map(reduced, images)
     next(frames).save(part, save_all=True, append_images=frames, duration=durations, loop=0, optimize=True)
@@ -122,7 +155,7 @@ def _bayer(size: int) -> np.ndarray:
     return np.block([[finer, finer + 2 / size**2], [finer + 3 / size**2, finer + 1 / size**2]])
 
 
-def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: float) -> None:
+def _mp4(part: Path, images: Iterator[np.ndarray], count: int, rate: float) -> None:
     import imageio_ffmpeg
 
     first = next(images)
@@ -138,7 +171,7 @@ def _mp4(part: Path, images: Iterator[np.ndarray], times: np.ndarray, rate: floa
     except OSError as error:
         if error.errno is not None:  # else the encoder has ended, and takes no more pictures
             raise
-    if _frames_of(part) < len(times):
+    if _frames_of(part) < count:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
@@ -152,8 +185,8 @@ def _frames_of(clip: Path) -> int:
         return 0
 
 
-_WRITERS = {".png": _strip, ".mp4": _mp4, ".gif": _gif}
-"""Ending -> what writes such a file; all are called alike, and a strip has no rate."""
+_CLIPS = {".mp4": _mp4, ".gif": _gif}
+"""Ending -> what writes such a clip; both are called alike."""
 
 
 def _need(module: str) -> None:

@@ -15,7 +15,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .bake import bake_command, join_command, simulate_command
 from .command import command_of, note, one_line, print_json
-from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs
+from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs, sides
 from .rig import app as rig_app
 from .train import one_by_one, train_command
 
@@ -174,6 +174,10 @@ def evaluate_command(
 def preview_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     out: Out,
+    frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP] in time codes; all if left out.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of one picture in pixels.")] = None,
+    view: Annotated[float, typer.Option(help="Degrees from the face to the character's left.")] = 32.0,
+    turntable: Annotated[bool, typer.Option("--turntable", help="The camera goes round the character once.")] = False,
     groom: Grooms = None,
     skeleton: Skeleton = None,
     head: Head = None,
@@ -186,7 +190,19 @@ def preview_command(
     from .progress import progress_bar
 
     with progress_bar("drawing") as progress:
-        preview(baked, out, grooms=groom or None, skeleton=skeleton, head=head, tell=note, progress=progress)
+        preview(
+            baked,
+            out,
+            frames=frames,
+            size=None if size is None else sides(size),
+            view=view,
+            turntable=turntable,
+            grooms=groom or None,
+            skeleton=skeleton,
+            head=head,
+            tell=note,
+            progress=progress,
+        )
     typer.echo(str(out))
 
 

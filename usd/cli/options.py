@@ -83,3 +83,11 @@ def numbers(words: list[str] | None, option: str) -> dict[str, float]:
         return {name: plain_number(text) for name, text in found.items()}
     except ValueError:
         raise NeuralocksError(f"{option} {' '.join(words or ())}: is not NAME=NUMBER; give numbers") from None
+
+
+def sides(text: str) -> tuple[int, int]:
+    """Width and height of `--size`, WIDTHxHEIGHT."""
+    both = text.lower().split("x")
+    if len(both) != 2 or not all(side.strip().isdecimal() and len(side) < 9 for side in both):
+        raise NeuralocksError(f"--size {text}: is not WIDTHxHEIGHT; write for example 640x480")
+    return int(both[0]), int(both[1])

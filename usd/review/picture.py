@@ -4,19 +4,27 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.preview import pictures as drawing
+from neuralocks_core.preview.film import AZIMUTH
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.finding import NoHairChains
 
+from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import open_stage
 from ..border.stopping import deferred
+from ..border.time_codes import time_codes
 from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
 from ..shot.curves import find_curves
 from .baked import Baked, read_baked
+
+SIDES = 16, 4096
+"""Least and largest width and height of a picture [pixels]."""
 
 
 @names_damage
@@ -27,7 +35,10 @@ def preview(
     grooms=None,
     skeleton=None,
     head=None,
-    size=None,
+    frames: str | None = None,
+    size: tuple[int, int] | None = None,
+    view: float = AZIMUTH,
+    turntable: bool = False,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
@@ -37,19 +48,47 @@ def preview(
         baked: path of the bake, or a `Baked` already read.
         path: .png for a strip of pictures, .mp4 or .gif for a clip.
         grooms, skeleton, head: as for `bake`.
+        frames: `FIRST:LAST[:STEP]` in time codes: what a strip shows, where more than twelve are six of them, or how far a clip
+            goes; all if left out.
         size: width and height of one picture in pixels.
+        view: where the camera is: degrees from the face to the character's left.
+        turntable: whether the camera goes round once.
         tell: called with the note on characters whose hair is not drawn.
         progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: the file is no bake, or the picture cannot be made.
     """
+    for side in size or ():
+        check_number("--size", side, *SIDES, whole=True)
+    check_number("--view", view, -360, 360)
     if isinstance(baked, Baked):
         scene, border = _strands(baked, tell)
     else:
         scene, border = _scene(baked, grooms, skeleton, head, tell)
     with deferred():  # what draws loads its modules at any time; the progress checks after each picture
-        return drawing.render(scene, path, size=size, rate=min(border.rate / border.frame, 30.0), progress=progress)
+        return drawing.render(
+            scene,
+            path,
+            size=size,
+            frames=_samples(frames, scene.times, border),
+            azimuth=view,
+            turntable=turntable,
+            rate=min(border.rate / border.frame, 30.0),
+            name=lambda time: f"frame {round(time * border.rate, 3):g}",
+            progress=progress,
+        )
+
+
+def _samples(frames: str | None, times: np.ndarray, border: Border) -> np.ndarray | None:
+    """Numbers of the samples at `times` [s] that are nearest to the frames asked for, ascending; None for all."""
+    if frames is None:
+        return None
+    first, last = times[[0, -1]] * border.rate
+    wanted = np.array(time_codes(frames, first, last, frame=border.frame))
+    if wanted[0] < first - border.frame / 2 or wanted[-1] > last + border.frame / 2:
+        raise NeuralocksError(f"--frames {frames}: the bake has frames {first:g} to {last:g}; choose from these")
+    return np.unique(drawing.nearest(times, border.seconds(wanted)))
 
 
 def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:

@@ -62,13 +62,13 @@ def test_a_clip_shows_the_nearest_sample_and_of_two_as_near_the_earlier(samples)
     for times in (np.sort(rng.random(samples)), np.arange(samples) / 12, np.repeat(rng.random(), samples)):
         clock = np.arange(times[0], times[-1] + 0.02, 1 / 24)
         nearest = np.abs(times[None] - clock[:, None]).argmin(axis=1)
-        assert np.array_equal(preview._nearest(times, clock), nearest)
+        assert np.array_equal(preview.nearest(times, clock), nearest)
 
 
 @pytest.mark.parametrize("kind", [".png", ".mp4", ".gif"])
 def test_pictures_and_clips_show_hair_on_a_body(tmp_path, kind):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'preview' is not installed")
-    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), panels=2, detail=SMALL)
+    path = preview.render(scene(), tmp_path / f"hair{kind}", size=(96, 128), frames=[1, 2], detail=SMALL)
     assert path.stat().st_size > 500 and list(tmp_path.iterdir()) == [path]
     if kind == ".png":
         from PIL import Image
@@ -140,7 +140,7 @@ def never_drawn():
 def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, name, said):
     (tmp_path / "file").write_text("")
     with pytest.raises(NeuralocksError, match=said):
-        preview.render(never_drawn(), tmp_path / name, size=(64, 64), panels=1)
+        preview.render(never_drawn(), tmp_path / name, size=(64, 64))
 
 
 def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatch):

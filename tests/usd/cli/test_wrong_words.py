@@ -132,3 +132,9 @@ def test_wrong_usage_is_status_two(capsys):
     assert status("bake") == 2
     assert status("bake", "a.usd", "-o", "b.usdc", "--jobs", "many") == 2
     assert status("unknown") == 2
+
+
+@pytest.mark.parametrize("size", ["640", "640x", "640x480x3", "1e2x100", "-5x9", "x"])
+def test_a_size_that_is_no_width_and_height_is_refused(tmp_path, size, capsys):
+    assert status("preview", tmp_path / "hair.usdc", "-o", tmp_path / "hair.png", "--size", size) == 1
+    assert f"--size {size}: is not WIDTHxHEIGHT; write for example 640x480" in capsys.readouterr().err

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a preview of a bake says."""
 
+import inspect
+
+import numpy as np
+import pytest
 from pxr import Usd, UsdGeom
 
+from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
+from usd.cli.app import preview_command
 from usd.review import picture
 
 from ..shots import Recipe, write_shot
@@ -29,3 +35,53 @@ def test_it_tells_whose_hair_is_not_drawn(tmp_path, monkeypatch):
     picture.preview(tmp_path / "hair.usda", "hair.png", skeleton="/Bert/Rig", tell=told.extend)
     picture.preview(tmp_path / "hair.usda", "hair.png", grooms=["/Anna/Hair"], tell=told.extend)
     assert told == []
+
+
+@pytest.fixture(scope="module")
+def hair(tmp_path_factory):
+    """A bake of frames 5 to 12, with motion blur."""
+    folder = tmp_path_factory.mktemp("hair")
+    return bake(write_shot(folder, Recipe(strands=8)), folder / "hair.usdc", frames="5:12", subframes=2).path
+
+
+@pytest.mark.parametrize(
+    "frames, shown",
+    [
+        ("7:10", [7, 8, 9, 10]),
+        ("6", [6]),
+        ("6:12:3", [6, 9, 12]),
+        ("5:12:0.5", [5, 6.5, 8, 9, 10.5, 12]),
+        (None, [6, 7, 8, 9.5, 10.5, 11.5]),
+    ],
+)
+def test_a_strip_shows_the_frames_asked_for_and_names_them(hair, tmp_path, monkeypatch, frames, shown):
+    """Six of them if there are more than twelve."""
+    named = []
+    monkeypatch.setattr(picture.drawing, "_strip", lambda part, images, names: (named.extend(names), part.touch()))
+    picture.preview(hair, tmp_path / "hair.png", frames=frames, size=(32, 40))
+    assert named == [f"frame {frame:g}" for frame in shown]
+
+
+def test_a_turntable_goes_once_round_a_single_frame_and_shows_other_sides(hair, tmp_path):
+    from PIL import Image
+
+    path = picture.preview(hair, tmp_path / "hair.png", frames="6", turntable=True, size=(60, 80))
+    pictures = np.asarray(Image.open(path).convert("RGB"), float)
+    assert pictures.shape[1] == 6 * 64 - 4
+    front, back = (pictures[:60, 64 * i : 64 * i + 60] for i in (0, 3))
+    assert np.abs(front - back).max() > 30
+    path = picture.preview(hair, tmp_path / "back.png", frames="6", view=32 + 180, size=(60, 80))
+    np.testing.assert_array_equal(np.asarray(Image.open(path).convert("RGB"))[:60], back)
+
+
+def test_frames_that_the_bake_lacks_and_sizes_that_nobody_draws_are_refused(hair, tmp_path):
+    with pytest.raises(NeuralocksError, match="--frames 1:7: the bake has frames 5 to 12.5; choose from these"):
+        picture.preview(hair, tmp_path / "hair.png", frames="1:7")
+    with pytest.raises(NeuralocksError, match="--size 90000: must be a whole number from 16 to 4096"):
+        picture.preview(hair, tmp_path / "hair.png", size=(64, 90000))
+    with pytest.raises(NeuralocksError, match="--view nan"):
+        picture.preview(hair, tmp_path / "hair.png", view=float("nan"))
+
+
+def test_the_commands_view_is_the_usual_one():
+    assert inspect.signature(preview_command).parameters["view"].default == picture.AZIMUTH
