@@ -29,13 +29,14 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     the way to `path` are made. Enter it before long work, to learn in time that a folder cannot be written.
 
     Raises:
-        NeuralocksError: it is a folder's name, or (CannotWrite) for every OSError in the block; nothing is left of it, and what
-            was under `path` stays.
+        NeuralocksError: it is a folder's name, or (CannotWrite) the file there is write-protected, or for every OSError in the
+            block; nothing is left of it, and what was under `path` stays.
     """
     path = Path(path)
     if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it leads to
         raise NeuralocksError(f"{path}: is a folder; move it, or choose another name")
     try:
+        check_unprotected(path)
         made = make_way(path)
         try:
             with own_folder(path.parent) as folder:
@@ -54,11 +55,13 @@ def check_writable(path: Path) -> None:
     """Before minutes of work, not after them.
 
     Raises:
-        NeuralocksError: it is a folder's name, or nothing can be written there; nothing is left of the attempt.
+        NeuralocksError: it is a folder's name or a write-protected file, or nothing can be written there; nothing is left of the
+            attempt.
     """
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; give a file name")
     try:
+        check_unprotected(path)
         made = make_way(path)
         try:
             with own_folder(path.parent):
@@ -67,6 +70,18 @@ def check_writable(path: Path) -> None:
             remove_empty(made)
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+def check_unprotected(path: Path) -> None:
+    """Refuse a file that nobody may write, as published files and those under some version controls are: POSIX systems would
+    let it be replaced all the same.
+
+    Raises:
+        CannotWrite: it is one.
+        OSError: the file system refuses to say.
+    """
+    if path.is_file() and not path.is_symlink() and not path.stat().st_mode & 0o222:
+        raise CannotWrite(f"{path}: is write-protected; make it writable, or choose another name")
 
 
 def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values that every JSON reader accepts: NaN and infinity, which JSON lacks, become null."""
 
+import json
 import math
+import re
+
+_NUMBER = r"-?[\d.]+(?:[eE][-+]?\d+)?"
+_NUMBERS = re.compile(rf"\[\n\s*{_NUMBER}(?:,\n\s*{_NUMBER})*\n\s*\]")  # strings hold no line ends as such
 
 
 def plain(value, digits: int | None = None):
@@ -22,3 +27,8 @@ def plain(value, digits: int | None = None):
             return None
         return value if digits is None else round(value, digits)
     return value
+
+
+def readable(value) -> str:
+    """Values that JSON knows as indented text, with each list of numbers on one line."""
+    return _NUMBERS.sub(lambda found: f"[{', '.join(re.findall(_NUMBER, found[0]))}]", json.dumps(value, indent=1))

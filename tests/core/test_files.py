@@ -10,7 +10,7 @@ import pytest
 
 from neuralocks_core import files
 from neuralocks_core.errors import CannotWrite, NeuralocksError
-from neuralocks_core.files import atomic_write, replace_npz
+from neuralocks_core.files import atomic_write, check_writable, replace_npz
 from tests.full_disk import room_for
 
 
@@ -121,3 +121,16 @@ def test_what_windows_lets_nobody_write_stays(tmp_path, monkeypatch):
         with pytest.raises(CannotWrite, match="hair.usdc: cannot be written"), atomic_write(path) as part:
             part.write_bytes(b"new")
     assert path.read_bytes() == b"checked in" and list(tmp_path.iterdir()) == [path]
+
+
+def test_what_nobody_may_write_stays_though_a_folder_would_let_it_be_replaced(tmp_path):
+    """As published files are, and those that a version control has not checked out."""
+    path = tmp_path / "hair.usdc"
+    path.write_bytes(b"published")
+    path.chmod(0o444)
+    for attempt in (check_writable, lambda path: atomic_write(path).__enter__()):
+        with pytest.raises(
+            CannotWrite, match="hair.usdc: is write-protected; make it writable, or choose another name"
+        ):
+            attempt(path)
+    assert path.read_bytes() == b"published" and list(tmp_path.iterdir()) == [path]

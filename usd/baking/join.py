@@ -36,12 +36,14 @@ class JoinResult:
         path: the layer written.
         grooms: prim paths.
         frames: its time codes.
+        complete: whether every groom has all frames of the shot.
         notes: what a user should know.
     """
 
     path: Path
     grooms: list[str]
     frames: list[float]
+    complete: bool
     notes: list[str]
 
 
@@ -97,8 +99,9 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         spool.discard()
         raise
     codes = sorted({code for sources in plan.values() for code in sources})
-    notes = composition_notes(stage, first.path) + _all_gaps(plan, frame, stage) + out_of_place(stage, out)
-    return JoinResult(out, [str(groom) for groom in plan], codes, notes)
+    missing = _all_gaps(plan, frame, stage)
+    notes = composition_notes(stage, first.path) + missing + out_of_place(stage, out)
+    return JoinResult(out, [str(groom) for groom in plan], codes, not missing, notes)
 
 
 class _Part:

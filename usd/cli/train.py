@@ -12,8 +12,8 @@ from neuralocks_core.shortcomings import HELD, HELD_BEGUN
 from .command import note, noting_when_cut_short, print_json
 from .options import AsJson, Head, Joints, Out, Seed, Skeleton, pairs
 
-SEVERAL = ("--groom", "--motion")
-"""Options that take as many words as follow: a shell's `--motion clips/*.bvh`."""
+SEVERAL = ("--groom", "--motion", "--set")
+"""Options that take all words that follow: a shell's `--motion clips/*.bvh`."""
 
 
 def one_by_one(words: list[str]) -> list[str]:

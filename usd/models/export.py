@@ -8,7 +8,7 @@ from pathlib import Path
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.json_values import plain
+from neuralocks_core.json_values import plain, readable
 
 from ..border.stopping import check
 from .description import described
@@ -54,7 +54,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
             tables = export_grooms(shot, model, put, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
             description["grooms"] = {"arrays": ARRAYS, "files": tables}
-        files = dict(file.graphs) | {DESCRIPTION: json.dumps(plain(description), indent=1).encode()}
+        files = dict(file.graphs) | {DESCRIPTION: readable(plain(description)).encode()}
         for name, data in files.items():
             put(name).write_bytes(data)
         check()

@@ -131,7 +131,7 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
     result = CliRunner().invoke(app, ["join", *map(str, parts), "-o", str(tmp_path / "hair.usdc"), "--json"])
     told = json.loads(result.stdout)
     assert told["frames"] == [1, 2, 3, 4, 5, 9, 10, 11, 12]
-    assert told["notes"] == ["no part has samples between 5 and 9"]
+    assert told["notes"] == ["no part has samples between 5 and 9"] and told["complete"] is False
     groom = inspect(tmp_path / "hair.usdc")["grooms"][0]
     assert groom["samples"] == {"first": 1, "last": 12, "number": 9, "missing": ["between 5 and 9"]}
     whole = bake(shot, tmp_path / "whole.usdc", model).path

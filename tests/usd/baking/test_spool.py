@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError
 from usd.baking.spool import Spool, _remove, fingerprint
 
 
@@ -209,3 +209,12 @@ def test_a_shot_edited_at_the_same_size_is_another_one(tmp_path):
     shot.write_text("a = 2")
     os.utime(shot, ns=(10**18, 10**18 + 10**6))
     assert fingerprint([shot], {}) != before
+
+
+def test_a_write_protected_output_is_refused_before_any_frame(tmp_path):
+    out = tmp_path / "hair.usdc"
+    out.write_bytes(b"published")
+    out.chmod(0o444)
+    with pytest.raises(CannotWrite, match="hair.usdc: is write-protected; make it writable"):
+        Spool(out, "x")
+    assert list(tmp_path.iterdir()) == [out] and out.read_bytes() == b"published"

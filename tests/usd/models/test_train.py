@@ -122,7 +122,9 @@ def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(
 
 def test_options_take_as_many_words_as_follow():
     """As the shell's own `--motion clips/*.bvh` gives them."""
-    words = one_by_one("train --groom a.usd b.usd --motion c.bvh -o m --groom d.usd e.usd --resume".split())
-    assert (
-        " ".join(words) == "train --groom a.usd --groom b.usd --motion c.bvh -o m --groom d.usd --groom e.usd --resume"
+    words = one_by_one(
+        "train --groom a.usd b.usd --motion c.bvh -o m --groom d.usd e.usd --set a=1 b=2 --resume".split()
+    )
+    assert words == (
+        "train --groom a.usd --groom b.usd --motion c.bvh -o m --groom d.usd --groom e.usd --set a=1 --set b=2 --resume".split()
     )
