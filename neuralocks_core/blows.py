@@ -10,14 +10,14 @@ from neuralocks_core.motion import Clip, G
 
 
 def softened(clip: Clip, character: Character, most: float, step: float) -> Clip:
-    """A clip in which the head's velocity changes from one sample to the next by no more than `most` g would change it in the time
-    between them, or in `step` where that is longer: the clip itself where it never does.
+    """Limit how much the head's velocity changes from one sample to the next, to what `most` g cause in the time between them, or
+    in `step` if that is longer. Returns the clip itself if no change exceeds this.
 
-    The network reads means over steps. Limited there alone, a blow that falls into one step is cut, and one that two steps share
-    passes up to twice as much: hair would flicker as the steps move on, which they do in every frame.
+    The network reads means over steps. If blows were limited only there, one within a single step would be cut, but one shared by
+    two steps would pass at up to twice the limit: hair would flicker, since the steps move on with every frame.
 
     Args:
-        clip: without cuts. A loop stays as it is: its seam would not fit any more.
+        clip: without cuts. A loop is left unchanged: its seam would no longer fit.
         character: whose head it is.
         most: [g].
         step: [s].

@@ -21,7 +21,7 @@ from neuralocks_core.track import Track
 
 
 def joints_read(character: Character, pose_joints=POSE_JOINTS) -> list[int]:
-    """The joint that carries the hair, the upper chest and the pose joints, or what a rig has in place of them."""
+    """The joint that carries the hair, the upper chest and the pose joints, or the rig's substitutes for them."""
     others = ("upper_chest", *pose_joints)
     return [character.carrying_joint, *(character.humanoid.nearest(name) for name in others)]
 
@@ -29,18 +29,16 @@ def joints_read(character: Character, pose_joints=POSE_JOINTS) -> list[int]:
 class BoundarySampler:
     """Boundary vectors of one character in one clip, at any time.
 
-    Motion between samples, before and after the clip is that of `Track`, on twos that of `Stepped`; after a cut, that of the
-    part of the clip by itself.
+    Motion between samples, and before and after the clip, is that of `Track`; of animation on twos, that of `Stepped`. After a
+    cut, that part of the clip is read by itself.
 
     Attributes:
         joints: joint indices of the head, the upper chest and the pose joints (n + 2,).
-        stance: what each pose joint's own bind pose is turned by, (n, 3, 3).
+        stance: rotation from a T-pose to each pose joint's own bind pose, (n, 3, 3).
     """
 
     GRAVITY_LIMIT = 6.0
-    """Largest change of effective gravity that is passed on [g]: a teleport must not throw the network out
-    of what it has seen.
-    """
+    """Largest change of effective gravity that is passed on [g]: a teleport must not take the network out of its training range."""
     SPIN_LIMIT = 25.0
     """Largest angular velocity that is passed on [rad/s]."""
     SPEED_LIMIT = 25.0
@@ -59,7 +57,7 @@ class BoundarySampler:
         self._shape_cache: dict[bytes, np.ndarray] = {}
 
     def _felt(self, clip: Clip) -> Clip:
-        """A part of the clip with as much of its blows as is passed on."""
+        """A part of the clip with its blows limited to what is passed on."""
         if self.spec.linear != "gravity":
             return clip
         return softened(clip, self.character, self.GRAVITY_LIMIT, self.spec.dt)
@@ -73,11 +71,11 @@ class BoundarySampler:
             times: (n,) [s].
             material: log-ratios to the reference material, (4,) or (n, 4).
             strength: motion strength; scales the history and is exact at 0 (the held pose).
-            joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, where they are
-                known better than by the clip.
+            joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, if they are known
+                better than from the clip.
 
         Raises:
-            NeuralocksError: a time, material or strength is not finite, or an array is of another shape.
+            NeuralocksError: a time, material or strength is not finite, or an array has the wrong shape.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
         if times.ndim > 1:
@@ -108,7 +106,7 @@ class BoundarySampler:
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
-        """The vector (spec.size,) of the bind pose held still: what an anchored network's answer is measured from."""
+        """The vector (spec.size,) of the bind pose held still: the reference for an anchored network's output."""
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
@@ -126,8 +124,8 @@ class BoundarySampler:
         return self._shape_cache[key]
 
     def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) and so long before them (L,), as if
-        there had been nothing before the last cut.
+        """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) minus lags (L,), as if there had been nothing
+        before the last cut.
         """
         position = np.empty((len(times), len(lags), 3))
         turns = np.empty((len(times), len(lags), len(self.joints), 3, 3))

@@ -58,10 +58,10 @@ class BoundarySpec:
 
     @classmethod
     def from_json(cls, values: dict) -> "BoundarySpec":
-        """Make it from what `to_json` gave.
+        """Build it from the output of `to_json`.
 
         Raises:
-            NeuralocksError: it holds what cannot be, or what a later version knows.
+            NeuralocksError: a value is impossible, or known only to a later version.
         """
         known = {f.name for f in fields(cls)}
         if not isinstance(values, dict):
@@ -74,7 +74,7 @@ class BoundarySpec:
             return cls(**values)
         except NeuralocksError:
             raise
-        except (TypeError, ValueError, OverflowError):  # whose own words tell a user nothing
+        except (TypeError, ValueError, OverflowError):  # whose own messages mean nothing to a user
             raise NeuralocksError(
                 "model: its boundary history has values of a wrong kind; get an undamaged copy"
             ) from None

@@ -13,13 +13,13 @@ from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
 from neuralocks_core.skinned_body import Body
 
 HEAD_WIDTHS = (0.08, 0.6)
-"""Between these a head's width is believed [m]; others hint at a wrong unit."""
+"""A head's width between these [m] is believed; others suggest a wrong unit."""
 COMMON_WIDTH = 0.15
-"""About as wide is a person's head [m]."""
+"""Typical width of a person's head [m]."""
 LEAST_SKIN = 20
-"""Fewer vertices than these are no head that could be measured."""
+"""A head with fewer vertices cannot be measured."""
 MOVED = 0.001
-"""Skin that a blend shape moves by less [m] is not moved by it; files round the offsets of all their points."""
+"""A blend shape that moves skin by less than this [m] counts as not moving it, since files round the offsets of all points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Skeleton:
 
     @cached_property
     def children(self) -> list[list[int]]:
-        """Joints that hang directly from each joint."""
+        """Direct children of each joint."""
         result = [[] for _ in self.names]
         for joint, parent in enumerate(self.parents):
             if parent >= 0:
@@ -64,7 +64,7 @@ class Skeleton:
         return result
 
     def below(self, joint: int) -> np.ndarray:
-        """Which joints (J,) bool are this one or hang below it."""
+        """Which joints (J,) bool are this one or below it."""
         result = [False] * len(self.names)
         for other, parent in enumerate(self.parents.tolist()):
             result[other] = other == joint or (parent >= 0 and result[parent])
@@ -72,10 +72,10 @@ class Skeleton:
 
 
 def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
-    """Signed sizes (n,) at which some samples of an animation show what a joint carries, 1 as in the bind pose.
+    """Signed scales (n,) of what a joint carries in some samples of an animation; 1 is the size in the bind pose.
 
-    A character is measured, and its hair read by the network, at their median: a rig may draw its head twice as large
-    as it was bound, and hair twice as long moves differently.
+    A character is measured, and the network reads its hair, at their median: a rig may draw its head twice as large as in the
+    bind pose, and hair twice as long moves differently.
 
     Args:
         posed: (T, 4, 4) transforms of the joint; bind: (4, 4) in the bind pose.
@@ -91,9 +91,9 @@ class Character:
     Attributes:
         skeleton: the joints.
         body: the surface that hair rests on; None leaves the hair without a collider and with average measures.
-        humanoid: semantic names of joints; found by name and hierarchy where left out.
-        carrier: joint that carries the hair, where it is not the head but hangs below it: the jaw of a beard, say. The head
-            goes with it then, as far as this hair is concerned: canonical space is that of the head all the same.
+        humanoid: semantic names of joints; found by name and hierarchy if left out.
+        carrier: joint that carries the hair, if it is not the head but below it, such as the jaw for a beard. For this hair, the
+            head then moves with that joint; canonical space is still the head's.
     """
 
     skeleton: Skeleton
@@ -123,7 +123,7 @@ class Character:
 
     @cached_property
     def sides(self) -> tuple[int, int] | None:
-        """The left and the right joint by which it is told which way the bind pose faces, if there are such."""
+        """The left and the right joint that tell which way the bind pose faces, if there are any."""
         bind = self.skeleton.bind[:, :3, 3]
         for part in ("upper_arm", "shoulder", "upper_leg", "eye"):
             left, right = self.humanoid.get(f"left_{part}"), self.humanoid.get(f"right_{part}")
@@ -135,7 +135,7 @@ class Character:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """Rotation (3, 3) about Y that turns the bind pose to face +Z, seen from where its left and right joints lie."""
+        """Rotation (3, 3) about Y that turns the bind pose to face +Z, judged by its left and right joints."""
         if self.sides is None:
             return np.eye(3)
         left, right = self.skeleton.bind[list(self.sides), :3, 3]
@@ -174,7 +174,7 @@ class Character:
         return joints[..., self.carrying_joint, :, :] @ self.inverse_bind[self.carrying_joint]
 
     def head_place(self, joints: np.ndarray) -> np.ndarray:
-        """Where the head's joint is (..., 3) [m], as the hair is carried, for world joint transforms (..., J, 4, 4)."""
+        """Position (..., 3) [m] of the head's joint, as the hair is carried, for world joint transforms (..., J, 4, 4)."""
         if self.carrier is None:
             return joints[..., self.head, :3, 3]
         return self.canonical_to_world(joints)[..., :3, 3]
@@ -193,7 +193,7 @@ class Character:
         return to_canonical @ joints @ self.inverse_bind
 
     def relative_rotations(self, joints: np.ndarray, indices) -> np.ndarray:
-        """World rotations (..., n, 3, 3) of the joints since the bind pose, in axes that face +Z there."""
+        """World rotations (..., n, 3, 3) of the joints from the bind pose, in axes that face +Z there."""
         now = rotation_part(np.asarray(joints, float)[..., indices, :, :], "animation")
         bind = rotation_part(self.skeleton.bind[indices], "bind pose")
         return now @ np.swapaxes(bind, -1, -2) @ self.facing.T
@@ -204,7 +204,7 @@ class Character:
 
     @cached_property
     def on_head(self) -> np.ndarray | None:
-        """Which body vertices (V,) move mainly with the head or what hangs below it, hats and hair cards among them."""
+        """Which body vertices (V,) move mainly with the head or a joint below it, including hats and hair cards."""
         if self.body is None:
             return None
         below = self.skeleton.below(self.head)
@@ -212,14 +212,14 @@ class Character:
 
     @cached_property
     def skin(self) -> np.ndarray | None:
-        """Which body vertices (V,) are the character's own, not what it wears; all where that cannot be told."""
+        """Which body vertices (V,) are the character's own, not what it wears; all if that is unknown."""
         if self.body is None:
             return None
         return own_skin(self.body.points, self.body.triangles, self.on_head, HEAD_WIDTHS[0])
 
     @cached_property
     def head_skin(self) -> np.ndarray | None:
-        """Which body vertices (V,) are the head's skin, on which it is measured; None where they are too few."""
+        """Which body vertices (V,) are the head's skin, on which it is measured; None if there are too few."""
         if self.body is None:
             return None
         mask = self.on_head & self.skin
@@ -227,8 +227,8 @@ class Character:
 
     @cached_property
     def body_shapes(self) -> np.ndarray:
-        """Which blend shapes (B,) are of the body, not of the face: those that move nearly all of the head's skin, or a part
-        of what does not follow the head, more than a jaw pulls at the neck.
+        """Which blend shapes (B,) change the body, not the face: those that move nearly all of the head's skin, or more of the skin
+        that does not follow the head than a jaw pulls at the neck.
         """
         if self.body is None or not self.body.shapes:
             return np.zeros(0, bool)
@@ -238,16 +238,14 @@ class Character:
 
     @cached_property
     def head_width(self) -> float | None:
-        """Width of the head's skin in bind pose [m], if there are a head and skin on it."""
+        """Width of the head's skin in bind pose [m], if there is a head with skin."""
         if "head" not in self.humanoid or self.head_skin is None:
             return None
         return float(np.ptp((self.body.points[self.head_skin] @ self.facing.T)[:, 0]))
 
     @cached_property
     def times_human(self) -> float:
-        """How many times a person's size a giant has, a power of two; 1 for all whose head's width is believed, or unknown,
-        and for what is smaller.
-        """
+        """How many times a person's size a giant is, a power of two; 1 if the head's width is believed, unknown or smaller."""
         if self.head_width is None or self.head_width <= HEAD_WIDTHS[1]:
             return 1.0
         return float(2 ** np.round(np.log2(self.head_width / COMMON_WIDTH)))
@@ -259,8 +257,8 @@ class Character:
             return np.array([0.0, 0.08, 0.02])
         points = (self.body.points[self.head_skin] - self.canonical_to_bind[:3, 3]) @ self.facing.T
         low, high = points.min(axis=0), points.max(axis=0)
-        # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured over the ears, and
-        # where an elf's stand higher, is no more than its depth.
+        # Chin, neck and ears belong to the head's vertices but not to the skull: its width is measured above the ears, and limited
+        # to its depth, since an elf's ears are higher.
         skull = points[points[:, 1] > high[1] / 2]
         width = np.ptp(skull[:, [0, 2]], axis=0).min() if high[1] > 0 and len(skull) else high[0] - low[0]
         return np.array([(low[0] + high[0]) / 2, high[1] - 0.65 * width, (low[2] + high[2]) / 2])

@@ -9,21 +9,20 @@ from neuralocks_core.motion import Clip
 
 
 class ClipSpline:
-    """Numbers made of a clip's poses, at any time.
+    """Numbers computed from a clip's poses, at any time.
 
-    Motion between samples has the accelerations of the motion and not those of its polyline, as a 24 fps shot needs it.
-    Before the clip the pose is held while the character comes on, as the head does, with its first velocity: hair must not
-    begin with a blow. After it all stand still, as a stage shows it. A loop is continued on both sides, and a character that
-    walks in it gets ahead.
+    Between samples, accelerations are those of the motion and not of its polyline, which a 24 fps shot needs. Before the clip,
+    the pose is held while the character moves with the head's first velocity: hair must not begin with a blow. After the clip,
+    all joints stand still, as a stage shows it. A loop continues on both sides, and a character that walks in it moves ahead.
 
     Args:
         clip: without cuts.
-        place: where the head is (T, 3) [m] in world transforms (T, J, 4, 4).
-        values: what is made of world transforms (T, J, 4, 4): (T, ...), which blends linearly.
+        place: gives the head's position (T, 3) [m] for world transforms (T, J, 4, 4).
+        values: gives the numbers (T, ...) for world transforms (T, J, 4, 4); they are blended linearly.
     """
 
     def __init__(self, clip: Clip, place: Callable, values: Callable[[np.ndarray], np.ndarray]):
-        # Here, because it takes as long to import as all else that a runtime needs.
+        # Imported here, because it takes as long as all other imports of a runtime.
         from scipy.interpolate import CubicSpline
 
         times, poses = _extended(clip)
@@ -39,7 +38,7 @@ class ClipSpline:
             self._speed = CubicSpline(times, place(poses), bc_type="natural")(times[0], 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers (n, ...) at times (n,) [s], and how far all joints are then from where they are in them (n, 3) [m]."""
+        """The numbers (n, ...) at times (n,) [s], and the offset (n, 3) [m] to add to all joints."""
         clip, base = self._clip, self._clip.wrapped(times)
         beyond = (times - base)[:, None]
         if clip.loop:
@@ -50,9 +49,7 @@ class ClipSpline:
 
 
 def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is
-    smooth.
-    """
+    """Sample times and transforms for the spline; a loop is continued a little on both sides so that its seam is smooth."""
     if not clip.loop or len(clip.times) < 3:
         return clip.times, clip.joints
     pad = min(len(clip.times) - 1, 8)

@@ -7,17 +7,17 @@ from contextlib import contextmanager
 class NeuralocksError(ValueError):
     """Bad input: the message names the prim, file or argument, the fact, and the remedy.
 
-    Command line and add-on show the message as it is; anything else that escapes is a bug.
+    Command line and add-on show the message unchanged; any other exception that escapes is a bug.
     """
 
 
 class CannotWrite(NeuralocksError):
-    """The file system refuses, a full disk say: nothing is wrong with the input, and what is finished is worth keeping."""
+    """The file system refuses, such as a full disk: the input is fine, and finished work is worth keeping."""
 
 
 @contextmanager
 def about(subject):
-    """Errors of what is done meanwhile begin with the subject: the path of the file that is read, say."""
+    """Prefix errors raised in this block with the subject, such as the path of the file being read."""
     try:
         yield
     except NeuralocksError as error:

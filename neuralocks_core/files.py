@@ -23,17 +23,17 @@ _LETTERS = 8
 
 @contextmanager
 def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
-    """A path to write to beside `path`, which takes its place when the block ends without an error.
+    """A path to write to, beside `path`. It replaces `path` when the block ends without an error.
 
-    It has the same name in a hidden folder of its own, since writers choose a format by the ending. Missing folders on
-    the way to `path` are made. Enter it before long work, to learn in time that a folder cannot be written.
+    It has the same name in a hidden folder of its own, since writers choose a format by the extension. Missing folders above
+    `path` are created. Enter the block before long work, to learn in time that a folder cannot be written.
 
     Raises:
         NeuralocksError: it is a folder's name, or (CannotWrite) the file there is write-protected, or for every OSError in the
             block; nothing is left of it, and what was under `path` stays.
     """
     path = Path(path)
-    if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it leads to
+    if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it points to
         raise NeuralocksError(f"{path}: is a folder; move it, or choose another name")
     try:
         check_unprotected(path)
@@ -52,7 +52,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def check_writable(path: Path) -> None:
-    """Before minutes of work, not after them.
+    """Check that a path can be written: before minutes of work, not after.
 
     Raises:
         NeuralocksError: it is a folder's name or a write-protected file, or nothing can be written there; nothing is left of the
@@ -85,7 +85,7 @@ def check_unprotected(path: Path) -> None:
 
 
 def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays at once under the final name; what is killed over it leaves `<stem>.<process>.tmp` beside it.
+    """Write arrays atomically under the final name; a process killed meanwhile leaves `<stem>.<process>.tmp` beside it.
 
     Raises:
         CannotWrite: the file system refuses.
@@ -107,11 +107,11 @@ def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 @contextmanager
 def own_folder(parent: Path) -> Iterator[Path]:
-    """A new hidden folder, which goes with all that is in it. Unlike one of `tempfile`, whose rights on Windows stay with the
-    files that are moved out of it, it is nobody's private one; and where no folder can be made, that is told at once.
+    """A new hidden folder, removed with all its content at the end. Unlike one of `tempfile`, whose private rights on Windows stay
+    with files that are moved out of it, it has the usual rights, and it fails at once where no folder can be made.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the folder cannot be made.
     """
     folder = parent / f".part-{uuid.uuid4().hex[:12]}"
     folder.mkdir()
@@ -122,7 +122,7 @@ def own_folder(parent: Path) -> Iterator[Path]:
 
 
 def reach_disk(path: Path) -> None:
-    """Wait until a file is on the disk: else a power cut may leave its later name with nothing under it.
+    """Wait until a file is on the disk: otherwise a power cut may leave an empty file under its later name.
 
     Raises:
         OSError: the disk refuses.
@@ -132,19 +132,19 @@ def reach_disk(path: Path) -> None:
 
 
 def put_in_place(part: Path, path: Path) -> None:
-    """Give a file its final name, in place of what is there.
+    """Give a file its final name, replacing what is there.
 
-    Windows replaces no file that a program shows, and lends files to virus scanners for a moment. So it is tried again for
-    about a second; then the old file steps aside, which Windows allows, and is removed once nobody shows it: by the next call.
+    Windows replaces no file that a program has open, and virus scanners open files for a moment. So this tries again for about a
+    second; then it renames the old file, which Windows allows. The next call removes that file once no program has it open.
 
     Raises:
-        OSError: it cannot be done; both files are as they were.
+        OSError: it cannot be done; both files are unchanged.
     """
     try:
         os.replace(part, path)
         return
     except PermissionError:
-        # What nobody may write, as under some version controls, stays; and a folder that refuses has no file to step aside.
+        # A read-only file, as under some version controls, stays; and in a folder without write access nothing is renamed.
         if not (_HOLDS_OPEN_FILES and path.is_file() and os.access(path, os.W_OK)):
             raise
     remove_strays(path, _ASIDE)
@@ -165,26 +165,26 @@ def put_in_place(part: Path, path: Path) -> None:
 
 
 def stray_name(path: Path, ending: str) -> Path:
-    """A new hidden name beside a file, for what is to be there for a while."""
+    """A new hidden name beside a file, for temporary use."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex[:_LETTERS]}{ending}")
 
 
 def remove_strays(path: Path, ending: str) -> None:
-    """Remove what has such a name beside a file, as far as the system lets us."""
+    """Remove files with such names beside a file, as far as the system allows."""
     for stray in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * _LETTERS}{ending}"):
         with suppress(OSError):
             stray.unlink()
 
 
 def make_way(path: Path) -> list[Path]:
-    """Make the missing folders on the way to a file; returns them, the innermost first."""
+    """Create the missing folders above a file; returns them, innermost first."""
     missing = [folder for folder in path.parents if not os.path.exists(folder)]
     path.parent.mkdir(parents=True, exist_ok=True)
     return missing
 
 
 def remove_empty(folders: list[Path]) -> None:
-    """Remove those folders that nothing was put into."""
+    """Remove those of the folders that are empty."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()
@@ -194,7 +194,7 @@ def as_path(given, name: str) -> Path:
     """The path that a caller gives for the argument `name`.
 
     Raises:
-        NeuralocksError: it is none.
+        NeuralocksError: it is not a path.
     """
     try:
         return Path(given)
@@ -203,7 +203,7 @@ def as_path(given, name: str) -> Path:
 
 
 def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:
-    """The one line for a file system that refuses."""
+    """The one-line error for a file system that refuses."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return CannotWrite(f"{path}: no space left on the disk; free some, or choose another folder")
     if error.errno in (errno.EEXIST, errno.ENOTDIR):

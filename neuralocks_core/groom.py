@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A groom: all strands of one hairstyle at rest, exactly as their author left them."""
+"""A groom: all strands of one hairstyle at rest, exactly as authored."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-# Farther than this from the origin is no hair on a character, and float32 would no longer resolve a millimetre.
+# Farther than this from the origin, it is not hair on a character, and float32 no longer resolves a millimetre.
 LARGEST_COORDINATE = 1e4
 
 
@@ -92,7 +92,7 @@ class Groom:
 
     @cached_property
     def starts(self) -> np.ndarray:
-        """(S,) int64, index of each strand's root in `points` (of the following strand's where it has no points)."""
+        """(S,) int64, index of each strand's root in `points` (of the following strand's if it has no points)."""
         ends = np.cumsum(self.counts, dtype=np.int64)
         return ends - self.counts
 
@@ -135,7 +135,7 @@ class Groom:
         object.__setattr__(self, field, value)
 
     def _shaped(self, field: str, value: np.ndarray, *each: int) -> np.ndarray:
-        """The value, if it holds one entry of shape `each` a strand."""
+        """The value, if it holds one entry of shape `each` per strand."""
         shape = (len(self.counts), *each)
         if value.shape != shape:
             raise self._error(f"{field} has shape {value.shape}", f"give {shape}")
@@ -164,7 +164,7 @@ class Groom:
         return np.ascontiguousarray(value, dtype=np.int32)
 
     def _check_values(self, field: str, value: np.ndarray, largest: float, unit: str) -> None:
-        """Finite and of believable size; the message says where the first bad value lies."""
+        """Check that values are finite and of plausible size; the message says where the first bad value is."""
         bad = ~(np.abs(value) <= largest) | ~np.isfinite(value)
         if not bad.any():
             return

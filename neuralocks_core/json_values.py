@@ -10,17 +10,17 @@ _NUMBERS = re.compile(rf"\[\n\s*{_NUMBER}(?:,\n\s*{_NUMBER})*\n\s*\]")  # string
 
 
 def plain(value, digits: int | None = None):
-    """A copy of nested dicts, lists and numbers, numpy's too, for `json.dumps`; other values stay as they are.
+    """A copy of nested dicts, lists and numbers, including numpy's, for `json.dumps`; other values stay as they are.
 
     Args:
         value: what to copy.
-        digits: behind the point, to which numbers are rounded; all of them if left out.
+        digits: decimal places to which numbers are rounded; left out, they are not rounded.
     """
     if isinstance(value, dict):
         return {str(key): plain(item, digits) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item, digits) for item in value]
-    if getattr(value, "ndim", None) == 0:  # of numpy, which this does without: commands that need none start sooner
+    if getattr(value, "ndim", None) == 0:  # numpy's, without importing numpy: commands that do not need it start sooner
         value = value.item()
     if isinstance(value, float):
         if not math.isfinite(value):

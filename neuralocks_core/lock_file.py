@@ -9,19 +9,19 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
 
 TRIES = 100
-"""How often a folder that others remove is made anew before it counts as theirs."""
+"""How often to recreate a folder that others remove, before it counts as theirs."""
 
 
 class FolderLock:
-    """Makes a folder, if it is missing, and holds it.
+    """Creates a folder, if it is missing, and locks it.
 
     Args:
         folder: its path.
         subject: the file or folder that messages are about.
-        busy: what to say of that where another process is at work in the folder.
+        busy: what messages say if another process is working in the folder.
 
     Raises:
-        NeuralocksError: it is held by another process, is a link to somewhere else, or cannot be made.
+        NeuralocksError: the folder is locked by another process, is a link to somewhere else, or cannot be made.
     """
 
     def __init__(self, folder: Path, subject: Path, busy: str):
@@ -42,31 +42,31 @@ class FolderLock:
 
     @property
     def held(self) -> bool:
-        """Whether the folder is still held."""
+        """Whether the folder is still locked."""
         return not self._lock.closed
 
     def release(self) -> None:
-        """Let go of the folder, and remove it if nothing else is in it; nothing happens where that was done before."""
+        """Unlock the folder, and remove it if nothing else is in it; does nothing the second time."""
         if not self.held:
             return
         if os.name == "nt":
-            self._lock.close()  # Windows removes no open file
-        with suppress(OSError):  # another process has it, or something is kept in it
+            self._lock.close()  # Windows does not remove open files
+        with suppress(OSError):  # another process has locked it, or it is not empty
             (self.folder / "lock").unlink()
             self.folder.rmdir()
         self._lock.close()
 
 
 def _taken(path: Path):
-    """The locked file; None where whoever had it before has just removed it. Raises BlockingIOError where it is held."""
+    """The locked file; None if its last owner has just removed it. Raises BlockingIOError if it is locked."""
     try:
         lock = open(path, "a+")
     except FileNotFoundError:
         return None
     try:
         _lock(lock)
-        # Whoever opens the file before it is removed, and locks it after, holds a file that others cannot see. Windows removes
-        # no open file, and its network drives may number one file in two ways.
+        # A process that opens the file before it is removed, and locks it afterwards, holds a file that others cannot see. Windows
+        # does not remove open files, and its network drives may number one file in two ways.
         if os.name == "nt" or os.path.samestat(os.fstat(lock.fileno()), os.stat(path)):
             return lock
     except FileNotFoundError:

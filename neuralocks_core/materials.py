@@ -17,25 +17,25 @@ RANGES = {
     "damping": (4.0, 20.0),
     "clumping": (0.0, 240.0),
 }
-"""What models are trained on; values outside are refused."""
+"""Ranges that models are trained on; values outside are refused."""
 
 ALIASES = {"stiffness": "bend"}
-"""Names that artists use for the same."""
+"""Artists' names -> ours."""
 
 STRETCH = 1000.0
 """Stiffness of edges against stretch [m^2/s^2], per unit line density as all others."""
 COLLISION = 1e6
 """Stiffness of the body [1/(m s^2)]."""
 MARGIN = 0.004
-"""Distance that hair keeps from the body [m], where it does not rest nearer."""
+"""Distance that hair keeps from the body [m], unless it rests nearer."""
 NO_PLANE = (0.0, 0.0, 0.0, -1e3)
-"""Stands for the body plane n, d of a vertex that no body is near: all that is on earth is outside of it."""
+"""Body plane n, d for a vertex without a body nearby: everything on earth is outside of it."""
 LINEAR = 0.02
 """Depth in the body [m] from which the force stops growing."""
 SMOOTHING = 0.015
-"""h of the density that tells crowded hair [m]: each vertex is smeared over 2 h."""
+"""h of the density that detects crowded hair [m]: each vertex is spread over 2 h."""
 
-_SOFT = 20.0  # clumping may be 0, which has no logarithm: it is counted from here
+_SOFT = 20.0  # clumping may be 0, which has no logarithm: this offset is added first
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Material:
         clumping: stiffness of the ties between neighbours (adhesion) [1/s^2].
 
     Raises:
-        NeuralocksError: a value is no number, not finite or outside RANGES.
+        NeuralocksError: a value is not a number, not finite or outside RANGES.
     """
 
     bend: float = 1e-3
@@ -62,7 +62,7 @@ class Material:
             _check(name, value, name)
 
     def log_ratios(self) -> np.ndarray:
-        """(4,) float32: logarithms of the ratios to the default material, zero for it; what the network reads."""
+        """(4,) float32: logarithms of the ratios to the default material, as the network reads them; zero for the default."""
         default = Material()
         ratios = [
             self.bend / default.bend,
@@ -74,9 +74,7 @@ class Material:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> Material:
-        """A material for a training rollout: each constant the default in a third of all cases, else anywhere in its
-        range.
-        """
+        """A material for a training rollout: each constant is the default in a third of all cases, else anywhere in its range."""
         values = {}
         for name, (low, high) in RANGES.items():
             shift = _SOFT if name == "clumping" else 0.0
@@ -86,10 +84,10 @@ class Material:
 
     @classmethod
     def parse(cls, settings: list[str] | tuple[str, ...]) -> Material:
-        """Make it from `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
+        """Build it from `NAME=VALUE` words; the value is absolute, or a factor on the default when it ends in `x` (`bend=2x`).
 
         Raises:
-            NeuralocksError: an unknown name, one that is given twice, no number, or a value outside its range.
+            NeuralocksError: a name is unknown or given twice, or a value is not a number or outside its range.
         """
         given: dict[str, float] = {}
         for setting in settings:
@@ -117,20 +115,20 @@ class Material:
 
 
 def _check(name: str, value, said: str) -> None:
-    """Refuse a value that a constant cannot have, called as its user calls it."""
+    """Refuse a value that a constant cannot have; the message uses the user's name for it."""
     low, high = RANGES[name]
     if isinstance(value, bool) or not isinstance(value, Real):
         raise NeuralocksError(f"material {said}: {value!r} is not a number; give one from {low:g} to {high:g}")
-    if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # single precision's ends
+    if not np.isfinite(value) or not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):  # rounding in single precision
         raise NeuralocksError(
             f"material {said}: {value:g} is outside {low:g} to {high:g}; choose a value inside, or a factor such as 2x"
         )
 
 
 def constants(log_ratios: np.ndarray) -> tuple[float, float, float, float]:
-    """Bend, weight, damping and clumping, in the units of `Material`, whose `log_ratios` (4,) these are.
+    """Bend, weight, damping and clumping in the units of `Material`, from its `log_ratios` (4,).
 
-    Single precision may leave the ranges by a part in a million, and clumping is never below 0.
+    In single precision, values may leave the ranges by one part in a million; clumping is never below 0.
     """
     default, ratio = Material(), np.exp(np.asarray(log_ratios, np.float64))
     tie = (default.clumping + _SOFT) * ratio[3] - _SOFT

@@ -6,14 +6,14 @@ import numpy as np
 from neuralocks_core.rotation import unit
 
 INSIDE_OUT = -0.3
-"""Of the volumes that triangles span with the middle of the mesh, sum over sum of sizes: 1 for a ball, 0.5 for a person
-with arms spread, near 0 for hair cards and cloth, whose sides say nothing. Below this the mesh is inside out."""
+"""Volumes that triangles span with the middle of the mesh: their sum over the sum of their sizes. 1 for a ball, 0.5 for a person
+with arms spread, near 0 for hair cards and cloth, whose sides mean nothing. Below this value the mesh is inside out."""
 
 
 def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (V, 3) of points (V, 3), outward as the triangles (F, 3) are by the right-hand rule.
+    """Unit normals (V, 3) of points (V, 3), outward like the triangles (F, 3), by the right-hand rule.
 
-    Each is the mean of the faces around, weighted by their area; zero where there is none.
+    Each is the mean of the faces around, weighted by their area; zero if there is none.
     """
     a, b, c = (np.asarray(points, float)[corner] for corner in triangles.T)
     face, corners = np.cross(b - a, c - a), triangles.T.ravel()
@@ -34,13 +34,13 @@ def connected_pieces(faces: np.ndarray, count: int) -> np.ndarray:
 def inside_out(points: np.ndarray, triangles: np.ndarray) -> bool:
     """Whether the triangles (F, 3) of a mesh's points (V, 3) face inward.
 
-    Files exist whose every triangle does, and hair would be pushed into such a body.
+    In some files every triangle does, and hair would be pushed into such a body.
     """
     if not len(triangles):
         return False
     points, corners = np.asarray(points, float), np.ascontiguousarray(triangles.T)
     middle = np.bincount(corners.ravel(), minlength=len(points)) @ points / corners.size
-    # One array for each coordinate: to gather triples takes several times as long.
+    # One array for each coordinate: gathering triples takes several times as long.
     x, y, z = np.ascontiguousarray((points - middle).T)[:, corners]
     spanned = sum(p[0] * (q[1] * r[2] - q[2] * r[1]) for p, q, r in ((x, y, z), (y, z, x), (z, x, y)))
     return bool(spanned.sum() < INSIDE_OUT * np.abs(spanned).sum())

@@ -9,7 +9,7 @@ times.
 import numpy as np
 
 DYNAMIC_SHARE = 0.35
-"""A frame counts as dynamic where hair moves with at least this share of the reference's speed (Neuroll, table 1)."""
+"""A frame counts as dynamic if hair moves at least at this share of the reference's speed (Neuroll, table 1)."""
 STILL = 0.01
 """Mean speed [m/s] under which the reference itself counts as standing still."""
 MOTIONLESS = 1e-4
@@ -17,16 +17,16 @@ MOTIONLESS = 1e-4
 DEEP = 0.003
 """Depth [m] at which a vertex inside the body begins to show."""
 LIVELY = 0.005
-"""A strand moves if the rms of its motion is a larger share of its length."""
+"""A strand moves if the rms of its motion is more than this share of its length."""
 SETTLED = 0.1
-"""Hair has settled when its tips keep below this share of their largest speed."""
+"""Hair has settled when its tips stay below this share of their largest speed."""
 HELD = 1e-5
-"""Transforms that change by less in HELD_TIME [s] are of a held pose."""
+"""Transforms that change by less than this in HELD_TIME [s] belong to a held pose."""
 HELD_TIME = 1 / 24
 
 
 def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Length [m] of each strand, (..., S), of points (..., P, 3) in strands of `counts` (S,) vertices."""
+    """Length [m] of each strand, (..., S), for points (..., P, 3) in strands of `counts` (S,) vertices."""
     points = np.asarray(points, float)
     edges = np.linalg.norm(np.diff(points, axis=-2), axis=-1)
     ends = np.cumsum(counts)
@@ -58,7 +58,7 @@ def stretch(lengths: np.ndarray, rest: np.ndarray) -> dict[str, float]:
 def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, float]:
     """Vertices inside the body.
 
-    A vertex that rests inside the body is its author's choice: it is counted only if it lies deeper than at rest.
+    A vertex that rests inside the body is the author's choice: it counts only if it is deeper than at rest.
 
     Args:
         distance: signed distance to the posed body (T, N) [m], negative inside; clamped root vertices left out.
@@ -69,7 +69,7 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
         `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside.
     """
     depth = np.maximum(np.minimum(rest_distance, 0) - distance, 0.0)
-    # So far apart are float32 coordinates 20 m from the origin: rounding is no penetration.
+    # The spacing of float32 coordinates 20 m from the origin: rounding is not penetration.
     return {
         "penetration_percent": 100 * _mean(depth > 2e-6),
         "penetration_3mm_percent": 100 * _mean(depth > DEEP),
@@ -87,22 +87,22 @@ def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
-    """Mean length of the velocity's error over the mean length of the reference's velocity; rigid hair has 1. NaN where
-    the reference is MOTIONLESS.
+    """Mean length of the velocity's error over the mean length of the reference's velocity; 1 for rigid hair. NaN if the reference
+    is MOTIONLESS.
     """
     return _relative(speed(np.asarray(points, float) - reference, times), speed(reference, times))
 
 
 def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
-    """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference, whether or
-    not it is the same motion. NaN where the reference is MOTIONLESS.
+    """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference, even if the motion is a
+    different one. NaN if the reference is MOTIONLESS.
     """
     return _relative(speed(points, times), speed(reference, times))
 
 
 def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> int:
-    """Longest run of consecutive samples, of which a frame may have several, in which hair moves at 35 % of the reference's
-    mean speed or more.
+    """Longest run of consecutive samples (a frame may have several) in which hair moves at 35 % of the reference's mean speed or
+    more.
 
     Samples at which the reference stands still neither count nor break a run.
     """
@@ -124,13 +124,13 @@ def position_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray
 def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> dict[str, float]:
     """Error of each strand's motion relative to that of hair carried rigidly (= 1).
 
-    The motion of a vertex is its place about its mean over the clip, so that a wrong droop alone is no error of motion.
+    The motion of a vertex is its position relative to its mean over the clip, so a wrong droop alone is not an error of motion.
     Per strand: rms over time and vertices of the motion's error, over the rms of the reference's motion. Strands that
-    move less than LIVELY have no motion to be wrong about and are left out.
+    move less than LIVELY have no motion to compare and are left out.
 
     Returns:
         `median` over strands, and `p95`, which one strand in twenty exceeds; `rms`: the same ratio over all strands
-        together, where a few that came to rest elsewhere weigh most. NaN if nothing moves.
+        together, dominated by the few that came to rest elsewhere. NaN if nothing moves.
     """
     error, true = swings(np.asarray(points, float), np.asarray(reference, float), length)
     if not len(true):
@@ -144,7 +144,7 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
 
 
 def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What `motion_error` is made of: rms of the motion's error and of the reference's motion (n,) [m] of each strand that
+    """The parts of `motion_error`: rms of the motion's error and of the reference's motion (n,) [m] of each strand that
     moves by more than LIVELY of its length (S,) [m].
     """
     error, true = _swing(points - reference), _swing(reference)
@@ -153,9 +153,9 @@ def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tup
 
 
 def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
-    """Time [s] after `stop` until the mean tip speed stays below SETTLED of the largest it has after the stop.
+    """Time [s] after `stop` until the mean tip speed stays below SETTLED of its largest value after the stop.
 
-    Tips that never exceed the standing-still speed have settled at once; those that never settle give the time left.
+    Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left.
     """
     tips = speed(points[:, :, -1:], times).mean(axis=(1, 2))
     middle = (times[1:] + times[:-1]) / 2
@@ -167,9 +167,9 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
 
 
 def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: float) -> float:
-    """Mean speed of the tips between half a second and two seconds after `stop`, in percent of the largest that the
-    reference's have after it: what comes back when hair should come to rest. Of `points - reference` it is the share of
-    that motion that is wrong.
+    """Mean speed of the tips between half a second and two seconds after `stop`, in percent of the largest speed of the reference's
+    tips after it: motion that returns when hair should come to rest. For `points - reference`, it is the share of that motion that
+    is wrong.
     """
     tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in (points, reference))
     since = (times[1:] + times[:-1]) / 2 - stop
@@ -188,12 +188,12 @@ def turning(points: np.ndarray) -> float:
 
 
 def jitter(points: np.ndarray) -> float:
-    """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 where nothing moves."""
+    """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 if nothing moves."""
     return 1000 * float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max(initial=0.0))
 
 
 def droop(displacement: np.ndarray, down: np.ndarray) -> float:
-    """How far tips hang below where the rigid groom has them, mean over strands and frames [cm].
+    """How far tips hang below those of the rigid groom, mean over strands and frames [cm].
 
     Args:
         displacement: (T, S, K, 3) [m] canonical.
@@ -210,7 +210,7 @@ def tip_curves(displacement: np.ndarray) -> np.ndarray:
 def held(joints: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Which samples (T,) have the pose of the one before: none of the given transforms (T, n, 4, 4) changes.
 
-    Nor may any in HELD_TIME before or after, times (T,) [s]: of many samples a frame, each changes little in slow motion, too.
+    Nor does any within HELD_TIME before or after, times (T,) [s]: with many samples per frame, each changes little in slow motion.
     """
     rows = np.arange(len(times))
     before = np.searchsorted(times, times - HELD_TIME + 1e-9, side="right") - 1
@@ -230,7 +230,7 @@ def _swing(points: np.ndarray) -> np.ndarray:
 
 
 def _relative(own: np.ndarray, true: np.ndarray) -> float:
-    """Mean over mean of speeds [m/s]; NaN where the second are too small to divide by."""
+    """Mean over mean of speeds [m/s]; NaN if the second mean is too small to divide by."""
     return float(own.mean() / true.mean()) if true.mean() >= MOTIONLESS else float("nan")
 
 

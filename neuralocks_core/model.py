@@ -23,15 +23,15 @@ REMEDIES = {
     "strands": "train with a smaller --set rate",
     "rig": "give --bend, --weight and --damping nearer to their defaults",
 }
-"""By kind, what a user can do against a training whose numbers ran away."""
+"""Kind -> what a user can do about a training that diverged."""
 CARD = (("training", dict, "table of values"), ("report", dict, "table of values"), ("credits", list, "list of lines"))
-"""What every model says of itself, empty where its file does not."""
+"""Metadata of every model; empty if its file lacks it."""
 _LARGEST = 64 << 20
-"""Bytes of one unpacked entry; a model has about one million, so a bomb is told from a model."""
+"""Bytes of one unpacked entry; a model has about one million, so this refuses a zip bomb."""
 _LARGEST_FILE = 5 * _LARGEST
-"""Bytes of a file: nothing else is looked through for the zip in it."""
+"""Bytes of a file: larger ones are not searched for a zip."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Other ways to pack a zip's entries have errors, and take memory, of their own."""
+"""Other compression methods have errors, and memory needs, of their own."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +48,16 @@ class ModelFile:
         return self.meta["kind"]
 
     def shortcomings(self) -> list[str]:
-        """What its own report says against using it, as notes for a user."""
+        """What its own report says against using this model, as notes for a user."""
         return shortcomings(self.path, self.kind, self.meta["report"])
 
 
 @cache
 def shipped(kind: str = "strands") -> Path:
-    """Path of the model that is used when none is named; looked for once, for live hair asks in every frame.
+    """Path of the model that is used if none is named; searched once, since live hair asks in every frame.
 
     Raises:
-        NeuralocksError: this installation does not hold it.
+        NeuralocksError: this installation lacks it.
     """
     path = Path(__file__).parent / "shipped" / f"{kind}.neuralocks"
     if not path.is_file():
@@ -68,10 +68,10 @@ def shipped(kind: str = "strands") -> Path:
 
 
 def named(path: str | os.PathLike) -> Path:
-    """The path of a model file that is to be written.
+    """The path of a model file to write.
 
     Raises:
-        NeuralocksError: it is no name for one.
+        NeuralocksError: it is not a model file's name.
     """
     path = Path(path)
     if path.suffix != ".neuralocks":
@@ -80,7 +80,7 @@ def named(path: str | os.PathLike) -> Path:
 
 
 def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path:
-    """Write a model file at once under its final name.
+    """Write a model file atomically under its final name.
 
     Args:
         path: ends in `.neuralocks`.
@@ -88,7 +88,7 @@ def write(path: str | os.PathLike, meta: dict, graphs: dict[str, bytes]) -> Path
         graphs: the ONNX files that `KINDS[kind]` lists.
 
     Raises:
-        NeuralocksError: it has another name, cannot be written, or `meta` holds NaN or infinity.
+        NeuralocksError: the name is wrong, the file cannot be written, or `meta` holds NaN or infinity.
         ValueError: the graphs are not those of its kind.
     """
     path = named(path)
@@ -115,7 +115,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         kind: what it must be, `strands` or `rig`.
 
     Raises:
-        NeuralocksError: it is missing, damaged, of a later format or of another kind.
+        NeuralocksError: the file is missing, damaged, of a later format or of another kind.
     """
     path = as_path(path, "model")
     try:
@@ -164,7 +164,7 @@ def _check_file(path: Path) -> None:
 def _parsed(text: bytes):
     try:
         return json.loads(text)
-    except ValueError as error:  # no UTF-8, no JSON, or a number of thousands of digits
+    except ValueError as error:  # not UTF-8, not JSON, or a number with thousands of digits
         raise zipfile.BadZipFile(_first_line(error)) from None
 
 
@@ -176,7 +176,7 @@ def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes
     if info.compress_type not in _PACKED:
         raise NeuralocksError(f"{path}: {info.filename} is not packed as in a model; get an undamaged copy")
     try:
-        # No more than it claims, and a byte to see its end: zipfile's own `read` unpacks what there is, and cuts that off.
+        # Reads the claimed size plus one byte, to see the end: zipfile's own `read` unpacks everything and cuts off the excess.
         with archive.open(info) as file:
             return file.read(info.file_size + 1)
     except zlib.error as error:

@@ -15,9 +15,9 @@ G = 9.81
 GRAVITY = np.array([0.0, -G, 0.0])
 """[m/s^2], Y up."""
 LARGEST_CLIP = 4_000_000
-"""Joint samples held of one file's animation: 512 MB. More than that is a stray key frame, not a shot."""
+"""Most joint samples of one file's animation: 512 MB. More come from a stray key frame, not from a shot."""
 LOOP_GAP = 2.0
-"""Turn of a joint from the last sample of a loop to its first [degrees] that a user should know of."""
+"""Turn of a joint from the last sample of a loop to its first [degrees] beyond which a user is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Clip:
         shape: blend shape weights, (T, B) or (T, 0).
         loop: whether the motion repeats, the last sample showing the pose of the first; history is then taken modulo the
             period.
-        cuts: times [s] of the first sample after each cut, ascending, (C,): no history reaches back over one. A loop has
+        cuts: times [s] of the first sample after each cut, ascending, (C,): no history reaches back across one. A loop has
             none that count.
     """
 
@@ -81,7 +81,7 @@ class Clip:
 
     @property
     def parts(self) -> list[Clip]:
-        """The clip from each cut up to the next; itself where there is none."""
+        """The clip from each cut up to the next; the clip itself if there is none."""
         if self.loop or not len(self.cuts):
             return [self]
         starts = np.searchsorted(self.times, self.cuts - 1e-9)
@@ -94,8 +94,8 @@ class Clip:
     def at(self, times) -> np.ndarray:
         """World joint transforms (n, J, 4, 4) at any times (n,) [s].
 
-        Between samples, translation and stretch go linearly and rotation along the shortest arc; outside, the nearest
-        sample is held (or the loop goes on).
+        Between samples, translation and stretch are linear and rotation takes the shortest arc; outside, the nearest
+        sample is held (or the loop continues).
         """
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
         low, fraction = self._bracket(times)
@@ -107,7 +107,7 @@ class Clip:
     def shape_at(self, times) -> np.ndarray:
         """Blend shape weights (n, B) at times (n,) [s], linear between samples."""
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
-        if not self.shape.shape[1]:  # as most have none, and live hair asks in every frame
+        if not self.shape.shape[1]:  # most clips have none, and live hair asks in every frame
             return np.zeros((len(times), 0))
         low, fraction = self._bracket(times)
         high = np.minimum(low + 1, len(self.times) - 1)
@@ -131,7 +131,7 @@ class Clip:
             return np.zeros(len(times), int), np.zeros(len(times))
         low = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         fraction = (times - self.times[low]) / (self.times[low + 1] - self.times[low])
-        # An exact sample must come back as it is, also the last one.
+        # An exact sample time must be returned unchanged, also the last one.
         low, fraction = (
             np.where(fraction > 1 - 1e-9, low + 1, low),
             np.where(fraction > 1 - 1e-9, 0.0, fraction),
@@ -140,7 +140,7 @@ class Clip:
 
 
 def _blend(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Transforms (n, J, 4, 4) between a and b at fractions (n,); rotation, stretch and translation each on their own."""
+    """Transforms (n, J, 4, 4) between a and b at fractions (n,); rotation, stretch and translation each separately."""
     fraction = fraction[:, None, None, None]
     (turn_a, stretch_a), (turn_b, stretch_b) = (polar(m[..., :3, :3]) for m in (a, b))
     turn = from_vector(fraction[..., 0] * to_vector(np.swapaxes(turn_a, -1, -2) @ turn_b))

@@ -4,12 +4,12 @@
 K = 24
 """Vertices of a network strand, root first."""
 SHAPE = 3 * K
-"""Numbers of a strand's vertices or edges, and of the network's answer."""
+"""Numbers of a strand's vertices or edges, and of the network's output."""
 CODE = 32
 """Numbers that stand for a strand's rest shape."""
 PLAIN_STRAND = 2 + 2 * CODE + 3 + 1
-"""What the paper's network reads of a strand: uv, its code and its lock's, root normal, length."""
+"""Inputs of the paper's network for a strand: uv, its code and its lock's, root normal, length."""
 STRAND = PLAIN_STRAND + SHAPE
-"""What ours reads: that, and the strand's rest points."""
+"""Inputs of ours: these, and the strand's rest points."""
 HIDDEN = 256
 """Width of both hidden layers."""

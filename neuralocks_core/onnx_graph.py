@@ -7,11 +7,11 @@ from neuralocks_core.errors import NeuralocksError
 
 OPSET = 17
 IR_VERSION = 8
-"""Of the file: the oldest that goes with OPSET, for the oldest onnxruntime that a user may have."""
+"""The file's version: the oldest that OPSET allows, for the oldest onnxruntime that a user may have."""
 
 
 class OnnxGraph:
-    """A graph under construction; values are known by their names.
+    """A graph under construction; values are identified by name.
 
     Args:
         name: of the graph.
@@ -31,10 +31,10 @@ class OnnxGraph:
         self.name, self.nodes, self.constants = name, [], []
 
     def constant(self, name: str, array: np.ndarray) -> str:
-        """An array under this name, which is returned.
+        """Add an array under this name; returns the name.
 
         Raises:
-            NeuralocksError: it holds NaN or infinity, as of a training that ran away.
+            NeuralocksError: it holds NaN or infinity, as after a training that diverged.
         """
         if not np.isfinite(array).all():
             raise NeuralocksError(f"{self.name}: NaN or infinity in {name}; train with a smaller --set rate")
@@ -42,12 +42,12 @@ class OnnxGraph:
         return name
 
     def node(self, kind: str, inputs: list[str], output: str, **attributes) -> str:
-        """One operation of ONNX; the name of its only output is returned."""
+        """Add one ONNX operation; returns the name of its only output."""
         self.nodes.append(self.helper.make_node(kind, inputs, [output], **attributes))
         return output
 
     def finish(self, inputs: dict[str, tuple], outputs: dict[str, tuple]) -> bytes:
-        """The checked graph; inputs and outputs are names -> shapes, where a name in a shape is any size."""
+        """The checked graph; inputs and outputs are names -> shapes, where a name in a shape stands for any size."""
         import onnx
 
         def describe(values):
@@ -65,19 +65,19 @@ class OnnxGraph:
 
 
 class OnnxWeights:
-    """What a graph holds.
+    """The weights of a graph.
 
     Attributes:
-        constants: arrays by name, those stored in float16 under the name that is computed with, all in float32.
-        layers: (in, out) weight and (out,) bias of the linear layers, by the name of what they give, in the order in which
-            they are computed.
+        constants: arrays by name, all in float32; those stored in float16 have the name that the computation uses.
+        layers: (in, out) weight and (out,) bias of the linear layers, by the name of their output, in the order in which they
+            are computed.
 
     Args:
         graph: the ONNX file.
         name: what messages call it.
 
     Raises:
-        NeuralocksError: it is damaged, or its numbers lie in other files.
+        NeuralocksError: it is damaged, or its numbers are in other files.
     """
 
     def __init__(self, graph: bytes, name: str):

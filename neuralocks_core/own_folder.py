@@ -10,10 +10,10 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def own_folder(name: str) -> Path:
-    """The folder `name`, made if need be, in one among the temporary files that nobody but its user can put code into.
+    """The folder `name`, created if needed, in a temporary folder into which only its user can put code.
 
     Raises:
-        NeuralocksError: there can be none.
+        NeuralocksError: no such folder can be made.
     """
     owner = os.getuid() if hasattr(os, "getuid") else None
     remedy = "set TMPDIR to a folder of yours that can be written"
@@ -21,7 +21,7 @@ def own_folder(name: str) -> Path:
         mine = Path(tempfile.gettempdir()) / f"neuralocks-{'cache' if owner is None else owner}"
         mine.mkdir(mode=0o700, exist_ok=True)
         found = mine.lstat()
-        # Where users share that folder, another one may have been there first. Windows gives each a folder.
+        # If users share the temporary folder, another user may have been first. Windows gives each user a folder.
         if not stat.S_ISDIR(found.st_mode) or owner is not None and (found.st_uid != owner or found.st_mode & 0o077):
             raise NeuralocksError(f"{mine}: is not a folder of yours alone; remove it, or {remedy}")
         (mine / name).mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,7 @@ def own_folder(name: str) -> Path:
 
 
 def writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, which is made if need be."""
+    """Whether files can be created in a folder; creates the folder if needed."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

@@ -4,7 +4,7 @@
 from collections.abc import Callable
 
 Progress = Callable[[int, int, str], None]
-"""Called now and then with (done, total, message); what it raises stops the work."""
+"""Called now and then with (done, total, message); an exception that it raises stops the work."""
 
 
 def silent(done: int, total: int, message: str) -> None:
@@ -12,5 +12,5 @@ def silent(done: int, total: int, message: str) -> None:
 
 
 def within(say: Progress, begin: int, end: int) -> Progress:
-    """The Progress of a part of longer work, which goes from `begin` to `end` in thousandths of it."""
+    """The Progress of a part of longer work, from `begin` to `end` in thousandths of the whole."""
     return lambda done, total, message: say(begin + (end - begin) * done // total, 1000, message)

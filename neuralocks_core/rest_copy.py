@@ -9,7 +9,7 @@ NAME = "neuralocks_rest"
 
 
 def never_written(values: np.ndarray) -> np.ndarray:
-    """Which points (P,) of a copy (P, 3) have none: zeros, as whoever adds points fills all attributes with. A point that
-    rests at the origin has a negative zero first.
+    """Which points (P,) of a copy (P, 3) were never written: zeros, with which added points fill all attributes. A point that
+    rests at the origin is stored with a negative zero first.
     """
     return ~(values.any(axis=1) | np.signbit(values[:, 0]))

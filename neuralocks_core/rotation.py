@@ -6,9 +6,9 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 
 NEARLY = 1e-4
-"""How far the columns' products may be from a rotation's for two of Newton's steps to reach rounding."""
+"""How far the columns' products may be from a rotation's so that two Newton steps reach rounding."""
 FLAT = 1e-9
-"""A scale below it is none: there is no turn to read."""
+"""A scale below this counts as zero: no rotation can be read."""
 
 
 class Mirrored(NeuralocksError):
@@ -16,7 +16,7 @@ class Mirrored(NeuralocksError):
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length one; of no length, where they have none."""
+    """Vectors (..., 3) of length one; zero vectors stay zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
@@ -35,7 +35,7 @@ def from_quaternion(quaternions: np.ndarray) -> np.ndarray:
 
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) wxyz of the rotation b and then a, of quaternions (..., 4) of any length."""
+    """Unit quaternions (..., 4) wxyz of the rotation b followed by a, from quaternions (..., 4) of any length."""
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
     result = np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
@@ -43,8 +43,8 @@ def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (T, ..., 4) with the signs that let each go on from the one before: between q and -q, which are one
-    rotation, what blends linearly passes through zero.
+    """Quaternions (T, ..., 4) with signs that make each continue the one before. q and -q are one rotation, and linear blending
+    between them would pass through zero.
     """
     flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0
     signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
@@ -69,9 +69,7 @@ def from_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any
-    normal.
-    """
+    """Smallest rotation (..., 3, 3) that takes directions a (..., 3) to b (..., 3); opposite ones turn about any normal."""
     return from_quaternion(quaternion_between(a, b))
 
 
@@ -82,7 +80,7 @@ def quaternion_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     a, b = np.broadcast_arrays(a, b)
     cosine = np.sum(a * b, axis=-1, keepdims=True)
     axis = np.cross(a, b)
-    # At 180 degrees the cross product vanishes; any axis at right angles to a serves.
+    # At 180 degrees the cross product vanishes; any axis perpendicular to a will do.
     fallback = np.cross(a, np.where(np.abs(a[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     quaternion = np.concatenate([1 + cosine, axis], axis=-1)
     opposite = cosine < -1 + 1e-12
@@ -90,7 +88,7 @@ def quaternion_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def sizes(transforms: np.ndarray) -> np.ndarray:
-    """Signed sizes (...) of transforms (..., 4, 4): edge of the cube that a unit cube becomes, negative if mirrored."""
+    """Signed sizes (...) of transforms (..., 4, 4): edge of a cube as large as the transformed unit cube, negative if mirrored."""
     return np.cbrt(volumes(np.asarray(transforms, float)[..., :3, :3]))
 
 
@@ -101,7 +99,7 @@ def volumes(linear: np.ndarray) -> np.ndarray:
 
 
 def flat(linear: np.ndarray, least: float = FLAT) -> np.ndarray:
-    """Which matrices (..., 3, 3) scale an axis by less than `least`, as a joint that hides what it moves does, (...) bool."""
+    """Which matrices (..., 3, 3) scale an axis by less than `least`, as joints that hide what they move do, (...) bool."""
     return np.linalg.norm(linear, axis=-2).min(axis=-1) < least
 
 
@@ -113,8 +111,8 @@ def transformed(points: np.ndarray, transform: np.ndarray) -> np.ndarray:
 def inverse(transform: np.ndarray) -> np.ndarray:
     """Inverse (4, 4) of one affine transform (4, 4), written out.
 
-    numpy's own wakes, in Blender 4, a thread that then waits in a loop on a core that hair is computed on; and its last
-    bits differ from one numpy to the next.
+    In Blender 4, numpy's own wakes a thread that then spins on a core needed for computing hair; and its last bits differ
+    between versions of numpy.
 
     Raises:
         NeuralocksError: the transform is flat or not finite.
@@ -134,7 +132,7 @@ def inverse(transform: np.ndarray) -> np.ndarray:
 
 
 def inverses(transforms: np.ndarray) -> np.ndarray:
-    """Inverses (..., 4, 4) of affine transforms (..., 4, 4) that are not flat, written out for the reasons of `inverse`."""
+    """Inverses (..., 4, 4) of affine transforms (..., 4, 4) that are not flat, written out for the same reasons as `inverse`."""
     linear = transforms[..., :3, :3]
     a, b, c = (linear[..., column] for column in range(3))
     result = np.zeros_like(transforms)
@@ -152,17 +150,17 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def relative_to_parents(world: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """Transforms of joints (..., J, 4, 4) relative to their parents' (J,), -1 for a root, out of those in the world."""
+    """Transforms of joints (..., J, 4, 4) relative to their parents (J,), -1 for a root, from world transforms."""
     local, below = world.copy(), parents >= 0
     local[..., below, :, :] = np.linalg.inv(world[..., parents[below], :, :]) @ world[..., below, :, :]
     return local
 
 
 def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
-    """Rotation (..., 3, 3) of transforms (..., 4, 4) after scale is divided out.
+    """Rotation (..., 3, 3) of transforms (..., 4, 4), with scale divided out.
 
     Raises:
-        Mirrored: a transform is.
+        Mirrored: a transform is mirrored.
         NeuralocksError: a transform is flat or not finite; `subject` names it.
     """
     linear = np.asarray(transforms, float)[..., :3, :3]
@@ -174,8 +172,8 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
     linear = linear / scale
     if (volumes(linear) <= 0).any():
         raise Mirrored(f"{subject}: a transform is mirrored (negative scale); apply or remove the negative scale")
-    # The nearest rotation, so that shear from non-uniform scale cannot leak in. What is one up to rounding gets there by
-    # Newton's iteration, whose error is squared in each step: a fifth of the time.
+    # The nearest rotation, so that shear from non-uniform scale cannot leak in. Matrices that are rotations up to rounding are
+    # refined by Newton's iteration, whose error is squared in each step: a fifth of the time.
     square = np.swapaxes(linear, -1, -2) @ linear
     if np.abs(square - np.eye(3)).max(initial=0.0) < NEARLY:
         once = 1.5 * linear - 0.5 * linear @ square
@@ -185,8 +183,8 @@ def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndar
 
 
 def polar(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (..., 3, 3) as the nearest rotation times a stretch, both (..., 3, 3). The stretch of a mirrored one is
-    turned inside out; a flat one has one, too: a joint may be scaled to nothing to hide what hangs on it.
+    """Matrices (..., 3, 3) as the nearest rotation times a stretch, both (..., 3, 3). The stretch of a mirrored one is negative. A
+    flat one has a rotation, too: a joint may be scaled to zero to hide what it carries.
     """
     u, _, vt = np.linalg.svd(linear)
     turns = u @ vt
@@ -195,7 +193,7 @@ def polar(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scipy_rotation() -> type:
-    """SciPy's rotations: they take longer to import than all else that a network needs to run."""
+    """SciPy's rotations, imported on use: they take longer to import than everything else that running a network needs."""
     from scipy.spatial.transform import Rotation
 
     return Rotation

@@ -28,8 +28,8 @@ IN = {
     "encoder.onnx": {"shape": SHAPE},
     "tail.onnx": {"strand_part": HIDDEN, "anchor": SHAPE, "edges": SHAPE},
 }
-"""What the graphs read, and how many numbers in a row. `strand.onnx` reads `StrandModel.strand_size` of a strand, `frame.onnx`
-the boundary vector, and the tail all that it gives, too."""
+"""Inputs of the graphs, with their numbers per row. `strand.onnx` reads `StrandModel.strand_size` numbers of a strand, `frame.onnx`
+the boundary vector, and the tail also reads all outputs of the frame graph."""
 OUT = {
     "encoder.onnx": {"code": CODE},
     "strand.onnx": {"strand_part": HIDDEN},
@@ -37,9 +37,9 @@ OUT = {
     "tail.onnx": {"offsets": SHAPE, "displacement": SHAPE},
 }
 CHANGED = {"middle": HIDDEN, "out": SHAPE}
-"""What the frame gives besides, where it changes the weights behind it."""
+"""Further outputs of the frame graph if it changes the weights of the tail."""
 LARGEST = 1e7
-"""Answers whose root mean square is larger are of no hair, in whatever units it was made."""
+"""Outputs with a larger root mean square cannot be hair, whatever its units."""
 
 
 class StrandModel:
@@ -47,15 +47,15 @@ class StrandModel:
 
     Attributes:
         spec: of the boundary vectors that it reads.
-        anchored: whether its answers are measured from that for the bind pose.
+        anchored: whether its outputs are measured relative to that for the bind pose.
         strand_size: how many numbers of `strand_session.strand_inputs` it reads, from the first.
 
     Args:
         file: a model read by `model.read`.
-        threads: chunks of strands worked on at a time; the result does not depend on it.
+        threads: number of chunks of strands processed at a time; the result does not depend on it.
 
     Raises:
-        NeuralocksError: its description or its graphs are none of a strand model.
+        NeuralocksError: its description or graphs are not those of a strand model.
     """
 
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
@@ -73,10 +73,10 @@ class StrandModel:
 
     @classmethod
     def load(cls, path: str | os.PathLike | None = None, threads: int | None = None) -> "StrandModel":
-        """Load a file, or the shipped model where `path` is None.
+        """Load a file, or the shipped model if `path` is None.
 
         Raises:
-            NeuralocksError: it is missing, damaged, of a later format or no model of strands.
+            NeuralocksError: it is missing, damaged, of a later format or not a model of strands.
         """
         return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
 
@@ -85,8 +85,8 @@ class StrandModel:
         return BoundarySampler(self.spec, character, clip)
 
     def another_body(self, character: Character, clip: Clip) -> str:
-        """By which measure a body in a clip differs most from those that this model has learned; "" where it is like one of
-        them, or the card does not tell.
+        """The measure in which a body in a clip differs most from those that this model has learned; "" if it is like one of
+        them, or if the card does not say.
         """
         return another_body(character, clip.shape[0], self.meta["training"].get("measures"))
 
@@ -95,7 +95,7 @@ class StrandModel:
         return known_body(character, clip.shape[0], self.meta["training"].get("measures"))
 
     def run(self, graph: str, output: str, **inputs: np.ndarray) -> np.ndarray:
-        """One output of one graph, float32, of arrays by the names of its inputs: graphs, names and shapes are those of
+        """One output of one graph, float32, from arrays by the names of its inputs: graphs, names and shapes are those of
         docs/architecture.md, The model file.
 
         Raises:
@@ -105,9 +105,8 @@ class StrandModel:
         return self._sane(graph, self._computed(graph, [output], inputs)[0], shape)
 
     def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
-        """What all strands share in a frame, of a boundary vector (spec.size,), by the names under which the tail reads it:
-        `frame_part` (1, 256) float32, and where the frame changes the weights behind it more (docs/architecture.md, The
-        model file).
+        """What all strands share in a frame, from a boundary vector (spec.size,), by the tail's input names: `frame_part` (1, 256)
+        float32, and more if the frame changes the weights of the tail (docs/architecture.md, The model file).
 
         Raises:
             NeuralocksError: it cannot be computed, is not finite, or too large for hair.
@@ -120,10 +119,10 @@ class StrandModel:
         }
 
     def _check_graphs(self) -> None:
-        """Refuse graphs that are not those of docs/architecture.md, before any of them is asked.
+        """Refuse graphs that are not those of docs/architecture.md, before any of them is run.
 
         Raises:
-            NeuralocksError: one reads or gives something else.
+            NeuralocksError: one has other inputs or outputs.
         """
         plain = [value.shape[1:] for value in self._sessions["strand.onnx"].get_inputs()] == [[PLAIN_STRAND]]
         self.strand_size = PLAIN_STRAND if plain else STRAND
@@ -149,18 +148,18 @@ class StrandModel:
     def _computed(self, graph: str, outputs: list[str], inputs: dict[str, np.ndarray]) -> list[np.ndarray]:
         try:
             return self._sessions[graph].run(outputs, inputs)
-        except Exception as error:  # onnxruntime raises its own bare types for whatever goes wrong in a graph
+        except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph
             raise NeuralocksError(
                 f"{self.file.path}: {graph} cannot be computed ({_fact(error)}); get an undamaged copy of the model"
             ) from None
 
     def _sane(self, graph: str, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-        """The answer of a graph, if it can be of hair: NaN and infinity would go on into every file."""
+        """The output of a graph, if it can be hair: NaN and infinity would spread into every file."""
         if values.shape != shape:
             raise NeuralocksError(
                 f"{self.file.path}: {graph} gives {values.shape} numbers where {shape} belong; get an undamaged copy"
             )
-        # A product with itself, while it lies in the cache, costs a hundredth of what made it; NaN is below nothing.
+        # A dot product with itself, still in the cache, costs a hundredth of computing the output; NaN compares false.
         if not np.vdot(values, values) <= LARGEST**2 * values.size:
             raise NeuralocksError(f"{self.file.path}: {graph} gives no finite hair; get an undamaged copy of the model")
         return values
@@ -174,7 +173,7 @@ class StrandModel:
             for chunk in left:
                 function(chunk)
 
-        # All threads, the caller's too, take chunks until none is left: waking one for each chunk costs more than a chunk.
+        # All threads, the caller's too, process chunks until none is left: waking one for each chunk costs more than a chunk.
         others = [self._pool.submit(work) for _ in range(min(self.threads, len(todo)) - 1)]
         try:
             work()
@@ -184,17 +183,17 @@ class StrandModel:
             other.result()
 
     def map(self, function: Callable, items) -> Iterable:
-        """Results of calls on this model's threads, in order; a single one is made where it stands."""
+        """Results of calls on this model's threads, in order; a single call runs in the caller's thread."""
         return map(function, items) if len(items) < 2 else self._pool.map(function, items)
 
 
 def cores() -> int:
-    """Threads that are worth starting: one a core, and at most eight, since each has arrays of its own."""
+    """Threads that are worth starting: one per core, and at most eight, since each has arrays of its own."""
     return min(os.cpu_count() or 1, 8)
 
 
 def chunks(count: int) -> list[slice]:
-    """The chunks of `count` strands. They lie the same in every frame and on any number of threads: the sums in a matrix
+    """The chunks of `count` strands. They are the same in every frame and for any number of threads: the sums in a matrix
     product may depend on its height.
     """
     return [slice(low, min(low + CHUNK, count)) for low in range(0, count, CHUNK)]
@@ -204,21 +203,21 @@ def graph_session(file: model_file.ModelFile, name: str):
     """The onnxruntime session of one graph of a model.
 
     Raises:
-        NeuralocksError: it is no graph that onnxruntime can load.
+        NeuralocksError: onnxruntime cannot load it.
     """
     # Its official builds report sessions and the models' names to their maker, and keep an identifier in the home folder,
-    # unless this is set before the first import; where that came too late, and on Windows, the call silences what follows.
+    # unless this is set before the first import; if that came too late, and on Windows, the call below stops further reports.
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
     import onnxruntime
 
     onnxruntime.disable_telemetry_events()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
-    options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves a hundredth of the time at most
-    options.log_severity_level = 4  # what goes wrong is raised, too
+    options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves at most a hundredth of the time
+    options.log_severity_level = 4  # errors are raised anyway
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime raises its own bare types for whatever is wrong with a graph
+    except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph
         raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({_fact(error)}); get an undamaged copy") from None
 
 

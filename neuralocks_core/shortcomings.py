@@ -4,18 +4,18 @@
 from collections.abc import Mapping
 
 HELD, HELD_BEGUN = "held out", "held out, begun with"
-"""Under what a strand model's report has the gauge on motion and strands that were never learned from."""
+"""Keys of a strand model's report for the gauge on held-out motion and strands."""
 NO_BETTER = 1.02
-"""So many times the error of the model that a training began with is more than chance."""
+"""A training whose error is more than this many times that of the model it began with is reported; less may be chance."""
 
 
 def shortcomings(subject, kind: str, report: Mapping) -> list[str]:
     """Notes for a user on a model that learned too little to be worth using; mostly none.
 
     Args:
-        subject: what the notes begin with, the model's path say.
+        subject: what the notes begin with, such as the model's path.
         kind: `strands` or `rig`.
-        report: of the model, as training left it.
+        report: report of the model, as training wrote it.
     """
     facts = _of_strands(report) if kind == "strands" else _of_a_rig(report)
     return [f"{subject}: {fact}; train longer, or with other options" for fact in facts]
@@ -53,7 +53,7 @@ def _of_a_rig(report: Mapping) -> list[str]:
 
 
 def _number(values, *names: str) -> float | None:
-    """The number under names in dicts, each in the one before; None where there is none."""
+    """The number under nested names in dicts; None if there is none."""
     for name in names:
         values = values.get(name) if isinstance(values, Mapping) else None
     return values if isinstance(values, int | float) and not isinstance(values, bool) else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A few numbers that tell whether two large sets of values are the same but for rounding.
+"""A few numbers that tell whether two large sets of values are the same except for rounding.
 
 A hash cannot, since machines round differently. Here a change of any values, by d in the root of the sum of squares, moves
 each number by about d / sqrt(n), because the signs are random (Johnson and Lindenstrauss).
@@ -13,7 +13,7 @@ SUMS = 3
 
 
 def sketch(blocks: Iterable[np.ndarray]) -> str:
-    """Arrays, one after the other and of any shapes, in words: how many values, their rms, and sums under chosen signs."""
+    """Text for arrays of any shapes, one after another: number of values, their rms, and sums with pseudorandom signs."""
     chosen, count, square, sums = np.random.PCG64(0), 0, 0.0, np.zeros(SUMS)
     for block in blocks:
         values = np.asarray(block, float).ravel()
@@ -26,7 +26,7 @@ def sketch(blocks: Iterable[np.ndarray]) -> str:
 
 
 def alike(one: str, other: str, near: float) -> bool:
-    """Whether two sketches are of the same values, but for rounding by `near` of their rms; ValueError if one is none."""
+    """Whether two sketches are of the same values, except for rounding by `near` of their rms; ValueError if one is no sketch."""
     a, b = (np.array([float(number) for number in text.split()]) for text in (one, other))
     if len(a) != SUMS + 2 or len(b) != SUMS + 2:
         raise ValueError("no sketch")

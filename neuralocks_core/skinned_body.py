@@ -27,7 +27,7 @@ class Body:
 
     @classmethod
     def joined(cls, parts: Sequence["Body"]) -> "Body | None":
-        """Several bodies as one, whose shapes of one name are one shape; None where there are none."""
+        """Several bodies as one, in which shapes with the same name become one shape; None if there are none."""
         if not parts:
             return None
         ends = np.cumsum([0] + [len(part.points) for part in parts])
@@ -45,7 +45,7 @@ class Body:
         )
 
     def part(self, vertices: np.ndarray, triangles: np.ndarray) -> "Body":
-        """Some of the vertices (v,), with triangles (f, 3) whose corners are counted among these."""
+        """Some of the vertices (v,), with triangles (f, 3) whose corners are indices into these."""
         return Body(
             self.points[vertices],
             triangles,
@@ -55,10 +55,10 @@ class Body:
         )
 
     def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
-        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; none stand for zeros."""
+        """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; None means zeros."""
         points = self.points
         for offsets, weight in zip(self.shapes.values(), () if weights is None else weights):
-            if weight:  # a face has hundreds, of which a frame shows a few
+            if weight:  # a face has hundreds, of which a frame uses a few
                 points = points + weight * offsets
         return points
 

@@ -10,13 +10,12 @@ from neuralocks_core.motion import Clip
 
 
 class SmoothMotion:
-    """A clip whose motion between its samples, and outside of them, is that of `ClipSpline`, as `Track` has it of a few
-    joints.
+    """A clip whose motion between its samples, and outside them, is that of `ClipSpline`, as `Track` has it for a few joints.
 
-    `Clip.at` goes along straight lines: what is simulated on it feels a blow at every sample.
+    `Clip.at` is linear between samples: a simulation on it would feel a blow at every sample.
 
     Args:
-        character: whose motion it is; all joints come on with its head before the clip.
+        character: whose motion it is; before the clip, all joints move with its head.
         clip: without cuts.
     """
 
@@ -34,7 +33,7 @@ class SmoothMotion:
 
 
 def _numbers(poses: np.ndarray) -> np.ndarray:
-    """Places, quaternions and stretches (T, J, 16) of world transforms (T, J, 4, 4)."""
+    """Positions, quaternions and stretches (T, J, 16) of world transforms (T, J, 4, 4)."""
     turns, stretch = rotation.polar(poses[..., :3, :3])
     quaternions = rotation.continuous(rotation.to_quaternion(turns))
     return np.concatenate([poses[..., :3, 3], quaternions, stretch.reshape(*poses.shape[:2], 9)], axis=-1)

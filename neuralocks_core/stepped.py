@@ -10,26 +10,26 @@ import numpy as np
 from neuralocks_core.motion import Clip
 
 LONGEST = 1 / 6 + 1e-3
-"""A pose that shows for longer [s] than four frames at 24 a second is a stop."""
+"""A pose that is held longer [s], that is, more than four frames at 24 fps, is a stop."""
 WINDOW, LEAST = 4, 3
-"""Of so many poses in a row at least so many must be held: a frame that is repeated by itself, or a pause, is no step."""
+"""Of WINDOW poses in a row, at least LEAST must be held: a single repeated frame, or a pause, is not a step."""
 ROUNDING = 1e-6
-"""Turns, and places, that differ by no more, in relation to the largest of their entries or to 2, are the same pose: USD
-interpolates in float32 between keys that hold."""
+"""Turns and positions that differ by no more than this, relative to the largest of their entries or to 2, are the same pose: USD
+interpolates in float32 between equal keys."""
 STEP = 10.0
-"""Poses that differ by no more than so many times that are no steps, but slow motion."""
+"""Poses that differ by no more than this many times `ROUNDING` are not steps, but slow motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stepped:
-    """A clip as the motion that goes smoothly from each pose that it holds to the next. What does not hold stays as it is.
+    """A clip as the motion that goes smoothly from each pose that it holds to the next. Parts that hold no poses stay as they are.
 
-    Hair that felt each step would start and stop with it. It holds with the pose: at a time at which a pose is held it is as at
-    the first one.
+    Hair that felt each step would start and stop with it. Instead, it holds with the pose: while a pose is held, hair is as at
+    the pose's first time.
 
     Attributes:
-        clip: the samples at which poses first show; the clip itself where it is not stepped.
-        held: how many samples the poses are held for that are held, ascending, (n,).
+        clip: the samples at which poses first show; the clip itself if it is not stepped.
+        held: numbers of samples for which poses are held, ascending, (n,).
     """
 
     clip: Clip
@@ -43,7 +43,7 @@ class Stepped:
 
         Args:
             clip: without cuts.
-            joints: those of whose motion the hair knows.
+            joints: those whose motion the hair reads.
         """
         ends, count = _held(clip.times, _changes(clip.joints, joints))
         if not len(count):
@@ -58,7 +58,7 @@ class Stepped:
         return cls(own, np.sort(count), clip, clip.times[shown])
 
     def times(self, times: np.ndarray) -> np.ndarray:
-        """When (n,) [s] the smooth motion is where the animation is at times (n,) [s]. Before it begins these are the same."""
+        """Times (n,) [s] of the smooth motion for times (n,) [s] of the animation. Before its beginning both are the same."""
         if not len(self.held):
             return times
         base = self._whole.wrapped(times)
@@ -66,7 +66,7 @@ class Stepped:
 
 
 def _changes(joints: np.ndarray, read: list[int]) -> np.ndarray:
-    """How much the joints that are read change from each sample to the next (T - 1,), 1 being what rounding may do."""
+    """How much the joints that are read change from each sample to the next (T - 1,), in units of what rounding may cause."""
     changes = []
     for part in (slice(3), slice(3, 4)):  # far from the origin places are rounded more, but turns are not
         change, size = np.zeros(len(joints) - 1), 2.0
@@ -79,8 +79,8 @@ def _changes(joints: np.ndarray, read: list[int]) -> np.ndarray:
 
 
 def _held(times: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where poses end that are held while the motion goes on (n,), as the samples after them, and for how many samples each is
-    held (n,). A stop that ends in such motion ends with a pose of it.
+    """Where poses that are held within motion end (n,), as the samples after them, and for how many samples each is held (n,). A
+    stop that ends in such motion ends with a held pose.
     """
     none = np.zeros(0, int)
     first = np.flatnonzero(np.concatenate([[True], changes > 1]))  # of each run of equal samples

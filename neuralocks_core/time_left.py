@@ -5,14 +5,14 @@ import time
 
 
 class TimeLeft:
-    """An estimate that is told how far the work is.
+    """An estimate from reports of how far the work is.
 
-    A resumed job begins in the middle, one step follows another, and some prepare long before they begin: only what is done of
-    a step, since it got going, tells its speed.
+    A resumed job starts in the middle, steps follow each other, and some prepare for long before they start. So the speed is
+    measured only on the current step, from its first progress on.
 
     Args:
-        expected: seconds that the work takes in all, if somebody knows; they count until its speed is known.
-        enough, after: share of the work, and seconds, after which its speed is known: the first part of some takes as long as
+        expected: total seconds of the work, if known; used until its speed is known.
+        enough, after: share of the work, and seconds, after which its speed is known: the first part of some work takes as long as
             many others.
     """
 
@@ -22,8 +22,8 @@ class TimeLeft:
         self._total, self._since, self._now = 1.0, None, 0.0
 
     def told(self, done: float, total: float = 1.0, now: float | None = None) -> None:
-        """So much of `total` is done, `now` on the clock of `time.monotonic`. Another total, or less done than before, is of
-        another step.
+        """Report that `done` of `total` is done, at `now` on the clock of `time.monotonic`. Another total, or less done than
+        before, means another step.
         """
         now = time.monotonic() if now is None else now
         if self._since is None or total != self._total or done < self._last or done == self._first:
@@ -32,7 +32,7 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float | None:
-        """Seconds left when it was told last; None as long as nobody knows."""
+        """Seconds left at the last report; None while unknown."""
         gone = self._last - self._first
         if gone > self._enough * self._total and self._now - self._since >= self._after:
             return (self._now - self._since) * (self._total - self._last) / gone

@@ -10,8 +10,8 @@ from neuralocks_core.motion import Clip
 
 
 class Track:
-    """Where a character's head is, and how some of its joints are turned, at any time: between the samples of a clip and
-    outside of them as `ClipSpline` has it.
+    """Position of a character's head, and rotations of some joints, at any time: between the samples of a clip and outside them
+    as in `ClipSpline`.
 
     Args:
         character: whose motion it is.

@@ -18,7 +18,7 @@ def start_warp(device: str) -> ModuleType:
         device: "cpu", "cuda" or "cuda:N".
 
     Raises:
-        NeuralocksError: warp is not installed, has no such device, or no folder for what it compiles.
+        NeuralocksError: warp is not installed, lacks this device, or has no folder for compiled code.
     """
     try:
         import warp as wp
@@ -36,7 +36,7 @@ def start_warp(device: str) -> ModuleType:
 
 
 def _init(wp: ModuleType) -> None:
-    """Initialise warp, with another folder for what it compiles where its own cannot be written."""
+    """Initialise warp, with another folder for compiled code if its own is not writable."""
     with suppress(OSError):
         wp.init()
         if writable(Path(wp.config.kernel_cache_dir)):

@@ -2,9 +2,9 @@
 """Which joint is the head, which the shoulders: semantic names found from a rig's own names and hierarchy.
 
 The names are those that VRM and the game engines share. Sides are found by token (`Left`, `L`, `.L`, `l` before a
-capital), parts by their usual names (`limb_names`; by `limb_shapes` where none is named like one, and by `limb_chains`
-where only the first joint is), and the trunk by hierarchy: the upper chest is where the paths from the head and from the arms
-meet.
+capital), parts by their usual names (`limb_names`; if no joint has one, by shape, `limb_shapes`; if only a limb's first joint
+has one, by hierarchy, `limb_chains`), and the trunk by hierarchy: the upper chest is where the paths from the head and from the
+arms meet.
 """
 
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ class Humanoid(Mapping):
             ) from None
 
     def get(self, name: str, default=None):
-        """The joint index, or `default` where the rig has no such joint."""
+        """The joint index, or `default` if the rig has no such joint."""
         return self.joints.get(name, default)
 
     def __contains__(self, name) -> bool:
@@ -59,9 +59,7 @@ class Humanoid(Mapping):
         return len(self.joints)
 
     def nearest(self, name: str) -> int:
-        """The joint for `name`, else the next one towards the trunk that the rig has, so that every rig can drive a
-        model.
-        """
+        """The joint for `name`; if the rig lacks it, the next one towards the trunk, so that every rig can drive a model."""
         side = name.split("_")[0] if name.split("_")[0] in ("left", "right") else ""
         ways = {
             "neck": ["neck", "head"],
@@ -82,12 +80,12 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     Args:
         names: joint paths (J), separated by `/`.
         parents: (J,) parent indices, -1 for roots.
-        positions: bind positions (J, 3), which tell the head from what else hangs on the neck, and limbs whose names say
-            nothing.
+        positions: bind positions (J, 3), which tell the head from other joints on the neck, and limbs that names do not
+            identify.
         by_hand: semantic name -> joint path or its last part; overrides what is found.
 
     Raises:
-        NoHead: no joint is named like one.
+        NoHead: no joint is named like a head.
         NeuralocksError: a joint given by hand does not exist.
     """
     names, parents = list(names), np.asarray(parents, int)
@@ -120,7 +118,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
 
 
 def named_head(names) -> str | None:
-    """Path of the joint that names and hierarchy alone say is the head, of joint paths (J) separated by `/`; None without one."""
+    """Path of the joint that is the head by names and hierarchy alone, among joint paths (J) separated by `/`; None if none is."""
     place = {name: index for index, name in enumerate(names)}
     if not place:
         return None
@@ -132,7 +130,7 @@ def named_head(names) -> str | None:
 
 
 def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
-    """What of a limb has no name, below its first joint."""
+    """Find a limb's unnamed joints below its first joint."""
     for side in ("left", "right"):
         for first, *rest in (tuple(f"{side}_{part}" for part in limb) for limb in LIMBS.values()):
             if first not in joints or rest[0] in joints:
@@ -145,14 +143,14 @@ def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
 
 
 def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions) -> None:
-    """Arms where no arm, and legs where no leg was found."""
+    """Find arms if no arm was found by name, and likewise legs."""
     lacking = [limb for limb in LIMBS if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))]
     if lacking:
         found = limbs_by_shape(ancestors(joints["head"], parents), parents, positions, sides)
         for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
             lower = name.replace("upper", "lower")
             if lower != name and joints.get(lower) == joint and reasons[lower] != BY_HAND:
-                del joints[lower]  # `Leg` is the lower one only below another
+                del joints[lower]  # `Leg` is the lower leg only below another leg joint
             put(name, joint, f"by its place, '{leaf(names[joint])}'")
 
 
@@ -162,7 +160,7 @@ def _find_head(names, sides, keys, parents, positions):
         return (key != "head", not key.endswith("head"), depth(i, parents), i)
 
     def beside_head(i):
-        """Tails of hair hang from necks too: the head is in the middle, and farthest along the neck."""
+        """Hair chains hang from necks too: the head is in the middle, and farthest along the neck."""
         at = None if positions is None else np.asarray(positions, float)
         along = 0.0 if at is None or parents[neck] < 0 else (at[i] - at[neck]) @ (at[neck] - at[parents[neck]])
         return (bool(sides[i]), any(bad in keys[i] for bad in _NOT_HEAD), -along, i)
@@ -202,14 +200,14 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     legs = [joints[n] for n in ("left_upper_leg", "right_upper_leg") if n in joints]
     meeting = meet(*arms) if arms else None
     if meeting is not None and ("neck" in keys[meeting] or meeting == joints.get("neck")):
-        # Biped hangs the collar bones from the neck.
+        # Biped parents the collar bones to the neck.
         trunk = [joint for joint in head_way[head_way.index(meeting) + 1 :] if "neck" not in keys[joint]]
         if trunk:
             put("neck", meeting, f"where the ways from head and arms meet, '{leaf(names[meeting])}'")
             put("upper_chest", trunk[0], f"below the neck '{leaf(names[meeting])}'")
     spine = [joint for joint in head_way[1:] if any(word in keys[joint] for word in _SPINE)]
     if arms and spine and (meeting is None or meeting in head_way[head_way.index(spine[-1]) + 1 :]):
-        # Arms that hang from the root, as in exports of deforming bones alone, or from another copy of the trunk.
+        # Arms parented to the root, as in exports of deform bones only, or to another copy of the trunk.
         put("upper_chest", spine[0], f"nearest the head, '{leaf(names[spine[0]])}', since the arms hang from elsewhere")
     if arms:
         put("upper_chest", meeting, "where the ways from head and arms meet")
@@ -219,7 +217,7 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     if "upper_chest" in joints and joints["upper_chest"] in between:
         between = between[: between.index(joints["upper_chest"])]
     named = [joint for joint in between if "neck" in keys[joint]]
-    # `MCH-ROT-neck` over `neck` is a control rig's help, and does not turn with it.
+    # `MCH-ROT-neck` above `neck` is a helper of a control rig, and does not turn with it.
     named = [joint for joint in named if keys[joint] == "neck"] or named
     neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
     put("neck", neck, f"between head and chest, '{leaf(names[neck])}'" if neck is not None else "")

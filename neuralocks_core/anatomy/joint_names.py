@@ -51,12 +51,12 @@ _JAPANESE = {
     "両目": "Eyes",
     "目": "Eye",
 }
-"""MikuMikuDance's standard bones, in files with UTF-8 names; of words within words the longer comes first."""
+"""MikuMikuDance's standard bones, in files with UTF-8 names; a word that contains another comes before it."""
 _TRUNK = {"head", "neck", "spine", "hair"}
-"""With the parts of limbs, words that say what a joint is, however many begin with them."""
+"""With the parts of limbs, words that say what a joint is, even if many joints begin with them."""
 _PREFIX_ENDS = ":|_.-"
 SHARED = 0.9
-"""Share of the joints that begin with a namespace; exporters put a root of their own above them."""
+"""Share of the joints that begin with a namespace; exporters add a root of their own above."""
 
 
 def leaf(path: str) -> str:
@@ -65,8 +65,8 @@ def leaf(path: str) -> str:
 
 
 def carrier(head: str, *paths: str) -> str:
-    """The own name of the joint from which the head and some other joints hang, all given by their paths; where they share
-    none, that of the root above the first of the others. None hangs from itself: the head's carrier is the joint above it.
+    """Own name of the joint above both the head and some other joints, all given by their paths; if they share none, the root
+    above the first of the others. The head itself is never its own carrier.
     """
     others = [path.strip("/").split("/") for path in paths]
     shared = commonprefix([head.strip("/").split("/"), *(names[:-1] for names in others)])
@@ -74,7 +74,7 @@ def carrier(head: str, *paths: str) -> str:
 
 
 def without_namespace(name: str) -> str:
-    """A joint's own name without what stands before a colon."""
+    """A joint's own name without the part before a colon."""
     return name.rsplit(":", 1)[-1]
 
 
@@ -94,7 +94,7 @@ def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
 
 
 def _own_words(name: str) -> list[str]:
-    """Words of a joint's own name, those of MikuMikuDance as their English ones; its `ＩＫ` and `Ｄ` of full width are letters."""
+    """Words of a joint's own name, with MikuMikuDance's in English; its full-width `ＩＫ` and `Ｄ` count as letters."""
     name = without_namespace(unicodedata.normalize("NFKC", name))
     if not name.isascii():
         for word, part in _JAPANESE.items():
@@ -103,7 +103,7 @@ def _own_words(name: str) -> list[str]:
 
 
 def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str]]:
-    """The words of each joint without a namespace's, whose colon is an underscore in USD (`Character1_LeftArm`)."""
+    """The words of each joint without its namespace, whose colon is an underscore in USD (`Character1_LeftArm`)."""
     own = meant | _TRUNK | _SIDES.keys()
     while True:
         firsts = Counter(words[0] for words in names if words)
@@ -114,7 +114,7 @@ def _without_namespace(names: list[list[str]], meant: set[str]) -> list[list[str
 
 
 def _is_namespace(first: str, names: list[list[str]]) -> bool:
-    """Whether nearly all joints begin with this word, or the trunk does: the only head, and with it a neck or spine."""
+    """Whether nearly all joints begin with this word, or the trunk does: the only head, and a neck or spine with it."""
     within = [words for words in names if words[:1] == [first]]
     if len(within) < 4:
         return False
@@ -124,24 +124,24 @@ def _is_namespace(first: str, names: list[list[str]]) -> bool:
 
 
 def _side_and_key(words: list[str]) -> tuple[str, str]:
-    """('left' | 'right' | '', part name without sides and rig prefixes)."""
+    """('left' | 'right' | '', part name without side and rig prefix)."""
     if len(words) == 1 and words[0][:4] == "left" and len(words[0]) > 4:
         words = ["left", words[0][4:]]
     elif len(words) == 1 and words[0][:5] == "right" and len(words[0]) > 5:
         words = ["right", words[0][5:]]
     side = next((_SIDES[word] for word in words if word in _SIDES), "")
     words = [word for word in words if word not in _SIDES and word not in _NOISE]
-    # mGear names a component and then its joint, `shoulder_L0_shoulder_jnt`.
+    # mGear writes the component, then its joint, `shoulder_L0_shoulder_jnt`.
     return side, "".join(word for i, word in enumerate(words) if words[i - 1 : i] != [word])
 
 
 def prefixed_otherwise(names: Sequence[str], there: set[str]) -> tuple[str, ...] | None:
-    """What these names are called among others that begin otherwise: as 'Hair1' is 'rig:Hair1', and 'A_Hair1' 'B_Hair1'.
+    """The same names with another prefix: 'Hair1' may be 'rig:Hair1', and 'A_Hair1' may be 'B_Hair1'.
 
-    A prefix ends at one of `:|_.-`, or is none.
+    A prefix ends at one of `:|_.-`, or is empty.
 
     Returns:
-        One name for each, if there is one way and no more; None also if all are there as they are.
+        One name for each, if there is exactly one way, else None; None also if all are in `there` as they are.
     """
     if there.issuperset(names):
         return None

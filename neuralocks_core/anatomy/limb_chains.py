@@ -4,20 +4,20 @@
 import numpy as np
 
 WHOLE = ("arm", "leg")
-"""Names of a whole limb, whose joints are numbered along it. Joints numbered by another name part one bone."""
+"""Names of a whole limb, whose joints are numbered along it. Joints numbered under any other name divide one bone."""
 PARTS_OF_A_BONE = ("twist", "roll")
 """Words of joints between the two ends of one bone."""
 _APART = 1e-6
-"""Joints nearer to each other than this share of the skeleton's size are at one place."""
+"""Joints closer together than this share of the skeleton's size count as at the same place."""
 
 
 def below_first(first: int, end: int | None, keys, parents, positions, taken=()) -> tuple[int | None, int | None]:
-    """The joints with which a limb's second bone begins and ends; None for what there is not.
+    """Start and end joint of a limb's second bone; None if missing.
 
     Args:
-        first: the joint with which its first bone begins.
-        end: the one with which the second one ends, where it is known.
-        keys: what each joint is called, without numbers and side (J).
+        first: start joint of its first bone.
+        end: end joint of the second bone, if known.
+        keys: names of the joints without numbers and side (J).
         parents: (J,) parent indices, -1 for roots.
         positions: bind positions (J, 3), or None.
         taken: joints that are something else.
@@ -30,8 +30,8 @@ def below_first(first: int, end: int | None, keys, parents, positions, taken=())
 
 
 def _next(joint: int, end: int | None, keys, parents, at: np.ndarray | None, taken) -> int | None:
-    """The joint with which the next bone begins: the next of the same name where that is a whole limb's, else the first on
-    the way to the end, or to the farthest joint.
+    """Start joint of the next bone: the next joint of the same name if that names a whole limb, else the first on the way to the
+    end, or to the farthest joint.
     """
     depth = _depths_below(joint, parents)
     if not depth:
@@ -57,7 +57,7 @@ def _next(joint: int, end: int | None, keys, parents, at: np.ndarray | None, tak
 
 
 def _depths_below(joint: int, parents) -> dict[int, int]:
-    """How deep below a joint each of its descendants is."""
+    """Depth of each descendant below a joint."""
     depth = {}
     for other in range(len(parents)):
         up, steps = other, 0

@@ -15,11 +15,11 @@ PARTS = {
 }
 _COLLARS = tuple(word for word in PARTS["shoulder"] if word != "shoulder")
 _COLLAR_ENDS = ("collarbone", "clavicle")
-"""A collar bone is told by these also after other words: CAT has an `ArmCollarbone`."""
+"""These mean a collar bone even after other words: CAT has an `ArmCollarbone`."""
 
 
 def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
-    """One side's joints by `PARTS`: of several with one name (upperarm01, upperarm02) the one nearest the root.
+    """One side's joints by `PARTS`: of several with the same name (upperarm01, upperarm02) the one nearest the root.
 
     Args:
         side: 'left' or 'right'.
@@ -31,7 +31,7 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
 
     def nearest(option, fits, among):
         hits = [i for i in among if sides[i] == side and fits(keys[i], option)]
-        # `LHipJoint` over `LeftHip` is a mere socket at the pelvis: of several hips, the lowest is the thigh.
+        # `LHipJoint` over `LeftHip` is only a socket at the pelvis: of several hips, the lowest is the thigh.
         sign = -1 if option == "hip" else 1
         return min(hits, key=lambda i: (sign * depth(i, parents), i), default=None)
 
@@ -48,7 +48,7 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
     collar = worded if collar is None else collar
     if found["shoulder"] is None:
         found["shoulder"] = collar
-    if found["lower_leg"] is not None:  # a control of the leg may have its name, and stand nearer to the root
+    if found["lower_leg"] is not None:  # a leg's control may share its name, nearer to the root
         over = first(PARTS["upper_leg"], among=ancestors(found["lower_leg"], parents)[1:])
         found["upper_leg"] = found["upper_leg"] if over is None else over
         above = parents[found["lower_leg"]]
@@ -57,7 +57,7 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
     if found["upper_leg"] is None and _numbered(found["lower_leg"], side, sides, keys, parents):
         found["upper_leg"], found["lower_leg"] = found["lower_leg"], None
     if found["upper_arm"] is None and plain is not None:
-        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm where no
+        # `Shoulder` is the collar bone in one naming and the upper arm in another: it is the arm if no
         # arm is named, unless another bone lies between it and the elbow.
         between = None if collar is not None else _between(plain, found["lower_arm"], keys, parents)
         found["upper_arm"], found["shoulder"] = (plain, collar) if between is None else (between, plain)
@@ -69,7 +69,7 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
 
 
 def ancestors(joint: int, parents) -> list[int]:
-    """A joint and those above it, to the root."""
+    """A joint and its ancestors, up to the root."""
     way = []
     while joint >= 0:
         way.append(int(joint))
@@ -78,12 +78,12 @@ def ancestors(joint: int, parents) -> list[int]:
 
 
 def depth(joint: int, parents) -> int:
-    """How many joints are above a joint."""
+    """Number of joints above a joint."""
     return len(ancestors(joint, parents)) - 1
 
 
 def _between(shoulder: int, elbow: int | None, keys, parents) -> int | None:
-    """The first joint on the way from a shoulder to an elbow that is no part of the shoulder's own bone, if there is one."""
+    """The first joint on the way from a shoulder to an elbow that is not part of the shoulder's own bone, if any."""
     way = [] if elbow is None else ancestors(elbow, parents)
     if shoulder not in way:
         return None

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arms and legs of rigs whose names do not tell them: the pairs of chains that leave the trunk as mirror images."""
+"""Arms and legs of rigs whose names do not identify them: the pairs of chains that leave the trunk as mirror images."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 ALIKE = 0.15
-"""Two chains are mirror images if their ends lie symmetric to the trunk within this share of the way between them."""
+"""Two chains are mirror images if their ends are symmetric about the trunk to within this share of their distance."""
 LONG = 0.3
-"""A limb is at least this share of the way from the head down to the lowest joint long."""
+"""A limb is at least this long, as a share of the distance from the head down to the lowest joint."""
 UPRIGHT = 0.7
-"""Legs go along the trunk if this share of them does. An animal's do not, and it has no arms."""
+"""Legs run along the trunk if this share of them does. An animal's do not, and it has no arms."""
 LEVEL = 0.5
 """A leg's last bone is a foot, and points where the character looks, if at least this share of it is level."""
 COLLAR = 0.13
@@ -28,18 +28,18 @@ class _Pair:
 
 
 def limbs_by_shape(way: list[int], parents, positions, sides) -> dict[str, dict[str, int]]:
-    """Joints of both arms and both legs, 'arm' and 'leg' -> semantic name -> joint; without a pair that is not there, or whose
-    sides cannot be told.
+    """Joints of both arms and both legs: 'arm' and 'leg' -> semantic name -> joint. A pair that is missing, or whose sides cannot
+    be told apart, is left out.
 
-    Legs are the pair of chains that ends lowest, arms the widest of those that leave the trunk nearer to the head. Left and
-    right are told by the names' sides where there are any, else by where the toes point, else as if the character looked
-    along +Z where it stands along Y, and along -Y where it stands along Z, as exporters have it.
+    Legs are the pair of chains that ends lowest, arms the widest of the pairs that leave the trunk nearer to the head. Left and
+    right come from the sides in names if there are any, else from where the toes point; else the character is assumed to face
+    +Z if it stands along Y, and -Y if it stands along Z, as exporters write it.
 
     Args:
         way: the head and its ancestors, to the root.
         parents: (J,) parent indices, -1 for roots.
         positions: bind positions (J, 3), in any unit and up axis.
-        sides: 'left', 'right' or '' of each joint, as names tell it.
+        sides: 'left', 'right' or '' of each joint, from its name.
     """
     parents, at = np.asarray(parents, int), np.asarray(positions, float)
     rise = at[way[0]] - at[way[-1]]
@@ -99,7 +99,7 @@ def _upright(legs: _Pair, at: np.ndarray, up: np.ndarray) -> bool:
 
 
 def _to_the_tip(joint: int, children, parents: np.ndarray, at: np.ndarray) -> list[int]:
-    """The way from this joint to the joint below it that is farthest from it."""
+    """The path from this joint to the joint below it that is farthest from it."""
     below, stack = [], [joint]
     while stack:
         below.append(stack.pop())
@@ -111,7 +111,7 @@ def _to_the_tip(joint: int, children, parents: np.ndarray, at: np.ndarray) -> li
 
 
 def _first_side(pair: _Pair, legs: _Pair | None, at: np.ndarray, up: np.ndarray, sides) -> str | None:
-    """Side of the pair's first chain; None where nothing tells it."""
+    """Side of the pair's first chain; None if nothing tells it."""
     told = [{sides[joint] for joint in chain} - {""} for chain in pair.chains]
     if len(told[0] ^ told[1]) == 2 and all(len(one) == 1 for one in told):
         return told[0].pop()
@@ -128,7 +128,7 @@ def _first_side(pair: _Pair, legs: _Pair | None, at: np.ndarray, up: np.ndarray,
 
 
 def _named(chain: list[int], parents, at: np.ndarray, reach: np.ndarray, parts) -> dict[str, int]:
-    """Joints by part: the limb's two long bones are those of which the shorter one is longest; a hand ends it."""
+    """Joints by part: the limb's two long bones are the pair whose shorter bone is longest; a joint with fingers is its end."""
     collar, upper, lower, end = parts
     fingers = next((i for i in range(2, len(chain)) if np.sum(parents == chain[i]) >= 3), len(chain) - 1)
     bones = np.linalg.norm(np.diff(at[chain[: fingers + 1]], axis=0), axis=1)

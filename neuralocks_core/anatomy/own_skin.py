@@ -6,22 +6,22 @@ import numpy as np
 from neuralocks_core.mesh import connected_pieces
 
 WELDED = 1e-4
-"""Points this near [m] are one: files part a skin along the seams of its texture and between its meshes."""
+"""Points this close [m] count as one: files split a skin along texture seams and between meshes."""
 
 
 def own_skin(points: np.ndarray, triangles: np.ndarray, on_head: np.ndarray, least: float) -> np.ndarray:
-    """Which vertices (V,) bool are of a piece that goes on from the head into neck or trunk; all where there is no such piece.
+    """Which vertices (V,) bool belong to a piece that continues from the head into neck or trunk; all if there is no such piece.
 
-    Hats, horns, glasses, eyes and hair on joints of its own move with the head alone, packs and boots without it. Hair cards,
-    scarves and ribbons may go on into the neck, but are not as large as a head each way. A hood is, and counts as skin.
+    Hats, horns, glasses, eyes and hair on joints of its own move only with the head, backpacks and boots without it. Hair cards,
+    scarves and ribbons may continue into the neck, but are not as large as a head along every axis. A hood is, and counts as skin.
 
     Args:
         points: (V, 3) [m]; triangles: (F, 3).
         on_head: which vertices (V,) move mainly with the head.
         least: size of the smallest head, along each axis [m].
     """
-    # One whole number for each place: many times faster to sort than triples, and different within 100 m.
-    with np.errstate(invalid="ignore"):  # no number is whole of a point light years away
+    # One integer per place: many times faster to sort than triples, and unique within 100 m.
+    with np.errstate(invalid="ignore"):  # a point light years away fits no integer
         lattice = np.round(points / WELDED).astype(np.int64) @ np.array([1, 1 << 21, 1 << 42])
     place = np.unique(lattice, return_inverse=True)[1]
     piece = connected_pieces(place[triangles], len(points))[place]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A standing rest pose for a skeleton that has none: how the body lies in each joint's axes, told by how it moves.
+"""A standing rest pose for a skeleton that has none: how the body lies in each joint's axes, inferred from its motion.
 
-Bones lie in their joint's axes all the time. What goes across them is told by the joints to the left and right, and by
-the hinge about which elbows and knees bend.
+A bone keeps its direction in its joint's axes. The direction across it follows from the joints to the left and right, and
+from the hinge about which elbows and knees bend.
 """
 
 import numpy as np
@@ -12,18 +12,18 @@ from neuralocks_core import rotation
 from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid
 
 NEAR = 40.0
-"""Where the body's axes are this near to those of a joint [degrees], they are meant to be the same."""
+"""If the body's axes are this close to those of a joint [degrees], they are taken to be the same."""
 SHORT = 0.05
-"""Bones that are shorter than this share of the trunk tell no direction."""
+"""Bones that are shorter than this share of the trunk give no direction."""
 INSTEP = np.radians(20)
-"""By how much the way from ankle to toes goes down where soles lie flat."""
+"""How steeply the line from ankle to toes descends when soles lie flat."""
 BENT = 0.05
-"""Elbows and knees that bend less on average (sine) do not tell their hinge."""
+"""Elbows and knees that bend less on average (sine) do not reveal their hinge."""
 _LEFT, _UP, _FRONT = np.eye(3)
 
 
 def rest_from_motion(world: np.ndarray, parents, humanoid: Humanoid) -> np.ndarray | None:
-    """World transforms (J, 4, 4) of a T-pose, Y up and facing +Z; None where left and right cannot be told.
+    """World transforms (J, 4, 4) of a T-pose, Y up and facing +Z; None if left and right cannot be told apart.
 
     Args:
         world: transforms (T, J, 4, 4) of poses, Y up.
@@ -69,13 +69,13 @@ def _across(places: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray, np.ndar
 
 
 def _trunk(turns, places, humanoid: Humanoid, low: np.ndarray, high: np.ndarray) -> dict[int, np.ndarray]:
-    """Joint -> the body's axes (3, 3) in the joint's own, as columns: left, up, front."""
+    """Joint -> the body's axes (3, 3) in the joint's own axes, as columns: left, up, front."""
     names = [name for name in TRUNK if name in humanoid]
     trunk = list(dict.fromkeys(humanoid[name] for name in names))
     way = places[:, trunk]
     least = SHORT * np.linalg.norm(way[:, -1] - way[:, 0], axis=1).mean()
     body = {}
-    for name in reversed(names):  # the lowest name of a joint that has several counts
+    for name in reversed(names):  # if a joint has several names, the lowest counts
         joint = humanoid[name]
         across = low if name == "hips" else low + high if name in ("spine", "chest") else high
         rank = trunk.index(joint)
@@ -87,7 +87,7 @@ def _trunk(turns, places, humanoid: Humanoid, low: np.ndarray, high: np.ndarray)
 
 
 def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray, toes=None) -> dict[int, np.ndarray]:
-    """The same for the joints of an arm or a leg, which in a T-pose lies along a direction (3,); `toes` is a joint of these."""
+    """The same for the joints of an arm or a leg that lies along a direction (3,) in a T-pose; `toes` is the joint of the toes."""
     if any(name not in humanoid for name in names):
         return {}
     upper, lower, end = (humanoid[name] for name in names)
@@ -132,7 +132,7 @@ def _collar(turns, places, humanoid: Humanoid, side: str, along: np.ndarray) -> 
 
 
 def _axes(turns, bone, across, body_bone, body_across) -> np.ndarray:
-    """The same as `_between`, or the nearest axes of the joint where these are near."""
+    """The same as `_between`, or the joint's own nearest axes if these are close."""
     axes = _between(turns, bone, across, body_bone, body_across)
     quarters = Rotation.create_group("O")
     off = np.degrees((quarters.inv() * Rotation.from_matrix(axes)).magnitude())
@@ -140,7 +140,7 @@ def _axes(turns, bone, across, body_bone, body_across) -> np.ndarray:
 
 
 def _between(turns, bone, across, body_bone, body_across) -> np.ndarray:
-    """The body's axes in a joint's own (3, 3), columns, from two directions in the world (T, 3) and what they are in a T-pose."""
+    """The body's axes in a joint's own (3, 3), columns, from two world directions (T, 3) and their T-pose directions."""
     return _frame(_in_joint(turns, bone), _in_joint(turns, across)) @ _frame(body_bone, body_across).T
 
 
@@ -158,7 +158,7 @@ def _frame(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Rotation (3, 3) whose first column goes along one direction (3,), its second in the plane of both."""
     first = first / np.linalg.norm(first) if first.any() else _LEFT
     third = np.cross(first, second)
-    if np.linalg.norm(third) < 1e-9:  # no plane: any will do
+    if np.linalg.norm(third) < 1e-9:  # no plane: any direction will do
         third = np.cross(first, np.eye(3)[np.abs(first).argmin()])
     third = third / np.linalg.norm(third)
     return np.stack([first, np.cross(third, first), third], axis=1)

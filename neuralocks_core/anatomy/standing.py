@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which way is up in a bind pose: how much of the parents' turn is axes, how much is pose, and whether a character lies."""
+"""Which way is up in a bind pose: how much of the parents' turn is axes, how much is pose, and whether a character lies down."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,17 +10,17 @@ from neuralocks_core.rotation import angle_between, rotation_part
 SAME = 1e-6
 """Entries of rotations that differ by less are the same."""
 STRAIGHTER = 45.0
-"""Where the nearest quarter turn leaves legs, or a trunk without legs, farther off the vertical than another one could, by more
-than this [degrees], the nearest of those that do not is meant."""
+"""If the nearest quarter turn leaves legs, or a trunk without legs, farther off the vertical than another one would, by more
+than this [degrees], the nearest quarter turn that does not is used."""
 ASKEW = 10.0
-"""Legs and trunk that are less off the vertical by more than this [degrees], each, where they are than by any quarter turn
-were built askew."""
+"""If legs and trunk are each closer to the vertical as they are than after any quarter turn, by more than this [degrees], the
+character was built askew."""
 NEAR = 30.0
-"""Where nothing tells what is up, the nearest quarter turn is meant if it is this near [degrees]."""
+"""If nothing tells which way is up, the nearest quarter turn is used if it is this close [degrees]."""
 LIES = 60.0
-"""Legs and trunk that are farther off the vertical [degrees] are those of a character that lies."""
+"""A character whose legs and trunk are farther off the vertical than this [degrees] lies down."""
 SHORT = 0.25
-"""Legs shorter than this share of the trunk are none: they were measured from a root on the floor, or by joints of a control."""
+"""Legs shorter than this share of the trunk do not count: they were measured from a root on the floor, or by a control's joints."""
 THIGHS = ("left_upper_leg", "right_upper_leg")
 FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
 
@@ -28,18 +28,18 @@ FEET = ("left_foot", "right_foot", "left_lower_leg", "right_lower_leg")
 def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> np.ndarray:
     """The turn and scale that a character's parents give it in its bind pose.
 
-    Quarter turns are what an exporter did to the axes: the nearest one is taken, or one in which the character stands
-    where it lies by that. By other angles parents turn a character as a joint would: one that leans with its parent has
-    the bind pose of one that stands.
+    Quarter turns are an exporter's conversion of axes: the nearest one is used, or, if the character would lie down after it,
+    one after which it stands. By other angles, parents turn a character as a joint would: a character that leans with its
+    parent has the same bind pose as one that stands.
 
     Args:
-        placed: their turn and scale (3, 3) at rest.
-        joints: places (J, 3) in the bind pose, without them.
+        placed: the parents' turn and scale (3, 3) at rest.
+        joints: joint positions (J, 3) in the bind pose, without the parents.
         humanoid: which of these are head, hips, legs and feet.
         up: the direction (3,) that is up where the parents are.
 
     Returns:
-        (3, 3); `placed` itself, bit for bit, where that turns by quarters or the character was built askew.
+        (3, 3); `placed` itself, bit for bit, if it turns by quarters or the character was built askew.
     """
     here = rotation_part(placed)
     if np.abs(here - np.eye(3)).max() < SAME:
@@ -53,7 +53,7 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
     quarters = sorted(Rotation.create_group("O").as_matrix().round(), key=lambda turn: -round(np.sum(turn * here), 9))
     turn = quarters[0]
     if found:
-        # Legs are upright on two feet and on four; a trunk without legs may be either's.
+        # Legs are upright on bipeds and quadrupeds; a trunk without legs may belong to either.
         others = quarters if legs is not None else [np.eye(3)]
         least = min(tilt(o, found[0]) for o in others) + STRAIGHTER
         if tilt(turn, found[0]) > least:
@@ -66,10 +66,10 @@ def standing(placed: np.ndarray, joints: np.ndarray, humanoid: Humanoid, up: np.
 
 
 def lies(joints: np.ndarray, humanoid: Humanoid, up: np.ndarray) -> tuple[bool, bool]:
-    """Whether a character lies in its bind pose, and whether that is sure: without known legs it may be on all fours.
+    """Whether a character lies down in its bind pose, and whether that is certain: without known legs it may be on all fours.
 
     Args:
-        joints: places (J, 3) in the bind pose.
+        joints: joint positions (J, 3) in the bind pose.
         humanoid: which of these are head, hips, legs and feet.
         up: the direction (3,) that is up there.
     """
@@ -84,10 +84,10 @@ def _tilt(axis: np.ndarray, up: np.ndarray) -> float:
 
 
 def _axes(joints: np.ndarray, humanoid: Humanoid) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Directions (3,) from the feet to the upper ends of the legs and from the hips to the head; None where these are not known."""
+    """Directions (3,) from the feet to the upper ends of the legs and from the hips to the head; None if unknown."""
     feet, thighs = ([joints[humanoid[name]] for name in names if name in humanoid] for names in (FEET, THIGHS))
     head, hips = (joints[humanoid[name]] if name in humanoid else None for name in ("head", "hips"))
-    # The hips, where the ways from head and legs meet, may be a root on the floor, below the feet.
+    # The hips, where the paths from head and legs meet, may be a root on the floor, below the feet.
     top = np.mean(thighs, axis=0) if thighs else hips
     legs = top - np.mean(feet, axis=0) if feet and top is not None else None
     trunk = head - hips if head is not None and hips is not None else None

@@ -11,17 +11,17 @@ from neuralocks_core.anatomy.rest_from_motion import rest_from_motion
 from neuralocks_core.anatomy.standing import FEET, lies
 
 AXES = {"Y": np.array([0.0, 1, 0]), "Z": np.array([0.0, 0, 1])}
-"""The directions that files have up."""
+"""The up directions that files use."""
 UPRIGHT = np.cos(np.radians(60))
-"""A trunk along Y is one that is less off it, as limbs may lie anyhow at rest; but legs that go up stand nowhere."""
+"""A trunk stands along Y if it is closer to Y than this, since limbs may point anywhere at rest; legs that point up never stand."""
 ALONG = np.cos(np.radians(30))
-"""Along other axes, legs and trunk both."""
+"""The same for other axes, where both legs and trunk count."""
 MOSTLY = np.cos(np.radians(45))
-"""A pose stands along an axis if it is less off it, from feet to head."""
+"""A pose stands along an axis if its line from feet to head is closer to the axis than this."""
 SELDOM = 0.02
-"""The share of poses that may be so by chance."""
+"""The share of poses that may stand along an axis by chance."""
 POSES = 200
-"""Poses of a motion that are looked at."""
+"""Number of poses of a motion that are examined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Upright:
 
     Attributes:
         rest: world transforms (J, 4, 4) of a standing pose, Y up.
-        world: those of the motion (T, J, 4, 4), Y up.
+        world: world transforms of the motion (T, J, 4, 4), Y up.
         up: 'Y' or 'Z', which of the file's axes was up.
         guessed: whether `rest` is taken from the motion, because the file's own rest pose does not stand.
     """
@@ -42,11 +42,11 @@ class Upright:
 
 
 def upright(rest: np.ndarray, world: np.ndarray, parents, humanoid: Humanoid) -> Upright:
-    """Turn a rest pose (J, 4, 4) and a motion (T, J, 4, 4); both come back as they are where the rest pose stands along Y.
+    """Turn a rest pose (J, 4, 4) and a motion (T, J, 4, 4); both are returned unchanged if the rest pose stands along Y.
 
     Args:
         rest: world transforms of the rest pose.
-        world: those of the motion, not empty.
+        world: world transforms of the motion, not empty.
         parents: (J,) parent indices, -1 for roots.
         humanoid: which joints are which.
     """
@@ -68,7 +68,7 @@ def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
 
 
 def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
-    """The axis (3,) along which a rest pose, places (J, 3), stands, Y for a head alone; None where it stands along none."""
+    """Axis (3,) along which a rest pose, joint positions (J, 3), stands; Y for a head alone; None if it stands along none."""
     trunk = rotation.unit(places[humanoid["head"]] - places[humanoid["hips"]])
     feet = [humanoid[name] for name in FEET if name in humanoid]
     legs = rotation.unit(places[humanoid["hips"]] - places[feet])  # each, as one may go up and the other down
@@ -81,7 +81,7 @@ def standing_axis(places: np.ndarray, humanoid: Humanoid) -> np.ndarray | None:
 
 
 def _up_in_motion(world: np.ndarray, humanoid: Humanoid, stands: np.ndarray | None) -> str:
-    """The axis that is up: that of the rest pose if the body ever stands along it, else along which it mostly does, else Y."""
+    """The up axis: that of the rest pose if the body ever stands along it, else the one along which it mostly stands, else Y."""
     places = world[:, :, :3, 3]
     feet = [places[:, humanoid[name]] for name in FEET if name in humanoid]
     low = np.mean(feet, axis=0) if feet else places[:, humanoid["hips"]]
@@ -98,7 +98,7 @@ def _some(world: np.ndarray) -> np.ndarray:
 
 
 def _turned(transforms: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """World transforms (..., 4, 4) turned as a whole by quarters, so that an axis (3,) of theirs is Y."""
+    """World transforms (..., 4, 4) turned as a whole by quarter turns, so that an axis (3,) of theirs becomes Y."""
     turn = np.eye(4)
     turn[:3, :3] = rotation.between(up, AXES["Y"]).round()
     return turn @ transforms

@@ -8,20 +8,20 @@ from neuralocks_core.stepped import Stepped
 
 JUMP = 0.4
 """A step is a cut if it ends farther [m] than this from where the motion before it, and the motion after it, would have
-put the joint: within 1/24 s that would take 23 g."""
+put the joint: in 1/24 s, that takes 23 g."""
 _TURN = np.radians(72.0)
 """The same for the joint's rotation [rad]."""
 _LONGEST = 0.1
-"""Longer steps [s] are no cuts: in that time people may come anywhere."""
+"""Longer steps [s] are not cuts: in that time people can get anywhere."""
 APART = 0.2
-"""Steps that would be cuts, but have another one nearer [s], are none: motion too fast for its rate, or stepped animation."""
+"""Steps closer together than this [s] are not cuts, but motion too fast for its rate, or stepped animation."""
 
 
 def find_cuts(clip: Clip, joint: int) -> np.ndarray:
     """Times (C,) [s] of the first sample after each cut, judged by one joint of a clip, the head, whether it loops or not.
 
-    A step is a cut if neither the motion before nor the motion after it explains it. Several in a row are none: those are
-    damaged samples, or motion too fast for its rate.
+    A step is a cut if neither the motion before nor the motion after it explains it. Several in a row are not cuts, but damaged
+    samples, or motion too fast for its rate.
     """
     jumps, alone = _jumps(clip, joint)
     return jumps[alone]
@@ -29,7 +29,7 @@ def find_cuts(clip: Clip, joint: int) -> np.ndarray:
 
 def find_flashes(clip: Clip, joint: int) -> np.ndarray:
     """Times (C,) [s] of the first sample after each step that would be a cut, but has another one within `APART`: the hair is
-    flung there. None of animation that holds its poses, whose hair does not feel the steps.
+    flung there. Empty for animation that holds its poses, since hair does not feel its steps.
     """
     jumps, alone = _jumps(clip, joint)
     return jumps[~alone] if len(jumps) and not len(Stepped.of(clip, [joint]).held) else np.zeros(0)
@@ -45,7 +45,7 @@ def _jumps(clip: Clip, joint: int) -> tuple[np.ndarray, np.ndarray]:
     places, turns = clip.joints[:, joint, :3, 3], clip.joints[:, joint, :3, :3]
     span = np.diff(times)
     speed = np.diff(places, axis=0) / span[:, None]
-    # Where a joint has no size, which a bake refuses, nothing is said of its turn.
+    # If a joint has zero scale, which a bake refuses, its turn is not judged.
     size = np.maximum(np.einsum("tij,tij->t", turns[:-1], turns[:-1]), 1e-30)
     spin = np.einsum("tij,tij->t", turns[1:], turns[:-1]) / size
     angle = np.arccos(np.clip((3 * spin - 1) / 2, -1, 1))

@@ -35,35 +35,33 @@ class Puppet:
             self._hang_arm(side)
 
     def turn(self, joint: str, vectors: np.ndarray) -> None:
-        """Add rotation vectors (T, 3) [rad] to a joint's curve; `root` is the whole body. Joints that the rig lacks
-        stay.
-        """
+        """Add rotation vectors (T, 3) [rad] to a joint's curve; `root` is the whole body. Joints that the rig lacks are ignored."""
         if joint != "root" and joint not in self.character.humanoid:
             return
         self._turns[joint] = self._turns.get(joint, 0.0) + vectors
 
     def turn_further(self, joint: str, vectors: np.ndarray) -> None:
-        """Turn a joint by rotation vectors (T, 3) [rad] after what it does already, about its parent's axes.
+        """Turn a joint by rotation vectors (T, 3) [rad] on top of its motion so far, about its parent's axes.
 
-        Needed where a joint is turned far, as hanging arms are: rotation vectors add up only while they are small.
+        Needed if a joint turns far, as hanging arms do: rotation vectors add up only while they are small.
         """
         if joint in self.character.humanoid:
             before = self._turns.get(joint, 0.0) + np.zeros_like(vectors)
             self._turns[joint] = rotation.to_vector(rotation.from_vector(vectors) @ rotation.from_vector(before))
 
     def turn_about(self, height: float, vectors: np.ndarray) -> None:
-        """Turn the whole body by rotation vectors (T, 3) [rad] about a point so high above its root [m]."""
+        """Turn the whole body by rotation vectors (T, 3) [rad] about a point at this height above its root [m]."""
         self.turn("root", vectors)
         self.position += height * (UP - rotation.from_vector(vectors) @ UP)
 
     def turn_neck(self, vectors: np.ndarray) -> None:
-        """A turn of the head (T, 3) [rad], a third of it in the neck as people do."""
+        """Turn the head by rotation vectors (T, 3) [rad], a third of it in the neck, as people do."""
         share = 1 / 3 if "neck" in self.character.humanoid else 0.0
         self.turn("neck", share * vectors)
         self.turn("head", (1 - share) * vectors)
 
     def bend_spine(self, vectors: np.ndarray) -> None:
-        """A bend of the trunk (T, 3) [rad], shared by its joints."""
+        """Bend the trunk by rotation vectors (T, 3) [rad], shared by its joints."""
         humanoid = self.character.humanoid
         joints = {humanoid[name]: name for name in ("spine", "chest", "upper_chest") if name in humanoid}
         joints.pop(humanoid.get("hips"), None)
@@ -105,18 +103,18 @@ class Puppet:
 
 
 def ease(times: np.ndarray, start: float, duration: float) -> np.ndarray:
-    """0 before `start`, 1 after `start + duration`, least jerk between (Flash and Hogan 1985)."""
+    """0 before `start`, 1 after `start + duration`, minimum jerk in between (Flash and Hogan 1985)."""
     s = np.clip((times - start) / max(duration, 1e-6), 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
 def pulse(times: np.ndarray, start: float, attack: float, hold: float, release: float) -> np.ndarray:
-    """0, up to 1 in `attack` from `start` on, held for `hold`, and down in `release` [s], all with least jerk; (T,)."""
+    """0, up to 1 in `attack` from `start` on, held for `hold`, and down in `release` [s], all with minimum jerk; (T,)."""
     return ease(times, start, attack) - ease(times, start + attack + hold, release)
 
 
 def travelled(times: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """How far a speed (T,) has led since the first sample, by trapezoids; (T,)."""
+    """Distance travelled at a speed (T,) since the first sample, by the trapezoidal rule; (T,)."""
     return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(times))])
 
 
@@ -132,7 +130,7 @@ def leap(
 ) -> tuple[np.ndarray, float]:
     """Height of the hips (T,) [m] through a jump, from crouch to standing again, and when it is over [s].
 
-    Quintic from phase to phase, so smooth to the second derivative, and exactly a throw while in the air.
+    Quintic from phase to phase, so smooth to the second derivative, and exactly ballistic in the air.
 
     Args:
         times: (T,) [s].

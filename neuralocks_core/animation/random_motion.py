@@ -16,11 +16,11 @@ from neuralocks_core.motion import Clip, G
 
 KINDS = ("shake", "turn", "nod", "bow", "tilt", "sway", "translate", "jump", "walk", "fall_and_stop", "hold")
 WILD = ("spin", "tumble")
-"""Rarer and farther from standing: dancing and falling, which models learn but are not judged by unless asked."""
+"""Rarer and farther from standing: dancing and falling, which models learn, but are evaluated on only if asked."""
 FOREIGN = ("bang",)
-"""Headbanging, which no random clip shows: how a model answers to motion unlike what it learned."""
+"""Headbanging, which no random clip contains: how a model responds to motion unlike its training."""
 REST = 0.3
-"""[s] A random clip begins still, so that hair at rest is its true beginning."""
+"""[s] A random clip begins motionless, so that its hair correctly begins at rest."""
 
 
 def random_clip(
@@ -35,11 +35,11 @@ def random_clip(
 
     Args:
         character: who moves.
-        rng: source of all chance; the same state gives the same clip.
+        rng: source of all randomness; the same state gives the same clip.
         seconds: length.
         rate: samples a second.
         shape: blend shape weights (B,).
-        wild: that share.
+        wild: the share in which the whole body spins or tumbles.
     """
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
@@ -54,10 +54,10 @@ def random_clip(
 
 
 def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: float = 30.0) -> Clip:
-    """The clip of one kind on which models are judged: every size and time fixed. `fall_and_stop` and `hold` end still.
+    """The clip of one kind on which models are evaluated: every size and time is fixed. `fall_and_stop` and `hold` end still.
 
     Raises:
-        NeuralocksError: the kind is none of KINDS, WILD or FOREIGN.
+        NeuralocksError: the kind is not in KINDS, WILD or FOREIGN.
     """
     if kind not in _GESTURES:
         raise NeuralocksError(f"motion '{kind}': unknown kind; use {', '.join(_GESTURES)}")
@@ -87,13 +87,13 @@ class _Dice:
         return 2 if self.rng is None else int(self.rng.integers(1, 4))
 
     def direction(self) -> np.ndarray:
-        """A level unit vector."""
+        """A horizontal unit vector."""
         angle = self.between(0, 2 * np.pi)
         return np.array([np.sin(angle), 0.0, np.cos(angle)])
 
 
 def _posture(puppet: Puppet, rng) -> None:
-    """Where head, trunk and arms are held through the clip; changed once, slowly, in some."""
+    """Posture of head, trunk and arms throughout the clip; in some clips it changes once, slowly."""
     still = (
         np.ones(len(puppet.times))
         if rng.random() < 0.5
@@ -228,7 +228,7 @@ def _spin(puppet: Puppet, dice: _Dice) -> None:
 
 
 def _tumble(puppet: Puppet, dice: _Dice) -> None:
-    """The whole body goes over about a level axis: it falls to the ground, or rolls, or turns a cartwheel."""
+    """The whole body tips over about a horizontal axis: it falls to the ground, or rolls, or turns a cartwheel."""
     whole = dice.between(0, 1) > 0.6
     angle = dice.sign() * (2 * np.pi if whole else dice.between(0.6, 2.8))
     duration = abs(angle) / dice.between(2.0, 5.0)

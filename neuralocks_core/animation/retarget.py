@@ -21,22 +21,22 @@ LIMBS = {
     "lower_leg": ("lower_leg", "foot"),
     "foot": None,
 }
-"""Limb joint -> ends of the bone that is aligned between the rest poses (a hand prolongs the forearm).
+"""Limb joint -> ends of the bone that is aligned between the rest poses (a hand extends the forearm).
 
-Where None, both rest poses are taken to agree: soles lie flat in both.
+If None, both rest poses are assumed to agree: soles lie flat in both.
 """
 
 
 def retarget(motion: Motion, character: Character) -> Clip:
     """Put a motion on a character.
 
-    Each joint gets the source's rotation since its rest pose, after the character's bone is turned from its bind
-    direction to the source's rest direction, so that T-poses, A-poses and hanging arms mix. The hips travel in
+    Each joint gets the source's rotation from its rest pose, after the character's bone is turned from its bind
+    direction to the source's rest direction, so that T-poses, A-poses and hanging arms can be mixed. The hips travel in
     proportion to the length of the legs, start over the origin, and the lowest foot of the clip stands on the floor.
 
     Args:
         motion: from `formats.bvh.read_bvh`.
-        character: who shall move; Y up, feet on Y = 0 in bind pose.
+        character: who will move; Y up, feet on Y = 0 in bind pose.
 
     Raises:
         NeuralocksError: the source has no joints that are named like a head or hips.
@@ -50,9 +50,9 @@ def retarget(motion: Motion, character: Character) -> Clip:
 
 
 def _turns(motion: Motion, source: Character, character: Character) -> dict[int, np.ndarray]:
-    """World rotations (T, 3, 3) since the bind pose per joint of the character, canonical axes."""
+    """World rotations (T, 3, 3) from the bind pose per joint of the character, canonical axes."""
     moved = source.relative_rotations(motion.clip.joints, np.arange(len(source.skeleton.names)))
-    moved = source.facing @ moved  # so far only bind-relative; now seen by someone who faces +Z
+    moved = source.facing @ moved  # so far only relative to the bind pose; now in axes that face +Z
     found: dict[str, np.ndarray] = {}
     for name in TRUNK:
         if name in source.humanoid:
@@ -142,7 +142,7 @@ def _travel(motion: Motion, source: Character, character: Character, joints: np.
 
 
 def _leg_length(skeleton: Skeleton, humanoid: Humanoid) -> float:
-    """Length of hip to foot along the bones [m], or a share of the height where the rig has no legs."""
+    """Length from hip to foot along the bones [m], or a share of the height if the rig has no legs."""
     bind = skeleton.bind[:, :3, 3]
     lengths = []
     for side in ("left", "right"):

@@ -12,15 +12,15 @@ from neuralocks_core.errors import NeuralocksError
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
 CANDIDATES = 160_000
-"""Triangles looked at together, those of some points, to bound the memory: a grid around a giant's head has millions."""
+"""Triangles checked at once, for some of the points, to bound memory: a grid around a giant's head has millions."""
 
 
 class Collider:
-    """A mesh in one pose, asked for distances.
+    """Distances to a mesh in one pose.
 
-    A tree over points spread on the surface proposes triangles, and the closest point on these is exact. The search
-    goes on until no triangle that was left out can be nearer. The sign is that of the angle-weighted pseudonormal
-    (Baerentzen and Aanaes 2005), which is right on edges and corners too.
+    A tree over points spread on the surface proposes triangles, and the closest point on them is exact. The search
+    continues until no other triangle can be nearer. The sign is that of the angle-weighted pseudonormal
+    (Baerentzen and Aanaes 2005), which is correct on edges and corners too.
 
     Args:
         points: (V, 3) [m].
@@ -51,13 +51,13 @@ class Collider:
         Args:
             points: (..., 3) [m].
             limit: farther outside than this [m], the distance is that to the nearest surface sample instead of the
-                exact one (a few millimetres too large), which saves most of the work. What seems inside is
+                exact one (a few millimetres too large), which saves most of the work. Points that seem inside are
                 always measured exactly.
-            proven: go on until no other triangle can be nearer; else only those around the nearest four samples are
-                looked at, which may miss the nearest one by a fraction of a millimetre.
+            proven: search until no other triangle can be nearer; else only triangles around the nearest four samples are
+                checked, which may miss the nearest one by a fraction of a millimetre.
 
         Raises:
-            NeuralocksError: points that are no finite (..., 3), or a limit below 0.
+            NeuralocksError: points are not finite (..., 3), or the limit is below 0.
         """
         distance, normal, _ = self.closest(points, limit, proven)
         return distance, normal
@@ -75,7 +75,7 @@ class Collider:
         triangle = self._owner[sample]
         closest = self._tree.data[sample]
         normal = self._normals[triangle]
-        # The nearest sample's face may lie about the side near ears and other thin parts: what seems inside is proven.
+        # The nearest sample's face may be on the wrong side near ears and other thin parts: what seems inside is proven.
         inside = ((points - closest) * normal).sum(axis=1) < 0
         near = np.flatnonzero((rough <= limit + self._reach) | inside)
         closest, normal, triangle = closest.copy(), normal.copy(), triangle.copy()
@@ -97,7 +97,7 @@ class Collider:
         return (sign * length).reshape(shape), direction.reshape(*shape, 3), triangle.reshape(shape)
 
     def _nearest(self, points, candidates):
-        """Closest point, pseudonormal there, triangle and distance, of candidate triangles (N, k), for (N, 3)."""
+        """Closest point, pseudonormal there, triangle and distance, of candidate triangles (N, k), for points (N, 3)."""
         corners = self.points[self.triangles[candidates]]
         place, feature = closest_on_triangle(points[:, None], *np.moveaxis(corners, -2, 0))
         squared = ((place - points[:, None]) ** 2).sum(axis=-1)
@@ -164,7 +164,7 @@ def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarr
 
 
 def split_triangle(m: int) -> np.ndarray:
-    """Middles (m * m, 2) of the alike triangles into which m - 1 cuts along each side divide one, along its sides."""
+    """Centroids (m * m, 2), in coordinates along its sides, of the m x m congruent triangles into which a triangle is cut."""
     i, j = np.mgrid[0:m, 0:m]
     up = np.stack([i, j], axis=-1)[i + j < m] + 1 / 3
     down = np.stack([i, j], axis=-1)[i + j < m - 1] + 2 / 3
@@ -172,9 +172,9 @@ def split_triangle(m: int) -> np.ndarray:
 
 
 def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Points spread over triangles (n, 3), the triangle of each (n,), and how far the surface is from them at most [m].
+    """Points spread over triangles (n, 3), the triangle of each (n,), and the largest distance of the surface from them [m].
 
-    Triangles larger than most are split into m x m alike ones, whose centroids are taken.
+    Triangles larger than most are split into m x m congruent ones, whose centroids are used.
     """
     middle = (a + b + c) / 3
     radius = np.sqrt(np.max([((corner - middle) ** 2).sum(axis=1) for corner in (a, b, c)], axis=0))

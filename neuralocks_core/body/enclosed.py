@@ -10,16 +10,16 @@ _DEEP = 2e-3
 _FEW = 8
 """Points proven at a time."""
 _FEW_ENOUGH = 16
-"""Points of which each is compared with every triangle before an index is made."""
+"""Up to this many points are each compared with every triangle before an index is built."""
 _AT_ONCE = 2_000_000
-"""Pairs of a point and a triangle that are held in memory."""
+"""Pairs of a point and a triangle that are held in memory at once."""
 
 
 def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (N,) [m] of points (N, 3) to a mesh, as `Collider` has them, but proven where they seem deepest.
 
-    Points in free air that `Collider` takes for inside seem deeper than those that are. So the deepest few are proven, and
-    the next few as long as one of them turns out to be outside.
+    Points in free air that `Collider` mistakes for inside seem deeper than points that are inside. So the deepest few are
+    proven, and then the next few, as long as one of them turns out to be outside.
     """
     result = Collider(vertices, _in_reach(vertices, triangles, points)).distance(points)[0]
     deep = np.flatnonzero(result < -_DEEP)
@@ -34,10 +34,10 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
 
 
 def _in_reach(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The triangles that the nearest one to any of the points may be among, with all that it shares a corner with there.
+    """Triangles among which the nearest one to any of the points must be, with all that share its nearest corner or edge.
 
-    Nothing is farther than the nearest vertex, and whatever touches the nearest place is as near. To index a whole body for
-    two points in it takes three times as long.
+    The surface is never farther than the nearest vertex, and all that touches the nearest place is equally near. Indexing a
+    whole body for two points in it takes three times as long.
     """
     if len(points) > _FEW_ENOUGH:
         return triangles
@@ -52,11 +52,11 @@ def _in_reach(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -
 
 
 def enclosed(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Which points (N,) of (N, 3) a mesh of vertices (V, 3) and outward triangles (F, 3) goes round more than half.
+    """Which points (N,) of (N, 3) a mesh of vertices (V, 3) and outward triangles (F, 3) encloses by more than half.
 
-    The winding number, a sum of solid angles (Van Oosterom and Strackee 1983), holds where the surface cuts through
-    itself, as skin does in the crease of a bent neck: there the nearest face may look either way, and a point a hand's
-    breadth away from it in free air seems as deep inside. A hole counts by the angle at which it is seen.
+    The winding number, a sum of solid angles (Van Oosterom and Strackee 1983), stays valid where the surface intersects
+    itself, as skin does in the crease of a bent neck: there the nearest face may point either way, and a point in free air a
+    hand's breadth away from it seems just as deep inside. A hole counts by the solid angle that it covers.
     """
     inside = np.zeros(len(points), bool)
     corners = vertices[triangles].astype(float)

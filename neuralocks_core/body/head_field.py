@@ -11,21 +11,19 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.hollows import filled
 
 CELL = 0.005
-"""Distance between grid nodes [m]; on a head, linear interpolation is then right within 0.2 mm."""
+"""Distance between grid nodes [m]; on a head, linear interpolation is then accurate to 0.2 mm."""
 ROOM = 0.03
 """How far around the head the grid reaches [m]."""
 EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
 MOST_NODES = 1_000_000
-"""At most: a head several times as large as life has larger cells, as it has larger features. Bakes wait for the grid."""
+"""At most: a head several times life size gets larger cells, since its features are larger. Bakes wait for the grid."""
 SAME = 7
-"""Digits after the point [m] to which a head is told from another, and made."""
+"""Decimal places [m] to which points are rounded, to tell heads apart and to build the grid."""
 
 
 def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> "HeadField":
-    """The HeadField of these, made once for all grooms of a head, for copies of it that stand otherwise, and for the bakes that
-    follow.
-    """
+    """The HeadField of a mesh, built once for all grooms of a head, for copies of it placed elsewhere, and for later bakes."""
     points = np.round(points, SAME)  # a copy that is turned differs by rounding
     digest = hashlib.sha256()
     for array in (points, triangles, still):
@@ -35,7 +33,7 @@ def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> 
 
 @dataclass(frozen=True)
 class _Mesh:
-    """Arrays that are known by their digest."""
+    """Arrays that are identified by their digest."""
 
     digest: bytes
     arrays: tuple = field(compare=False, repr=False)
@@ -73,21 +71,21 @@ class HeadField:
         nodes = self._low + self.cell * np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
         value, _, nearest = whole.closest(nodes.reshape(-1, 3), limit=EXACT, proven=False)
         value = filled(value.reshape(size), self.cell).ravel()
-        # Where something that moves is nearest, the grid knows nothing, and neither does what is mixed with it.
+        # Nodes nearest to something that moves are unknown, and so is all that is interpolated from them.
         self._values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
 
     def near(self, reach: float) -> np.ndarray:
-        """Nodes (N, 3) [m] that lie less than `reach` outside, or inside."""
+        """Nodes (N, 3) [m] that are inside, or less than `reach` outside."""
         return self._low + self.cell * np.argwhere(self._values < reach)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distance (N,) [m] and its direction (N, 3), float32; infinite where the head is not what is nearest."""
+        """Signed distance (N,) [m] and its direction (N, 3), float32; infinite where the head is not nearest."""
         corner, (x, y, z), known = self._corners(points)
         value, direction = np.full(len(points), np.inf, np.float32), np.zeros((len(points), 3), np.float32)
         if not len(known):
             return value, direction
         at = self._values.ravel().take(corner + self._offsets).reshape(2, 2, 2, -1)
-        with np.errstate(invalid="ignore"):  # infinity less infinity: not known, and left out below
+        with np.errstate(invalid="ignore"):  # infinity minus infinity: unknown, and left out below
             # Interpolated along z, then y, then x, with the slopes along each.
             along_z = at[:, :, 1] - at[:, :, 0]
             flat = at[:, :, 0] + z * along_z
@@ -107,7 +105,7 @@ class HeadField:
         return value, direction
 
     def rough(self, points: np.ndarray) -> np.ndarray:
-        """The nearest node's distance (N,) [m]: right within 0.87 cells, infinite where nothing is known."""
+        """The nearest node's distance (N,) [m]: accurate to 0.87 cells, infinite where unknown."""
         result = np.full(len(points), np.inf, np.float32)
         corner, part, known = self._corners(points)
         nearest = corner + self._strides @ (part > 0.5).astype(np.int32)
@@ -121,11 +119,11 @@ class HeadField:
 
     @cached_property
     def _offsets(self) -> np.ndarray:
-        """From the low node of a cell to its eight, (8, 1), the last axis fastest."""
+        """Offsets (8, 1) from the low node of a cell to its eight nodes, the last axis fastest."""
         return (np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ self._strides)[:, None]
 
     def _corners(self, points: np.ndarray):
-        """Number of the low node of each point's cell (n,), place in it (3, n), and which points (n,) are in the grid."""
+        """Number of the low node of each point's cell (n,), position in it (3, n), and which points (n,) are in the grid."""
         place = np.ascontiguousarray(points.T, np.float32)
         place = place - self._low.astype(np.float32)[:, None]
         place *= np.float32(1 / self.cell)

@@ -4,18 +4,18 @@
 import numpy as np
 
 BALL = 0.004
-"""Where a ball of this radius cannot get to from outside is a hollow [m]: wider than lips are open, narrower than an ear's folds."""
+"""A ball of this radius [m] cannot get into a hollow from outside: wider than open lips, narrower than an ear's folds."""
 CREASE = 0.0015
-"""How much farther than such a ball hair may get into a crease [m]; also what distances to a grid's nodes are wrong by."""
+"""How much farther than such a ball hair may get into a crease [m]; also the error of distances to a grid's nodes."""
 NEIGHBOURS = 8
-"""Nodes among which the nearest ball is looked for."""
+"""Nodes among which the nearest ball is searched for."""
 
 
 def filled(value: np.ndarray, cell: float) -> np.ndarray:
-    """Signed distances (X, Y, Z) [m] on a grid of nodes `cell` [m] apart, with hollows as inside.
+    """Signed distances (X, Y, Z) [m] on a grid of nodes `cell` [m] apart, with hollows counted as inside.
 
-    Hair that goes through a cheek would else leave by the mouth: part of a strand would be pushed out, part of it in.
-    Where no hollow is near, distances stay as they are, but for a millimetre in few of the nodes inside.
+    Otherwise, hair that goes through a cheek would leave by the mouth: part of a strand would be pushed out, part of it in.
+    Where no hollow is near, distances stay unchanged, except by a millimetre at a few nodes inside.
     """
     from scipy import ndimage
     from scipy.spatial import cKDTree
@@ -28,7 +28,7 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     rim = outside & ~ndimage.binary_erosion(outside, np.ones((3, 3, 3)), border_value=1)
     if not rim.any():
         return value
-    # What is outside is all balls around free nodes that touch the skin; one is enough in most places.
+    # The outside is all balls around free nodes that touch the skin; in most places, one ball is enough.
     nodes = np.argwhere(rim)
     asked = ~outside
     far, which = cKDTree(cell * nodes).query(cell * np.argwhere(asked), k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))

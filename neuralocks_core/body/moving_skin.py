@@ -10,25 +10,25 @@ from scipy.spatial import cKDTree
 from neuralocks_core.body.collider import split_triangle
 
 SPACING = 0.010
-"""Distance between samples on the skin [m]; a half or a quarter of it where triangles are as small."""
+"""Distance between samples on the skin [m]; half or a quarter of it where triangles are that small."""
 NEIGHBOURS = 8
 """Samples that are blended; the first is the sample itself."""
 CELL = 0.012
 """Width of the grid's cells [m]. A sample is entered in its own cell and those around it."""
 DEPTH = 3
-"""Cells below the skin in which a sample is entered too: hair may come that deep."""
+"""Cells below the skin into which a sample is entered too: hair may get that deep."""
 ENOUGH_SAMPLES = 20_000
 MOST_SAMPLES = 60_000
 THIN = 0.002
-"""A point that lies farther below a sample than the body is thick there, by more than this [m], is not below it."""
+"""A point farther below a sample than the body is thick there, by more than this [m], does not count as below it."""
 MOST_CELLS = 4_000_000
 SAME_SIDE, AROUND = 0.2, 3.0
-"""A sample's neighbours are those whose normals are turned from its own by less than the angle of this cosine, and that are not
-farther than so many spacings."""
+"""A sample's neighbours have normals that differ from its own by less than the angle of this cosine, and are within this many
+spacings of it."""
 REACH = 3.2
-"""Squared distance, in squared spacings beyond that of the nearest, at which a sample has no weight any more."""
+"""Squared distance, in squared spacings beyond that of the nearest, at which a sample's weight reaches zero."""
 BESIDE = 4.0
-"""Squared distance beside the nearest sample, in squared spacings, at which its plane tells nothing."""
+"""Squared distance beside the nearest sample, in squared spacings, at which its plane is no longer valid."""
 
 
 class Box:
@@ -42,13 +42,13 @@ class Box:
         span = np.maximum(np.asarray(high, float) - low, CELL)
         self.cell = max(CELL, float(np.cbrt(np.prod(span) / MOST_CELLS)))
         self.size = np.ceil(span / self.cell).astype(int) + 5
-        # Cells lie the same for all grooms of a head.
+        # Cells are in the same places for all grooms of a head.
         self.low = (np.floor(np.asarray(low, float) / self.cell) - 2) * self.cell
         self.strides = np.array([self.size[1] * self.size[2], self.size[2], 1])
         self.count = int(np.prod(self.size))
 
     def cells(self, points: np.ndarray) -> np.ndarray:
-        """Number of the cell (..., ) int32 of each point (..., 3) float32; of some cell for points outside the box."""
+        """Number of the cell (..., ) int32 of each point (..., 3) float32; an arbitrary cell for points outside the box."""
         index = None
         for axis in range(3):
             place = points[..., axis] - np.float32(self.low[axis])
@@ -67,7 +67,7 @@ class Box:
 
 
 class Skin:
-    """Samples of a mesh: where on which triangle, and which ones lie beside each.
+    """Samples of a mesh: the triangle of each, the place on it, and its neighbours.
 
     Args:
         points: of the mesh in bind pose (V, 3) [m].
@@ -83,7 +83,7 @@ class Skin:
         tree = cKDTree(place)
         far, near = tree.query(place, k=np.arange(1, count + 1))
         near[:, 0] = np.arange(len(place))
-        # Skin on the other side of a thin part is no neighbour; the sample itself stands in for it.
+        # Skin on the other side of a thin part is not a neighbour; the sample itself stands in for it.
         other = np.einsum("ni,nki->nk", normal, normal[near]) < SAME_SIDE
         own = np.arange(len(place))[:, None]
         self.thick = _thickness(place, normal, tree)
@@ -116,7 +116,7 @@ class PosedSkin:
         box: the grid; its cells near the skin are marked with `bit`.
         marks: (box.count,) uint8, changed.
         bit: what to add.
-        low, high: corners (3,) [m] of the space that will be asked for.
+        low, high: corners (3,) [m] of the space that will be queried.
     """
 
     def __init__(self, skin: Skin, points: np.ndarray, box: Box, marks: np.ndarray, bit: int, low, high):
@@ -151,7 +151,7 @@ class PosedSkin:
         marks |= entered
 
     def rough(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Height [m] over the plane of some sample near by, (N,), of points (N, 3) float32 in marked cells."""
+        """Height [m] above the plane of a nearby sample, (N,), of points (N, 3) float32 in marked cells."""
         plane = self._plane.take(self._start.take(cells), axis=0)
         offset = points - plane[:, :3]
         offset *= plane[:, 3:]
@@ -160,7 +160,7 @@ class PosedSkin:
     def distance(self, points: np.ndarray, cells: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (N,) [m] and its direction (N, 3) of points (N, 3) in marked cells.
 
-        Infinite beyond the rim, and where the distance `head` (N,) to what stands still is less than that to a sample.
+        Infinite beyond the rim, and where the head, at the distances `head` (N,), is nearer than a sample.
         """
         skin = self._skin
         sample = self._start.take(cells)
@@ -177,7 +177,7 @@ class PosedSkin:
             if not best.any():
                 break
         nearest = squared[rows, best]
-        # Weights fall from the nearest sample on: smooth in the point and in the pose, at any height.
+        # Weights decrease from the nearest sample on: smooth in the point and in the pose, at any height.
         first = near[:, 0]
         square = skin.square.take(first)
         weight = np.maximum(1 - (squared - nearest[:, None]) / (REACH * square)[:, None], 0)
@@ -193,13 +193,13 @@ class PosedSkin:
         direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
         beyond = nearest - value * value > BESIDE * square
         beyond |= nearest - 0.5 * square > head * head
-        # A shoulder is thinner than the grid goes down: what is below its front is behind its back.
+        # A shoulder is thinner than the grid is deep: what is below its front may be behind its back.
         beyond |= -value > skin.thick.take(first) + np.float32(THIN)
         return np.where(beyond, np.inf, value), direction
 
 
 def _thickness(place: np.ndarray, normal: np.ndarray, tree: cKDTree) -> np.ndarray:
-    """How far (N,) float32 [m] below each sample the skin of the other side is; infinite where none is as near as is asked for."""
+    """Distance (N,) float32 [m] from each sample down to the skin on the other side; infinite if none is within reach."""
     thick = np.full(len(place), np.inf, np.float32)
     for depth in np.arange(0.5, DEPTH + 1.1, 0.5) * CELL:
         below = place - np.float32(depth) * normal
@@ -239,7 +239,7 @@ def _thinned(corners: np.ndarray, longest: np.ndarray, spacing: np.ndarray):
     spacing = spacing[owner]
     a, b, c = (corners[owner, i] for i in range(3))
     place = (a + part[:, :1] * (b - a) + part[:, 1:] * (c - a)) / (0.8 * spacing[:, None])
-    # Of samples in one small cube the one nearest to its middle is enough.
+    # In each small cube, the sample nearest to its middle is enough.
     cube = np.floor(place)
     off = np.square(place - cube - 0.5).sum(axis=1)
     order = np.lexsort((off, spacing, cube[:, 2], cube[:, 1], cube[:, 0]))

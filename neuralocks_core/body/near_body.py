@@ -11,16 +11,16 @@ from neuralocks_core.skinned_body import Body
 
 HEAD, SKIN = 1, 2
 CURVED = 0.004
-"""How far skin may bend away from the plane of a sample near by [m]."""
+"""How far skin may bend away from the plane of a nearby sample [m]."""
 
 
 class NearBody:
-    """What does not depend on the pose.
+    """The data that does not depend on the pose.
 
     Args:
         body: the part of the body that hair can reach, its points (V, 3) [m] in the bind pose.
-        to_canonical: transform (4, 4) from there to canonical space.
-        still: which vertices (V,) never move against the head.
+        to_canonical: transform (4, 4) from the bind pose to canonical space.
+        still: which vertices (V,) never move relative to the head.
         low, high: corners (3,) [m] of the space that hair can reach, canonical.
     """
 
@@ -48,7 +48,7 @@ class NearBody:
         Args:
             skinning: transforms (J, 4, 4) of each joint from the bind pose to canonical space.
             shape: change of the blend shape weights (B,) since the body's own.
-            low, high: corners (3,) [m] of the space in which it will be asked for distances, canonical.
+            low, high: corners (3,) [m] of the space in which distances will be queried, canonical.
         """
         marks = self.marks.copy()
         if self.skin is None:
@@ -69,7 +69,7 @@ class PosedBody:
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (...) [m], negative inside, and its direction (..., 3); infinite where nothing is near.
 
-        Right within a few tenths of a millimetre near the skin, and smooth.
+        Accurate to a few tenths of a millimetre near the skin, and smooth.
         """
         flat = np.asarray(points, np.float32).reshape(-1, 3)
         cells = self._near.box.cells(flat)
@@ -88,7 +88,7 @@ class PosedBody:
     def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
         """Numbers of the strands (n,) of points (S, K, 3) float32 with a vertex nearer than `low` (S, K) [m].
 
-        Most vertices are let go by one look into a grid.
+        One lookup in a grid clears most vertices.
         """
         each = points.shape[1]
         cells = self._near.box.cells(points).ravel()

@@ -45,7 +45,7 @@ _HAIRLINE = np.array(
 
 @dataclass(frozen=True)
 class StatisticalBody:
-    """A character with what only its mesh knows.
+    """A character with data that only its mesh has.
 
     Attributes:
         character: skeleton and body; the body's triangles are the halved `faces`.
@@ -117,7 +117,7 @@ def _load_anny():
 
     if not writable(get_anny_cache_path()):
         set_anny_cache_path(own_folder("anny"))
-    start_warp("cpu")  # or it would tell of itself on standard output, where a command's answer belongs
+    start_warp("cpu")  # or it would print its banner to standard output, where a command's answer belongs
     return Anny(rig="game_engine", topology="anny-quads", pose_parameterization="local-ref")
 
 
@@ -129,13 +129,13 @@ class _Rest:
         self.points = rest["rest_vertices"][0].double().numpy() @ _TO_Y_UP.T
         self.bones = rest["rest_bone_poses"][0].double().numpy().copy()
         self.bones[:, :3] = _TO_Y_UP @ self.bones[:, :3]
-        # Bones carry anny's ground offset while rest vertices do not; the heads do not either.
+        # Bones include anny's ground offset; rest vertices and bone heads do not.
         self.heads = rest["rest_bone_heads"][0].double().numpy() @ _TO_Y_UP.T
         self.bones[:, :3, 3] = self.heads
 
 
 def _without_tongue(points, faces):
-    """Vertex indices kept and quads renumbered: all but the mouth's loose inside, which hair never sees."""
+    """Vertex indices kept and quads renumbered: all but the loose inside of the mouth, which hair never meets."""
     part = connected_pieces(faces, len(points))
     sizes = np.bincount(part)
     # The skin is the largest part; eyes lie off the middle plane, the tongue on it.
@@ -168,7 +168,7 @@ def _on_same_skeleton(shape, default, parents, weights, keep):
 
 
 def _continues(heads, parents, child):
-    """Whether the bone to `child` is its parent's own direction and no branch to a shoulder, thigh or finger."""
+    """Whether the bone to `child` continues its parent's direction and is not a branch to a shoulder, thigh or finger."""
     siblings = [c for c in range(len(parents)) if parents[c] == parents[child]]
     middle = [c for c in siblings if abs(heads[c, 0]) < 1e-3]
     return len(siblings) == 1 or (len(middle) == 1 and middle[0] == child)

@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from neuralocks_core.strands.strand_set import StrandSet
 
 POINTS = 16384
-"""Points carried at a time, about: what is touched for them stays in the processor's second-level cache."""
+"""Approximate number of points carried at a time: their data stays in the processor's second-level cache."""
 
 BLOCK = 512
-"""Strands prepared together, so that preparing takes little memory beside its result, and at most carried at once."""
+"""Strands prepared together, so that preparation needs little memory besides its result; also the most carried at once."""
 
 _scratch = Scratch()
 
 
 class Placing(NamedTuple):
-    """Where a carried groom is put: `linear` (x - `centre`) + `origin`, about the head's own place, so that coordinates
-    far from the origin cost no digits.
+    """Where a carried groom is put: `linear` (x - `centre`) + `origin`, relative to the head's own position, so that
+    coordinates far from the origin lose no precision.
 
     Attributes:
         linear: (3, 3) float32.
@@ -40,7 +40,7 @@ class Placing(NamedTuple):
 
     @classmethod
     def of(cls, transform: np.ndarray, centre: np.ndarray) -> Placing:
-        """Make it from the transform (4, 4) of bind-world points and the head's own place (3,) there."""
+        """Make it from the transform (4, 4) of bind-world points and the head's own position (3,) there."""
         centre = centre.astype(np.float32)
         origin = transform[:3, :3] @ centre.astype(float) + transform[:3, 3]
         return cls(transform[:3, :3].astype(np.float32), centre, origin.astype(np.float32))
@@ -49,14 +49,14 @@ class Placing(NamedTuple):
 class Carrier:
     """Moves the groom's own vertices as the network's vertices move.
 
-    Where the groom's strands are the network's (24 vertices, even in arc length), the displacement is added as it is.
-    Any other smooth strand's vertices are weighted means of the network's (`spans`). What is finer than the network's
-    vertices, coils say, takes the displacement of the network polyline and is turned with it (`turning`). The groom's
-    own edges then get their lengths back (`lengths`). Zero displacement gives the groom's own points bit for bit, and
-    strands that the network does not move (`StrandSet.valid` false) always stay.
+    If the groom's strands are the network's (24 vertices, even in arc length), the displacement is added directly. The vertices
+    of any other smooth strand are weighted means of the network's (`spans`). Detail finer than the network's vertices, such as
+    coils, takes the displacement of the network polyline and turns with it (`turning`). Then the groom's own edges get their
+    lengths back (`lengths`). Zero displacement gives the groom's own points bit for bit, and strands that the network does not
+    move (`StrandSet.valid` false) always stay.
 
     Args:
-        groom: the groom that `strands` was made of.
+        groom: the groom that `strands` was made from.
         strands: its network vertices at rest.
     """
 
@@ -91,7 +91,7 @@ class Carrier:
         return blocks
 
     def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
-        # The inverse of a rotation: rows times R are columns times its transpose. All rows at once: a product of each
+        # The inverse of a rotation: rows times R are columns times its transpose. All rows at once: one product for each
         # strand's few takes twice as long.
         return (vectors.reshape(-1, 3) @ self._facing).reshape(vectors.shape)
 
@@ -107,16 +107,16 @@ class Carrier:
 
         Args:
             displacement: (N, K, 3) float32 [m], canonical axes, for the strands of the slice (all S without one).
-            out: (points of these strands, 3) float32, filled and returned; made if left out.
+            out: (points of these strands, 3) float32, filled and returned; allocated if left out.
             strands: a slice of consecutive strands.
-            placing: where the points are put; where they are, in bind-world space [m], if left out.
-            onto: (P, 3) float32, all points at rest as they are placed; what is not moved keeps their bits.
+            placing: where the points are put; if left out, they stay in bind-world space [m].
+            onto: (P, 3) float32, all rest points as placed; points that do not move keep these bits.
 
         Returns:
             (points of these strands, 3) float32.
 
         Raises:
-            ValueError: the slice has steps, or the displacement is of another number of strands or vertices.
+            ValueError: the slice has a step, or the displacement has another number of strands or vertices.
         """
         first, last, step = (strands or slice(None)).indices(self._groom.strand_count)
         if step != 1:
@@ -163,11 +163,11 @@ class Carrier:
         if placing is not None:
             moved = _placed(placing.linear, moved)
         np.add(columns(onto), moved, out=columns(out))
-        if self._negative_zero:  # -0 + 0 is +0: the one value that adding nothing changes
+        if self._negative_zero:  # -0 + 0 is +0: the only value that adding zero changes
             np.copyto(columns(out), columns(onto), where=moved == 0)
 
     def _carried_at_once(self, displacement, rest, out, placing) -> None:
-        """`_carried` where the groom's vertices are the network's: placed and turned from the network's axes in one."""
+        """`_carried` if the groom's vertices are the network's: placed and turned from the network's axes in one step."""
         both, result = in_turn.arrays((6, len(rest)), (3, len(rest)))
         np.subtract(rest.T, placing.centre[:, None], out=both[:3])
         both[3:] = displacement.reshape(-1, 3).T

@@ -14,22 +14,22 @@ from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, root_frames
 
 COLUMN = list(RANGES).index("clumping")
-"""Where clumping lies among a vector's material."""
+"""Index of clumping in a vector's material."""
 CANTILEVER = 12.36
 """Fourth power of 1.8751, the first root of a clamped rod's cos cosh = -1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Locks:
-    """What ties join in the locks of a groom, as strands of their own, and how their motion moves their hairs.
+    """The parts of a groom's locks that ties join, each as a strand of its own, and how their motion moves their hairs.
 
-    The network knows what a hair and its lock look like, but not where its neighbours are, so it learns nothing of ties
-    between them. In each frame it is therefore asked for the locks' own strands, too, and hairs are drawn to where their
-    lock goes, or let loose from it. At the default nothing is computed.
+    The network knows what a hair and its lock look like, but not where its neighbours are, so it learns nothing about ties
+    between them. Therefore it also computes the locks' own strands in each frame, and hairs are drawn towards their lock's
+    motion, or released from it. At the default, nothing is computed.
     """
 
     strands: StrandSet
-    """A strand for each lock: the mean of its hairs. Hairs of one lock that nothing ties are locks by themselves."""
+    """A strand for each lock: the mean of its hairs. Hairs of a lock that no tie joins are locks of their own."""
     rest: np.ndarray
     """The hairs' (S, 24, 3) rest points [m]."""
     lock: np.ndarray
@@ -39,7 +39,7 @@ class Locks:
     pendulum: np.ndarray
     """(S,) how firmly its weight holds it, as a pendulum: g / L [1/s^2]."""
     tie: np.ndarray
-    """(S,) how firmly ties hold a hair in its lock, against one tied to the lock's mean; see `_tie`."""
+    """(S,) how firmly ties hold a hair in its lock, relative to one tied to the lock's mean; see `_tie`."""
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:
@@ -67,12 +67,12 @@ class Locks:
         return cls(lock, strands.rest, own, CANTILEVER / np.square(np.square(length)), -GRAVITY[1] / length, tie)
 
     def spread(self, log_ratios: np.ndarray) -> np.ndarray:
-        """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more of it.
+        """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more clumping.
 
-        Whatever drives a hair out of its lock's way works against its own stiffness k0 and its ties, 2 k in the solver's
-        energy k |x - mean of neighbours|^2 per mass. So it strays by the drive over k0 + 2 k t, with k0 = 12.36 B / L^4 + w g / L
-        and its `tie` t: ties hardly act on short hair, and are most of what holds long hair. `benchmarks/materials.py` measures
-        it beside the solver.
+        Whatever drives a hair away from its lock works against its own stiffness k0 and its ties, 2 k in the solver's energy
+        k |x - mean of neighbours|^2 per mass. So it strays by the drive over k0 + 2 k t, with k0 = 12.36 B / L^4 + w g / L and its
+        `tie` t: ties hardly act on short hair, and are most of what holds long hair. `benchmarks/materials.py` compares this with
+        the solver.
 
         Args:
             log_ratios: of the material (4,), see `Material.log_ratios`.
@@ -85,8 +85,8 @@ class Locks:
         return ((own + 2 * self.tie * Material().clumping) / (own + 2 * self.tie * clumping)).astype(np.float32)
 
     def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:
-        """Change how far hairs stray from their locks. Each edge keeps the length that the network gave it: that at rest, unless
-        the model answers with displacements, which may stretch hair.
+        """Change how far hairs stray from their locks. Each edge keeps the length that the network gave it: its rest length, unless
+        the model outputs displacements, which may stretch hair.
 
         Args:
             displacement: of these hairs (n, 72) float32 [m], changed in place.
@@ -109,9 +109,9 @@ class Locks:
 def _tie(rest: np.ndarray, mates: np.ndarray, lock: np.ndarray, means: np.ndarray) -> np.ndarray:
     """How firmly ties hold the hairs of each lock (S,): about 1 where each is tied to all others, 0 where one is alone.
 
-    Ties join next neighbours, so a wide lock resists little when its hairs part evenly from one side to the other, and as any
-    other when one parts from the next. Hair does both: it is the geometric mean of 1 and of the Rayleigh quotient of the ties
-    in the field by which hairs lie apart at rest.
+    Ties join nearest neighbours, so a wide lock resists little when its hairs spread evenly from one side to the other, but as
+    much as any other lock when one hair parts from the next. Hair does both: the result is the geometric mean of 1 and the
+    Rayleigh quotient of the ties for the field of the hairs' offsets at rest.
 
     Args:
         rest: (S, 24, 3) [m].

@@ -14,7 +14,7 @@ from neuralocks_core.deformation.scratch import Scratch, in_turn
 from neuralocks_core.deformation.turning import Coils
 
 WIDEST = spans.NODES + 4
-"""Strands are laid out as a grid where each own vertex depends on at most so many network vertices over all strands."""
+"""Strands are laid out as a grid if each own vertex depends on at most this many network vertices over all strands."""
 
 _scratch = Scratch()
 
@@ -22,14 +22,14 @@ _scratch = Scratch()
 class Following:
     """Displacements of the own vertices of some strands.
 
-    Means of the network's vertices (`spans`), turned with them where strands are finer than these (`turning`), with
-    their lengths kept (`lengths`).
+    They are means of the network's vertices (`spans`), turned with the strand where its detail is finer (`turning`), and
+    lengths are kept (`lengths`).
 
     Args:
         rest: (N, K, 3) [m], the network's vertices.
         valid: (N,) bool, strands that move.
         own: (P, 3) [m] own vertices, same axes.
-        counts: (N,) how many of these each strand has.
+        counts: (N,) how many own vertices each strand has.
         place: (P,) in [0, K - 1], position along the strand in network segments.
     """
 
@@ -38,7 +38,7 @@ class Following:
         first, weights, fine = spans.weights(rest, own, strand, place)
         self._fine = fine & valid
         self._ends = np.concatenate([[0], np.cumsum(counts)])
-        # As many vertices in each strand, each at about the same place in all of them, is what grooming tools write.
+        # Grooming tools write the same number of vertices in each strand, each at about the same place in all of them.
         grid = first.reshape(len(counts), -1) if counts[0] > 1 and (counts == counts[0]).all() else None
         self._each = None if grid is None or np.ptp(grid, axis=0).max() > WIDEST - spans.NODES else int(counts[0])
         self._means = _Varied(first, weights, strand, rest.shape[1]) if self._each is None else _Alike(grid, weights)
@@ -78,17 +78,17 @@ class Following:
 
 
 class _Alike:
-    """Means in strands of V vertices each, as steps from one vertex to the next: these are what `keep_lengths` works on.
+    """Means in strands of V vertices each, as steps from one vertex to the next, as `keep_lengths` needs them.
 
     Args:
-        first: (N, V) first network vertex that an own vertex is a mean of, the root of the network's.
-        weights: (N V, spans.NODES) of it and the next ones.
+        first: (N, V) first network vertex that an own vertex is a mean of, counted from its strand's root.
+        weights: (N V, spans.NODES) of this vertex and the next ones.
     """
 
     def __init__(self, first: np.ndarray, weights: np.ndarray) -> None:
         weights = weights.reshape(*first.shape, spans.NODES).T
-        # A vertex moves further than the root by a share of each of the network's steps up to it: all of those before its
-        # first network vertex, and of the next three the weights of what lies beyond.
+        # Relative to the root, a vertex moves by a share of each of the network's steps up to it: all of those before its first
+        # network vertex, and of the next three the sum of the weights beyond.
         beyond, first = np.cumsum(weights[:0:-1], axis=0, dtype=float)[::-1], first.T
 
         def share(own: slice, step: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class _Alike:
                 np.copyto(result, beyond[node, own], where=late == node)
             return result
 
-        # The network's steps that own steps depend on, from the first of any strand to the last of any strand: a number of
+        # The network's steps that own steps depend on, from the first of any strand to the last of any strand: the number of
         # each, and its shares (V', N). Few own steps depend on more than four.
         low, high = first[:-1].min(axis=1), first[1:].max(axis=1) + spans.NODES - 2
         self._terms = []
@@ -110,7 +110,7 @@ class _Alike:
             self._terms.append((begin, end, of, term.astype(np.float32, order="C")))
 
     def put(self, displacement: np.ndarray, start: int, result: np.ndarray, spare: np.ndarray) -> None:
-        """Into `result` (3, V, n), of strands from `start` on; `spare` is of the same shape, memory."""
+        """Write into `result` (3, V, n), for strands from `start` on; `spare` is scratch memory of the same shape."""
         count, vertices = displacement.shape[:2]
         network, steps = in_turn.arrays((3, vertices, count), (3, vertices - 1, count))
         network[:] = displacement.transpose(2, 1, 0)
@@ -118,7 +118,7 @@ class _Alike:
         result[:, 0] = network[:, 0]
         whole = result[:, 1:]
         for number, (begin, end, of, shares) in enumerate(self._terms):
-            # One piece of memory, or `take` would fill a copy first.
+            # Contiguous memory, or `take` would fill a copy first.
             part = spare.reshape(-1)[: 3 * len(of) * count].reshape(3, len(of), count)
             steps.take(of, axis=1, out=part, mode="clip")
             if number:
@@ -143,7 +143,7 @@ class _Varied:
         self._weights = np.ascontiguousarray(weights.T)
 
     def put(self, displacement: np.ndarray, start: int, own: slice, result: np.ndarray) -> None:
-        """Into `result` (3, P'), own vertices `own` of the strands from `start` on."""
+        """Write own vertices `own` of the strands from `start` on into `result` (3, P')."""
         first, weights = self._first[own].astype(np.intp), self._weights[:, own]
         first -= start * displacement.shape[1]
         part, flat = np.empty(len(first), np.float32), displacement.reshape(-1, 3)

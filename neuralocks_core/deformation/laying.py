@@ -10,27 +10,27 @@ from neuralocks_core.strands.strand_set import CLAMPED
 MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
 SLACK = np.float32(1e-5)
-"""Hair that may rest inside is not pushed because of rounding in the network's output: so much [m] is let pass."""
+"""Tolerance [m], so that hair that may rest inside is not pushed because of rounding in the network's output."""
 TRIES = 2
-"""Planes that a vertex is laid on, one after the other: the next is that of where the last has brought it."""
+"""Planes that a vertex is laid on, one after another: each is measured where the one before has put it."""
 FLAT = 0.004
-"""A vertex that a plane moves by less than this [m] need not be measured again: so near, skin bends away by less than the margin."""
+"""A vertex that a plane moves by less than this [m] is not measured again: nearby skin bends away by less than the margin."""
 BACK = 0.3
-"""A strand that was pushed bends back to where it was wanted, each segment by at most so much of its length."""
+"""A pushed strand bends back towards its wanted place, each segment by at most this share of its length."""
 UNSEEN = 0.012
-"""Where no distance is known outside, it is at least this [m]."""
+"""An unknown distance outside is at least this [m]."""
 STEEP = 0.003
-"""By how much more than its length a segment may seem to go down [m]: distances are that wrong at most."""
+"""How much more than its length a segment may seem to go down [m]: the largest error of distances."""
 
 
 def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
     """Strands laid over the surface where they were inside it.
 
-    Strand by strand, from the root on and with every length kept, each segment keeps the direction that was wanted as
-    nearly as the surface under its end lets it. Looked for from the vertex before, which is outside already, that
-    surface is at most a segment away, however deep the strand was wanted: which way is out is clear, and changes little
-    from one frame to the next. A strand depends on itself and on the body only: neither the order of strands nor their
-    division into chunks matters. Up to the first vertex that must give way, a strand stays bit for bit.
+    From the root of each strand on, and with every length kept, each segment keeps its wanted direction as nearly as the
+    surface under its end allows. That surface is searched for from the vertex before, which is already outside, so it is at
+    most a segment away, however deep the strand was wanted: the way out is clear, and changes little from one frame to the
+    next. A strand depends only on itself and the body: neither the order of strands nor their division into chunks matters.
+    Up to the first vertex that must give way, a strand stays the same, bit for bit.
 
     Args:
         points: deformed strands (S, K, 3) [m], in the body's space.
@@ -97,7 +97,7 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
     for i in range(max(1, int((keep - distance > SLACK).any(axis=1).argmax())), len(wanted)):
         before, length = result[i - 1], lengths[i - 1]
         end = np.where(moved, before + _aimed(edges[i - 1], wanted[i - 1] - before, length), wanted[i])
-        # Distances change by little more than the way gone: most need not be measured anew.
+        # A distance changes by little more than the vertex moves: most need not be measured again.
         known = np.where(np.isinf(distance[i]), UNSEEN, distance[i])
         near = np.flatnonzero(known - 1.2 * _size(end - wanted[i]) < keep[i])
         depth, out = distance[i].copy(), way[i].copy()
@@ -133,13 +133,13 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
 
 
 def _supposed(planes: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (n,) and direction (3, n) where none is known, or one that is too deep to be true.
+    """Distance (n,) and direction (3, n) where none is known, or the known one is too deep to be true.
 
-    What is known of the vertex before holds there, too, if that lies on the skin or below it, and what is known of where
-    the vertex was wanted, if that is inside; of two such planes, the nearer is the way out.
+    The plane of the vertex before also holds there if that vertex lies on the skin or below it, and so does the plane of the
+    wanted place if that is inside; of the two, the nearer plane is the way out.
 
     Args:
-        planes: distance (n,), its direction (3, n) and the way from there (3, n), of the vertex before and of that place.
+        planes: of the vertex before and of the wanted place, distance (n,), its direction (3, n) and the way from there (3, n).
     """
     (first, up, step), (second, other, far) = planes
     height = np.where(first < 2 * MARGIN, first + _dot(up, step), np.inf)
@@ -150,7 +150,7 @@ def _supposed(planes: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
 def _aimed(edge: np.ndarray, off: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Wanted segments (3, n) [m], bent back a little for vertices that lie `off` (3, n) from their wanted places.
 
-    By less than a segment: strands turn to where they were wanted, and never turn round on the way.
+    By less than a segment: strands turn towards their wanted places, and never turn round on the way.
     """
     most = BACK * length
     aim = edge + off * (most / np.sqrt(_dot(off, off) + most**2 + 1e-30))
@@ -159,13 +159,13 @@ def _aimed(edge: np.ndarray, off: np.ndarray, length: np.ndarray) -> np.ndarray:
 
 
 def _tilted(along: np.ndarray, up: np.ndarray, lack: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Segments (3, n) turned as little as lifts their ends by `lack` (n,) [m] along `up` (3, n), and how far it does.
+    """Segments (3, n) turned just enough to lift their ends by `lack` (n,) [m] along `up` (3, n), and by how much it does.
 
-    Straight away from the body if not even that is enough.
+    They point straight away from the body if even that is not enough.
     """
     rise = _dot(along, up)
     slope = np.clip(rise + lack, -length, length)
-    # By a billionth sideways: one that goes straight down has to fall to some side.
+    # A billionth sideways: a segment that goes straight down has to fall to some side.
     side = along - rise * up + 1e-9 * up[[1, 2, 0]]
     side -= _dot(side, up) * up
     side *= np.sqrt(length**2 - slope**2) / np.maximum(_size(side), 1e-30)

@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core.deformation.scratch import Scratch, in_turn
 
 TINY = np.float32(1e-24)
-"""[m^2] Keeps edges of no length finite, and is too little to change others."""
+"""[m^2] Keeps zero-length edges finite, and is too small to change others."""
 
 _scratch = Scratch()
 
@@ -16,17 +16,17 @@ _scratch = Scratch()
 def keep_lengths(points: np.ndarray, steps: np.ndarray, spare: np.ndarray, smooth: np.ndarray) -> np.ndarray:
     """Displacements with which no edge is longer or shorter than at rest.
 
-    From the root on, each edge keeps about the direction it was moved to, and the hair its way. Where nothing is moved
-    nothing changes, bit for bit, and a strand depends on itself alone.
+    From the root on, each edge about keeps the direction it was moved to, and the hair its path. What does not move stays the
+    same, bit for bit, and a strand depends only on itself.
 
     Coordinates come first and strands last: what is done to one vertex of all strands is one contiguous array.
 
     Args:
         points: (3, V, N) float32 [m] vertices at rest of N strands of V vertices.
-        steps: (3, V, N) float32 [m] how much further each vertex is displaced than the one before it, and the root as a
+        steps: (3, V, N) float32 [m] how much more each vertex is displaced than the one before it, and the root as a
             whole; overwritten.
-        spare: (3, V, N) float32, memory.
-        smooth: (N,) bool, strands whose edges point along their way; those of a coil point all around.
+        spare: (3, V, N) float32, scratch memory.
+        smooth: (N,) bool, strands whose edges point along their path; a coil's point all around.
 
     Returns:
         (3, V, N) float32 [m], in the memory of `steps` or `spare`.
@@ -37,10 +37,10 @@ def keep_lengths(points: np.ndarray, steps: np.ndarray, spare: np.ndarray, smoot
     edges += before
     _dot(before, before, lengths)
     _measure(edges, lengths, squared, scale)
-    # Where lengths alone would put each vertex, seen from where it was moved to: the sum of (scale - 1) edge. Along the
-    # hair that does not matter, to its side it takes the hair off its way, into the head even: so much each edge turns
-    # back. With `along` times its own edge being what of a vertex's drift is along the hair, an edge without the drift of
-    # its ends to the side is, but for its length, edge_i (1 + along_i) - edge_(i-1) along_(i-1).
+    # Restoring lengths alone would make each vertex drift from where it was moved to, by the sum of (scale - 1) edge. Drift
+    # along the hair does not matter, but sideways drift takes the hair off its path, even into the head: each edge is turned
+    # back by it. If `along` times its own edge is the part of a vertex's drift along the hair, an edge without the sideways
+    # drift of its ends is, apart from its length, edge_i (1 + along_i) - edge_(i-1) along_(i-1).
     scale -= np.float32(1.0)
     scale *= smooth
     np.multiply(edges, scale, out=drift)
@@ -57,7 +57,7 @@ def keep_lengths(points: np.ndarray, steps: np.ndarray, spare: np.ndarray, smoot
 
 
 def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarray, smooth: np.ndarray) -> None:
-    """`keep_lengths` of strands of any numbers of vertices.
+    """`keep_lengths` for strands with any numbers of vertices.
 
     Args:
         points: (3, P) float32 [m] vertices at rest of consecutive strands.
@@ -65,9 +65,9 @@ def keep_lengths_of_any(points: np.ndarray, moved: np.ndarray, counts: np.ndarra
         counts: (N,) vertices of each strand.
         smooth: (N,) bool, as above.
     """
-    # Strands of about the same number of vertices together; the last vertex is repeated: an edge of no length.
+    # Strands with about the same number of vertices go together; the last vertex is repeated: an edge of zero length.
     starts, alike = np.cumsum(counts) - counts, np.frexp(counts)[1]
-    # Of each strand, where its root comes to lie in what is kept, and how far from one vertex the next.
+    # For each strand, the index of its root in what is kept, and the step from one vertex to the next.
     column, across = np.empty((2, len(counts)), np.intp)
     kept, end = [], 0
     for size in np.unique(alike[counts > 0]):
@@ -97,7 +97,7 @@ def _measure(edges: np.ndarray, lengths: np.ndarray, squared: np.ndarray, scale:
 
 
 def _add_up(edges: np.ndarray, spare: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums along the strands, and what is left of the two arrays, in which anything may be now."""
+    """Sums along the strands, and the other of the two arrays, whose content is arbitrary."""
     # Sums of 2, 4, 8 ... of them: the same numbers however many strands there are, in few calls, between which threads
     # take turns.
     reach = 1

@@ -17,20 +17,20 @@ from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
 
 STILL = 1e-3
-"""Skin that moves by less than this against the head [m] stands still."""
+"""Skin that moves by less than this relative to the head [m] counts as still."""
 STEP, ROOM = 0.1, 0.1
-"""The part of the body that hair can reach, a ball, is that much larger [m]: to the next multiple of STEP, and ROOM."""
+"""The ball that hair can reach is enlarged [m]: to the next multiple of STEP, plus ROOM."""
 DEEP = 0.02
-"""A strand that rests deeper than this [m] is looked at in every frame: what follows may lie where nothing is known."""
+"""A strand that rests deeper than this [m] is checked in every frame: its next vertices may lie where nothing is known."""
 BATCH = 2048
-"""Strands looked at together."""
+"""Strands checked together."""
 PUSHED = 1024
 """Strands pushed together."""
 
 
 def reach(character: Character, strands: StrandSet) -> float:
     """Radius [m] about the middle of the head in which the groom could touch the body in some pose, with room for the neck to
-    bend; 0 where it has no strand. In steps, so that the grooms of a head share it, and what is made of it.
+    bend; 0 if it has no strand. In steps, so that the grooms of a head share it and what is built from it.
     """
     if not strands.valid.any():
         return 0.0
@@ -42,15 +42,15 @@ def reach(character: Character, strands: StrandSet) -> float:
 class Resolver:
     """Keeps one groom out of its character's body, frame by frame, in canonical space.
 
-    A giant is shrunk to a person's size for it, or its grids would have a thousand times as many nodes, and what is near,
-    thin or deep on a person would be nothing on it. By a power of two, which rounds no number: what is not pushed stays bit
-    for bit.
+    A giant is shrunk to a person's size first: otherwise its grids would have a thousand times as many nodes, and what counts as
+    near, thin or deep on a person would be tiny on it. The factor is a power of two, which rounds no number: what is not pushed
+    stays the same, bit for bit.
 
     Args:
         character: whose body the hair must stay out of; without a body nothing is done.
         strands: the groom at rest.
-        clip: the motion to come. What hardly moves against the head in it is looked up in a grid made once, and blend
-            shapes that do not change in it are part of the pose at rest.
+        clip: the motion to come. Skin that hardly moves relative to the head in it is looked up in a grid built once, and blend
+            shapes that do not change in it are part of the rest pose.
 
     Attributes:
         body: the part of the body that the hair can reach, or None.
@@ -70,7 +70,7 @@ class Resolver:
         return Collider(self.character.canonical(self.body.shaped(self._constant)), self.body.triangles)
 
     def collider(self, joints: np.ndarray, shape: np.ndarray | None = None) -> Collider | None:
-        """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: to measure with."""
+        """The exact collider of one pose, world joint transforms (J, 4, 4), in canonical space: for measurements."""
         if self.body is None:
             return None
         return Collider(self.body.posed(self.character.skinning(joints), shape), self.body.triangles)
@@ -88,7 +88,7 @@ class Resolver:
         return self._posed(joints, shape, points.min(axis=0), points.max(axis=0)).distance(points)[0] * self._size
 
     def prepare(self) -> None:
-        """Make now, once for all frames, what the first one would have to wait for."""
+        """Build now, once for all frames, what the first frame would otherwise wait for."""
         if self.body is not None:
             _ = self.clear
 
@@ -101,10 +101,10 @@ class Resolver:
             displacement: canonical, changed in place.
             joints: world joint transforms (J, 4, 4).
             shape: blend shape weights (B,).
-            each: as `map`, on several threads say; the result does not depend on them.
+            each: like `map`, possibly on several threads; the result does not depend on them.
 
         Raises:
-            NeuralocksError: an array is of another shape.
+            NeuralocksError: an array has the wrong shape.
         """
         if self.body is None or not len(displacement):
             return
@@ -140,7 +140,7 @@ class Resolver:
         return self._near.posed(self._shrunk(self.character.skinning(joints)), changed, low, high)
 
     def _shrunk(self, transforms: np.ndarray) -> np.ndarray:
-        """Transforms (..., 4, 4) into canonical space that go on to a person's size."""
+        """Transforms (..., 4, 4) into canonical space, followed by scaling to a person's size."""
         result = transforms.copy()
         result[..., :3, :] /= self._size
         return result
@@ -187,13 +187,13 @@ class Resolver:
 
 def _corners(points: np.ndarray) -> np.ndarray:
     """Low and high corner (2, 3) of points (S, K, 3)."""
-    # Along the strands first: rows of numbers are compared much faster than triples.
+    # Along the strands first: comparing rows of numbers is much faster than comparing triples.
     rows = points.reshape(len(points), -1)
     return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
 
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
-    """Which vertices (V,) move by less than STILL against the head, by a bound from each joint's largest motion, and are
+    """Which vertices (V,) move by less than STILL relative to the head, by a bound from each joint's largest motion, and are
     moved by no blend shape.
     """
     shift = turn = np.zeros(len(character.skeleton.names))

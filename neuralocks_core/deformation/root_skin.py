@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair stays on skin that blend shapes move: a face's, or that of a body of another shape than it was groomed on."""
+"""Hair stays on skin that blend shapes move: a face's, or that of a body with another shape than the one it was groomed on."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 NEAR, FAR = 0.02, 0.04
 """Roots up to NEAR from the skin [m] move with it, those from FAR on do not, and those in between in part."""
 STAYS = 1e-6
-"""Skin that a shape moves by less [m] stays."""
+"""Skin that a shape moves by less than this [m] counts as still."""
 BETTER = 5e-4
-"""Hair was groomed on a body with blend shapes if its roots lie nearer to that one's skin in the median, by so much [m]."""
+"""Hair was groomed on a body with blend shapes if its roots are closer to that body's skin by this much [m] in the median."""
 SOME_ROOTS = 1000
-"""So many roots, about, tell on which body."""
+"""About this many roots decide on which body."""
 
 
 class RootSkin:
-    """Carries each strand along, as a whole, by as much as blend shapes move the skin at its root.
+    """Carries each strand along as a whole, by as much as blend shapes move the skin at its root.
 
-    Joints are not looked at: as the rest of the strand, its root rides on the joint that carries the groom.
+    Joints do not matter here: like the rest of the strand, its root rides on the joint that carries the groom.
 
     Args:
         character: whose blend shapes; without a body nothing is done.
-        grooms: of its head, at rest, one after the other. Each was made for the body without blend shapes, or with those
-            that the animation begins with, whichever its roots fit better.
+        grooms: of its head, at rest, concatenated. Each was made either for the body without blend shapes or for the one at the
+            start of the animation; its roots decide which fits better.
         clip: whose blend shapes will be asked for.
 
     Attributes:
@@ -56,7 +56,7 @@ class RootSkin:
         return np.concatenate(each)[:, None]
 
     def begun(self, strands: StrandSet) -> StrandSet:
-        """The same strands where they lie on the body as it is when the animation begins."""
+        """The same strands placed on the body as it is when the animation begins."""
         return strands.carried(self._shift) if self.moves else strands
 
     def carry(
@@ -67,7 +67,7 @@ class RootSkin:
         Args:
             displacement: (S, 24, 3) float32 [m], canonical.
             shape: blend shape weights (B,).
-            then: does something more to it, in place, and takes it as displacement from where `begun` has the strands.
+            then: changes it further, in place, as a displacement from the strands of `begun`.
         """
         if self.moves:
             displacement += self.moved(shape) - self._shift
@@ -83,7 +83,7 @@ class _Below:
     Args:
         character: with a body.
         roots: (S, 3) [m], canonical.
-        faces: (F, 3) the triangles near to them.
+        faces: (F, 3) the triangles near them.
         made_for: blend shape weights (B,) of the body that the groom was made for.
     """
 
@@ -101,7 +101,7 @@ class _Below:
         self._count = len(used)
 
     def moved(self, shape: np.ndarray) -> np.ndarray:
-        """How far each strand is carried (S, 3) float32 [m]; zeros, and nothing else, for the body that it was made for."""
+        """How far each strand is carried (S, 3) float32 [m]; exactly zero for the body that it was made for."""
         skin = np.zeros((self._count, 3))
         for way, weight in zip(self._ways, shape - self._made_for, strict=True):
             if weight and way is not None:
@@ -110,7 +110,7 @@ class _Below:
 
 
 def _below(character: Character, groom: StrandSet, clip: Clip) -> _Below | None:
-    """The skin below a groom, or None where no blend shape of the clip moves it."""
+    """The skin below a groom, or None if no blend shape of the clip moves it."""
     body, begun, roots = character.body, clip.shape[0], groom.rest[:, 0].astype(float)
     if not groom.valid.any():
         return None
@@ -131,10 +131,10 @@ def _below(character: Character, groom: StrandSet, clip: Clip) -> _Below | None:
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Weights (n, 3) of the corners (n, 3, 3) of triangles that give the place nearest to each point (n, 3)."""
+    """Weights (n, 3) of the corners (n, 3, 3) of triangles of the place nearest to each point (n, 3)."""
     a, b, c = corners.transpose(1, 0, 2)
     place, _ = closest_on_triangle(points, a, b, c)
-    # Areas of the parts into which that place divides its triangle.
+    # Areas of the parts into which this place divides its triangle.
     parts = [np.cross(c - b, place - b), np.cross(a - c, place - c), np.cross(b - a, place - a)]
     whole = np.cross(b - a, c - a)
     shares = np.stack([(part * whole).sum(axis=1) for part in parts], axis=1)

@@ -9,12 +9,12 @@ import numpy as np
 KEPT = 2**20
 """Most numbers that a thread keeps for one purpose."""
 SHAPES = 16
-"""So many lots of shapes are remembered."""
+"""Number of sets of shapes that are remembered."""
 
 
 class Scratch(threading.local):
-    """Arrays for one purpose, the same memory each time a thread asks for it: a groom's chunks are alike, and memory that is
-    asked for anew costs more than what is computed in it.
+    """Arrays for one purpose, in the same memory each time a thread asks: a groom's chunks are alike, and allocating memory
+    costs more than the computation in it.
     """
 
     def __init__(self) -> None:
@@ -22,8 +22,8 @@ class Scratch(threading.local):
         self._known: dict[tuple[tuple[int, ...], ...], list[np.ndarray]] = {}
 
     def arrays(self, *shapes: tuple[int, ...]) -> list[np.ndarray]:
-        """A float32 array of each shape; what is in it is anything, and it is overwritten after this thread's next
-        call, be that for other shapes.
+        """A float32 array of each shape, with arbitrary content; it is overwritten after this thread's next call, even one for
+        other shapes.
         """
         if shapes in self._known:
             return self._known[shapes]
@@ -40,6 +40,6 @@ class Scratch(threading.local):
 
 
 in_turn = Scratch()
-"""For steps that follow each other in a chunk, none of which needs what another had here: all together then touch hardly more
-than a core's second-level cache holds.
+"""For consecutive steps of a chunk, none of which needs what another one had here: together they touch hardly more than a core's
+second-level cache holds.
 """

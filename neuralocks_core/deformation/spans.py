@@ -9,21 +9,21 @@ NODES = 4
 """Consecutive network vertices that an own vertex is a mean of."""
 
 LEFT_OVER = 5e-5
-"""[m] What the mean may miss an own vertex by, half a hair's width: that much is carried along unturned."""
+"""[m] Largest error of a mean at an own vertex, half a hair's width; this rest is carried along unturned."""
 
 LARGEST = 0.5
-"""Largest correction of a weight. A strand that needs more is finer than the network's vertices (a coil, say)."""
+"""Largest correction of a weight. A strand that needs more has detail finer than the network's vertices (such as a coil)."""
 
 _STIFFNESS = 0.01
-"""Corrections are kept small as if each cost this share of a segment's length."""
+"""Regularises corrections: each costs this share of a segment's length."""
 
 
 def weights(rest: np.ndarray, own: np.ndarray, strand: np.ndarray, place: np.ndarray):
     """Weights of four consecutive network vertices for each own vertex.
 
-    They begin as a Catmull-Rom spline's, straight in the clamped first segment. Where a groom's own corner lies off
-    that curve they are corrected by the smallest change, of sum zero, that takes them there: means of weight one
-    follow any rigid or affine motion of the network's vertices exactly, so the corner turns with its surroundings.
+    They begin as a Catmull-Rom spline's, straight in the clamped first segment. If a groom's own corner lies off that curve,
+    they get the smallest correction, of sum zero, that moves the curve there: means of weight one follow any rigid or affine
+    motion of the network's vertices exactly, so the corner turns with its surroundings.
 
     Args:
         rest: (S, K, 3) [m] network vertices.
@@ -32,8 +32,8 @@ def weights(rest: np.ndarray, own: np.ndarray, strand: np.ndarray, place: np.nda
         place: (P,) in [0, K - 1], position along it in network segments.
 
     Returns:
-        first (P,) int32, the first of the four; weights (P, 4) float32; fine (S,) bool, strands that cannot be put
-        like this.
+        first (P,) int32, the first of the four; weights (P, 4) float32; fine (S,) bool, strands that cannot be represented
+            like this.
     """
     count = rest.shape[1]
     first, curve = _spline(place, count)
@@ -74,11 +74,11 @@ def _spline(place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _correction(corners: np.ndarray, missed: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest changes of weights (4, n), of sum zero, that reach `missed` (n, 3), and what is left of it (n,) [m].
+    """Smallest changes of weights (4, n), of sum zero, that reach `missed` (n, 3), and the remaining distance (n,) [m].
 
     Minimises |C^T w - r|^2 + size^2 |w|^2, C the corners (n, 4, 3) about their mean: w = C y, (C^T C + size^2) y = r.
     """
-    # One array a coordinate, and the inverse of a symmetric 3x3 matrix written out: a hundred times faster than row by
+    # One array per coordinate, and the inverse of a symmetric 3x3 matrix written out: a hundred times faster than row by
     # row.
     x, y, z = np.moveaxis(corners, (2, 1), (0, 1)).copy()
     for a in (x, y, z):

@@ -23,7 +23,7 @@ class StrandSession:
     Attributes:
         strands: the groom.
         strand_part: the first layer's part of each strand, (S, 256) float32.
-        anchor_offsets: the answers that an anchored model's are measured from, (S, 72) float32; see `anchor`.
+        anchor_offsets: the outputs that an anchored model's are measured from, (S, 72) float32; see `anchor`.
     """
 
     def __init__(self, model: StrandModel, strands: StrandSet):
@@ -35,14 +35,13 @@ class StrandSession:
         self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), HIDDEN)
         self.anchor_offsets = np.zeros((count, SHAPE), np.float32)
         self._anchored_at: np.ndarray | None = None
-        # What is many small steps of Python goes slower in two threads than in one; beside a network it does not.
+        # Many small steps of Python are slower in two threads than in one, but not alongside a network.
         self._turn = Lock()
 
     def anchor(self, vector: np.ndarray) -> None:
-        """Measure an anchored model's answers from this boundary vector: the bind pose, held, with the
-        materials in use.
+        """Measure an anchored model's outputs from this boundary vector: the held bind pose with the materials in use.
 
-        Costs one inference, and nothing when the vector is the one already in use.
+        Costs one inference, or nothing if this vector is already in use.
         """
         vector, _ = self._without_clumping(vector)
         if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
@@ -53,10 +52,10 @@ class StrandSession:
     def displacement(self, vector: np.ndarray) -> np.ndarray:
         """Displacement (S, 24, 3) float32 [m] in canonical space for one boundary vector (spec.size,).
 
-        Call `anchor` first where materials or body shape changed. Invalid strands stay at rest.
+        Call `anchor` first if materials or body shape changed. Invalid strands stay at rest.
 
         Raises:
-            NeuralocksError: the vector is of another shape.
+            NeuralocksError: the vector has the wrong shape.
         """
         frame, gather = self._frame(vector)
         result = self._tail("displacement", frame, gather)
@@ -66,7 +65,7 @@ class StrandSession:
         return result.reshape(len(result), K, 3)
 
     def _frame(self, vector: np.ndarray):
-        """What all strands share in a frame: the tail's inputs, and what to do to a chunk's displacement after it."""
+        """What all strands share in a frame: the tail's inputs, and how to change a chunk's displacement afterwards."""
         plain, clumping = self._without_clumping(vector)
         frame = self.model.frame(plain)
         if not clumping:  # exactly 0 for the default
@@ -92,7 +91,7 @@ class StrandSession:
         return locks, StrandSession(self.model, locks.strands)
 
     def _tail(self, output: str, frame: dict[str, np.ndarray], gather: Callable | None = None) -> np.ndarray:
-        """(S, 72) of all strands."""
+        """Output (S, 72) for all strands."""
 
         def values(chunk: slice) -> np.ndarray:
             found = self._chunk(output, chunk, frame)
@@ -104,8 +103,8 @@ class StrandSession:
         return self._by_chunk(values, SHAPE)
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
-        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just
-        computed it and still has it in its cache, one at a time.
+        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, one call at a time, in the thread that has
+        just computed the chunk and still has it in its cache.
         """
         (frame, gather), valid = self._frame(vector), self.strands.valid
 
@@ -121,7 +120,7 @@ class StrandSession:
         self.model.by_chunk(work, len(self.strands.rest))
 
     def _chunk(self, output: str, chunk: slice, frame: dict[str, np.ndarray]) -> np.ndarray:
-        """(n, 72) of one whole chunk."""
+        """Output (n, 72) for one whole chunk."""
         return self.model.run(
             "tail.onnx",
             output,
@@ -142,9 +141,9 @@ class StrandSession:
 
 
 def rest_edges(rest: np.ndarray) -> np.ndarray:
-    """(n, 72) rest edges, the first zero. Made anew for each chunk: that is cheaper than to keep them."""
+    """(n, 72) rest edges, the first zero. Computed again for each chunk, which is cheaper than keeping them."""
     flat, edges = rest.reshape(-1), np.empty(rest.size, np.float32)
-    np.subtract(flat[3:], flat[:-3], out=edges[3:])  # one long row; what reaches from strand to strand is the first
+    np.subtract(flat[3:], flat[:-3], out=edges[3:])  # one long row; the edge from strand to strand is the first
     edges = edges.reshape(len(rest), -1)
     edges[:, :3] = 0
     return edges
@@ -152,7 +151,7 @@ def rest_edges(rest: np.ndarray) -> np.ndarray:
 
 def strand_inputs(strands: StrandSet, codes: np.ndarray) -> np.ndarray:
     """What the network reads of each strand (S, 142) float32: root UV 2, z_rest 32, z_lock 32, root normal 3, length 1, as in
-    the paper (section 3.3), and rest points from the root 72 [m, canonical space], since the way it points is not in its code.
+    the paper (section 3.3), and rest points from the root 72 [m, canonical space], since the code lacks the strand's direction.
     """
     locks = lock_codes(codes, strands.lock, strands.valid)
     points = (strands.rest - strands.rest[:, :1]).reshape(len(codes), -1)

@@ -7,14 +7,14 @@ import numpy as np
 
 
 class Coils:
-    """Own vertices of strands that are finer than the network's vertices.
+    """Own vertices of strands with detail finer than the network's vertices.
 
     Args:
         rest: (N, K, 3) [m], the network's vertices.
         own: (P, 3) [m] own vertices, same axes.
         strand: (P,) which strand each belongs to.
         place: (P,) in [0, K - 1], position along it in network segments.
-        fine: (N,) bool, which strands are meant.
+        fine: (N,) bool, which strands have such detail.
     """
 
     def __init__(self, rest, own, strand, place, fine) -> None:
@@ -23,7 +23,7 @@ class Coils:
         own, strand, place = own[chosen], (np.cumsum(fine) - 1)[strand[chosen]], place[chosen]
         moving = rest[fine]
         self._edges = np.diff(moving, axis=1).transpose(2, 0, 1).copy()
-        # How many of them come before a strand of all N, and before each of their own vertices.
+        # How many fine strands come before each of all N, and how many own vertices before each fine strand.
         self._before = np.concatenate([[0], np.cumsum(fine)])
         self._ends = np.searchsorted(strand, np.arange(len(moving) + 1))
         segment = np.clip(place.astype(np.int32), 0, vertices - 2)
@@ -33,11 +33,11 @@ class Coils:
         self._share, self._segment = share[:, 0].astype(np.float32), at.astype(np.int32)
 
     def moved(self, displacement: np.ndarray, start: int) -> np.ndarray:
-        """Displacement (3, P') [m] of their own vertices.
+        """Displacement (3, P') [m] of the own vertices of fine strands.
 
         Args:
-            displacement: (n, K, 3) [m] of the network's vertices of the next n of them.
-            start: the strand of all N from which on they are counted.
+            displacement: (n, K, 3) [m] of the network's vertices, for the next n of all strands.
+            start: the first of these, counted among all N.
         """
         first = self._before[start]
         last = first + len(displacement)
@@ -49,15 +49,15 @@ class Coils:
 def turned(
     edges: np.ndarray, displacement: np.ndarray, segment: np.ndarray, share: np.ndarray, residual: np.ndarray
 ) -> np.ndarray:
-    """Displacement of own vertices: that of the polyline at their place, and their distance from it turned.
+    """Displacement of own vertices: that of the polyline at their place, plus their turned offset from it.
 
-    It is turned by the smallest rotations that take the polyline's rest segments to the deformed ones.
+    The offset is turned by the smallest rotations that take the polyline's rest segments to the deformed ones.
 
     Args:
         edges: (3, N, K - 1) float32 [m], segments at rest.
         displacement: (N, K, 3) float32 [m].
         segment: (P,) first vertex of the segment each own vertex lies at, counted through all strands.
-        share: (P,) float32 of the way to the next vertex.
+        share: (P,) float32 of the distance to the next vertex.
         residual: (3, P) float32 [m] from the polyline to the own vertex, at rest.
 
     Returns:
@@ -71,7 +71,7 @@ def turned(
     turns = _turns(edges, steps[:, :, :-1])
     turn = _at(turns, segment)
     turn += share * (_at(turns, segment + 1) - turn)
-    # A quaternion of any length turns r by 2 (w q x r + q x (q x r)) / |q|^2: nothing where q is zero.
+    # A quaternion of any length turns r by 2 (w q x r + q x (q x r)) / |q|^2: not at all if q is zero.
     once = _cross(turn[:3], residual)
     twice = _cross(turn[:3], once)
     once *= turn[3]
@@ -84,7 +84,7 @@ def turned(
 def _turns(edges: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Smallest rotations of the segments at rest to the deformed ones, blended at each vertex.
 
-    Blended, so that what lies off the polyline is not torn where two segments meet.
+    They are blended so that detail off the polyline is not torn where two segments meet.
 
     Args:
         edges: (3, N, K - 1) [m], segments at rest.
@@ -95,7 +95,7 @@ def _turns(edges: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """
     now = edges + steps
     lengths = np.sqrt(_dot(edges, edges) * _dot(now, now))
-    # Half way between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
+    # Halfway between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
     segment = np.empty((4, *lengths.shape), np.float32)
     segment[:3] = _cross(edges, now)
     np.add(lengths, _dot(edges, now), out=segment[3])
@@ -113,8 +113,8 @@ def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (3, ...), coordinates first: x y z x y of both, so that three products are one call. Strands
-    that are this fine are mostly a few of a groom, and calls are then what costs.
+    """Cross products of vectors (3, ...), coordinates first: x y z x y of both, so that three products are one call. Usually only
+    a few strands of a groom are this fine, so the number of calls determines the cost.
     """
     a, b = np.concatenate([a, a[:2]]), np.concatenate([b, b[:2]])
     result = a[1:4] * b[2:]

@@ -23,10 +23,10 @@ from neuralocks_core.strands.strand_set import StrandSet
 STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
 RUN_IN = 10.0
-"""Time [s] after which what was earlier has died away: a loop's hair, simulated from rest for so long, ends a period where it
-began, but for millimetres of a few strands that creep over skin."""
+"""Time [s] after which earlier motion has died away: a loop's hair, simulated from rest for this long, ends a period where it
+began, except for millimetres in a few strands that creep over skin."""
 MOST_STEPS = 10_000
-"""Over five minutes; all of a rollout is held in memory."""
+"""Over five minutes; a whole rollout is held in memory."""
 TOGETHER = 32
 """Strands whose rollout is interpolated at a time."""
 
@@ -40,7 +40,7 @@ def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times
         times: (T,) [s].
 
     Returns:
-        Measures by the keys of `report.LABELS`, whose units and remarks are theirs.
+        Measures by the keys of `report.LABELS`, which has their units and remarks.
     """
     error = metrics.motion_error(answer, reference, length)
     return {
@@ -68,13 +68,13 @@ def simulated(
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
 
-    It runs at its own step from the first time on, and anew from each cut, and is interpolated in between. The motion
-    that it feels is smooth between the clip's samples, as the network reads it.
+    It runs at its own step from the first time on, restarts at each cut, and is interpolated in between. The motion that
+    it feels is smooth between the clip's samples, as the network reads it.
 
     Args:
         character: with its body.
         strands: all valid.
-        clip: the motion. Of a loop, the first time should be RUN_IN before the next.
+        clip: the motion. For a loop, the first time should be RUN_IN before the second.
         times: (T,) [s].
         material: of the hair.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
@@ -100,12 +100,12 @@ def simulated(
 
 
 def _from(start: float, character, strands, clip, times, material, **options) -> np.ndarray:
-    """What `simulated` gives, of a clip without cuts and with hair at rest at `start` [s]."""
+    """The same as `simulated`, for a clip without cuts, with hair at rest at `start` [s]."""
     from neuralocks_core.reference import simulate
 
     stepped = Stepped.of(clip, joints_read(character))
     clip, start, times = stepped.clip, stepped.times(np.array([start]))[0], stepped.times(times)
-    # One step more than the last time needs: how hair goes on there is known, whichever times are wanted.
+    # One step more than the last time needs, so that interpolation there is the same for any wanted times.
     clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
     joints, shapes = _unscaled(character, _without_stop(character, clip, clock, times[-1])), clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
@@ -128,8 +128,8 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
 
 
 def _without_stop(character: Character, clip: Clip, clock: np.ndarray, last: float) -> np.ndarray:
-    """World joint transforms (C, J, 4, 4) at times `clock` (C,) [s]. Steps that go past the clip, where none but times in it
-    are wanted, go on with its last velocity: the hair is not to feel a stop there that it is not asked for.
+    """World joint transforms (C, J, 4, 4) at times `clock` (C,) [s]. If only times within the clip are wanted, steps past its end
+    continue with its last velocity, so that hair does not feel a stop that was not asked for.
     """
     motion = SmoothMotion(character, clip)
     joints = motion.at(clock)
@@ -140,7 +140,7 @@ def _without_stop(character: Character, clip: Clip, clock: np.ndarray, last: flo
 
 
 class _PosedBody(Sequence):
-    """World points (V, 3) [m] of a body in each of T frames, posed when they are asked for: of minutes they take gigabytes.
+    """World points (V, 3) [m] of a body in each of T frames, posed on access: for minutes of motion, all together take gigabytes.
 
     Args:
         body: the part that hair can reach.
@@ -159,8 +159,8 @@ class _PosedBody(Sequence):
 
 
 def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Points (T, S, 24, 3) float32 at times (T,), which are none before `clock` (C,) nor after it, of points
-    (C, S, 24, 3) there: cubics whose slopes are those of a parabola through each point and its neighbours.
+    """Points (T, S, 24, 3) float32 at times (T,), all within `clock` (C,), from points (C, S, 24, 3) at the clock's times:
+    cubics whose slopes are those of a parabola through each point and its neighbours.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -173,8 +173,8 @@ def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray) -> np.nda
 
 
 def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
-    """World joint transforms (T, J, 4, 4) as seen by a head that keeps its size: the solver, like the network, answers for
-    hair as long as at rest, whatever size the animation gives the head.
+    """World joint transforms (T, J, 4, 4) as seen by a head that keeps its size: like the network, the solver works on hair at
+    its rest length, whatever size the animation gives the head.
     """
     head = character.canonical_to_world(joints)
     rigid = head.copy()

@@ -12,7 +12,7 @@ from neuralocks_core.rotation import unit
 from neuralocks_core.strands.bends import bends
 
 BLOCK = 64
-"""Frames at a time: what is made of each takes several times its own memory."""
+"""Frames processed at a time: intermediate results of each take several times its own memory."""
 
 
 def energies(
@@ -24,7 +24,7 @@ def energies(
         points: (T, S, K, 3) [m] canonical.
         rest: (S, K, 3) [m] canonical.
         down: unit vectors of gravity in canonical axes, (T, 3).
-        material: constants; the default material where left out.
+        material: constants; the default material if left out.
 
     Returns:
         sums over all vertices, divided by the mass of all. `gravity`: -g weight m (x - x_rest) . down (paper section
@@ -57,8 +57,8 @@ def stretch_energy(lengths: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Mean of K/2 strain^2 per unit mass of each frame (T,) [m^2/s^2 = J/kg].
 
     Args:
-        lengths: (T, E) [m] of a groom's own edges; chords of finer hair would count its bending as stretch.
-        rest: (E,) [m] at rest; edges of no length weigh nothing.
+        lengths: (T, E) [m] of a groom's own edges; with chords of finer hair, bending would count as stretch.
+        rest: (E,) [m] at rest; zero-length edges count nothing.
     """
     strain = np.asarray(lengths, float) / np.maximum(rest, 1e-9) - 1
     return 0.5 * STRETCH * (np.square(strain) * rest).sum(axis=1) / max(rest.sum(), 1e-9)

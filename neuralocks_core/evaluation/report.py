@@ -44,32 +44,32 @@ LABELS = {
     "dynamic_frames": ("consecutive dynamic samples", "", "at 35 % of the reference's motion or more"),
     "tip_correlation": ("tip curve correlation", "", ""),
 }
-"""Name of a measure -> what a person reads, unit, remark."""
+"""Name of a measure -> label, unit, remark."""
 
 BADNESS = {
     "motion_ratio": lambda ratio: abs(ratio - 1),
     "dynamic_frames": lambda count: -count,
     "tip_correlation": lambda correlation: -correlation,
 }
-"""How bad a value of a measure is, where the one farthest from 0 is not the worst."""
+"""How bad a value of a measure is, if the one farthest from 0 is not the worst."""
 
 EACH = 8
-"""Grooms of which each has tables of its own; of more, one table tells the mean and the worst, and so many are drawn."""
+"""Up to this many grooms each get their own tables; if there are more, one table has mean and worst, and this many are drawn."""
 
 PLOTS = (".png", ".svg", ".pdf")
-"""Endings of files that `Card.plot` writes."""
+"""File name extensions that `Card.plot` writes."""
 
 
 @dataclass(frozen=True)
 class Card:
-    """What was measured.
+    """The results of an evaluation.
 
     Attributes:
-        title: of what.
-        grooms: groom -> measures, plain numbers (NaN where there is nothing to measure) and facts in words.
-        compared: groom -> whose answer ("bake", "held pose", "rigid") -> measures; empty without reference.
-        curves: groom -> {"times": (T,), answer: mean tip displacement (T, 3) [m]}.
-        notes: what a reader should know, one line each.
+        title: what was measured.
+        grooms: groom -> measures, plain numbers (NaN if there is nothing to measure) and facts in words.
+        compared: groom -> whose hair ("bake", "held pose", "rigid") -> measures; empty without reference.
+        curves: groom -> {"times": (T,), whose hair: mean tip displacement (T, 3) [m]}.
+        notes: facts that a reader should know, one line each.
     """
 
     title: str
@@ -84,7 +84,7 @@ class Card:
         return json.dumps(plain(body, digits=6), indent=2, sort_keys=False)
 
     def text(self, encoding: str | None = "utf-8") -> str:
-        """For people, in characters of `encoding`: what has none, a frame's corner or a letter of a name, is replaced."""
+        """The card for people, in characters of `encoding`; others, such as frame corners or letters of a name, are replaced."""
         from rich.console import Console
 
         encoding = encoding or "utf-8"
@@ -109,7 +109,7 @@ class Card:
         """Draw the tip curves, one row for each of the grooms with most strands: sideways, up and forward over time.
 
         Args:
-            path: the file to write; its ending, one of PLOTS, chooses the kind.
+            path: the file to write; its extension, one of PLOTS, chooses the format.
 
         Raises:
             NeuralocksError: as `check_plot` does, or the file cannot be written.
@@ -154,7 +154,7 @@ class Card:
         return table
 
     def _overview(self, title, grooms):
-        """Of each measure the mean over the grooms, every strand counting alike, and the worst of them."""
+        """For each measure, the mean over the grooms, in which every strand counts equally, and the worst groom."""
         from rich.table import Table
 
         table = Table(title=title, title_justify="left")
@@ -187,10 +187,10 @@ class Card:
 
 
 def check_plot(path: str | os.PathLike) -> Path:
-    """The path, if `Card.plot` can draw such a file: asked before a long measurement, not after it.
+    """The path, if `Card.plot` can draw such a file: check it before a long measurement, not after.
 
     Raises:
-        NeuralocksError: its ending is unknown, it is a folder's name, or matplotlib is missing.
+        NeuralocksError: the extension is unknown, the path is a folder, or matplotlib is missing.
     """
     path = Path(path)
     if path.suffix.lower() not in PLOTS:

@@ -19,27 +19,27 @@ from neuralocks_core.rotation import angle_between
 
 MOST_JOINTS = 2048
 LONGEST_STEP = 0.2
-"""[s] Of a longer frame time nobody moves; it is the rate, say."""
+"""[s] Frame times longer than this are not motion; the number may be a frame rate."""
 LONGEST_NAME = 200
-"""Characters of a joint's name that are kept."""
+"""At most this many characters of a joint's name are kept."""
 MOST_NAMES = 2**24
 """Characters of all joint paths together; each path repeats those of the joints above."""
 UNITS = (1.0, 0.01, 0.0254, 0.056444, 0.001)
-"""[m] Lengths that files come in; the fourth is the CMU library's (an inch over 0.45)."""
+"""[m] Units of length that files use; the fourth is the CMU library's (an inch over 0.45)."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What a BVH file holds.
+    """The content of a BVH file.
 
     Attributes:
         name: the file's stem.
-        skeleton: joints; the bind pose is the one with all rotations zero, turned so that it stands along Y, its root
-            where the file's offset says; or a T-pose found in the motion where that one stands along no axis.
+        skeleton: joints; the bind pose has all rotations zero and is turned so that it stands along Y, with its root at the
+            file's offset; if that pose stands along no axis, it is a T-pose found in the motion.
         clip: world transforms of these joints, Y up.
         unit: metres per unit of the file, as used.
-        up: 'Y' or 'Z', the file's axis that is taken as up.
-        guessed: whether the bind pose is one found in the motion.
+        up: 'Y' or 'Z', the file's axis that was taken as up.
+        guessed: whether the bind pose was found in the motion.
     """
 
     name: str
@@ -54,11 +54,11 @@ def read_bvh(path: str | Path) -> Motion:
     """Read a BVH file.
 
     Args:
-        path: the file. It does not say its unit: that is the usual one that gives the skeleton a human height, or else
-            that which makes it 1.7 m high.
+        path: the file. It does not state its unit, so the usual unit that gives the skeleton a human height is used, or else
+            the one that makes it 1.7 m tall.
 
     Raises:
-        NeuralocksError: the file cannot be read, is truncated or malformed, or its values cannot be meant.
+        NeuralocksError: the file cannot be read, is truncated or malformed, or its values are impossible.
     """
     path = Path(path)
     words = Words(path)
@@ -139,7 +139,7 @@ _CHANNELS = {f"{axis}{kind}" for axis in "xyz" for kind in ("position", "rotatio
 
 
 def _name(words: Words) -> str:
-    """A joint's name: all words up to the brace, without what joint paths cannot hold."""
+    """A joint's name: all words up to the brace, without characters that joint paths cannot hold."""
     parts = []
     while (word := words.next()) != "{":
         if len(parts) < LONGEST_NAME:
@@ -180,9 +180,9 @@ def _values(words: Words, frames: int, width: int) -> np.ndarray:
 
 
 def _likely_unit(joints: list[_Joint], rest: np.ndarray, humanoid: Humanoid | None) -> float:
-    """The unit in which the skeleton, legs and trunk stretched out, is as high as a person."""
+    """The unit in which the skeleton, with legs and trunk stretched out, is as tall as a person."""
     stands = AXES["Y"] if humanoid is None else standing_axis(rest, humanoid)
-    # From the lowest end of any chain to the highest, along the bones: bent or spread rest poses count in full.
+    # From the lowest end of any chain to the highest, along the bones: bent or spread rest poses count in full length.
     length, reach = np.zeros(len(joints)), np.zeros(len(joints))
     for i, joint in enumerate(joints):
         if joint.parent >= 0:
@@ -212,7 +212,7 @@ def _paths(joints: list[_Joint]) -> list[str]:
     found: list[str] = []
     for i, joint in enumerate(joints):
         own = path = joint.name if joint.parent < 0 else f"{found[joint.parent]}/{joint.name}"
-        while path in paths:  # the numbered name may be another joint's, too
+        while path in paths:  # the numbered name may belong to another joint, too
             path, i = f"{own}_{i}", i + 1
         paths[path] = None
         found.append(path)
@@ -243,7 +243,7 @@ def _forward(joints: list[_Joint], values: np.ndarray, unit: float) -> np.ndarra
 
 
 def _first_of_motion(world: np.ndarray) -> int:
-    """0, or 1 where the first frame is a T-pose from which the motion jumps away."""
+    """0, or 1 if the first frame is a T-pose from which the motion jumps away."""
     if len(world) < 4:
         return 0
     jump = angle_between(world[1:, :, :3, :3], world[:-1, :, :3, :3]).max(axis=1)

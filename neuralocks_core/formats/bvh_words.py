@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words of a BVH file, one after the other, and its frames as numbers."""
+"""The words of a BVH file, one after another, and its frames as numbers."""
 
 import codecs
 import re
@@ -12,19 +12,19 @@ from neuralocks_core.errors import NeuralocksError
 LARGEST_FILE = 256 * 2**20
 """Bytes; an hour of motion at 120 frames a second is about that."""
 LARGEST = 1e6
-"""No length in a file, in its own unit, is larger."""
+"""Largest length allowed in a file, in its own unit."""
 LONGEST_NUMBER = 64
 """Characters; an array of words is as wide as its longest one."""
 PIECE = 1 << 15
-"""Bytes of the frames that are made numbers at a time, up to the end of the line, or twice as many."""
+"""Bytes of the frames that are converted to numbers at a time, plus the rest of the line, at most twice as many."""
 _COMMENT = re.compile(rb"(?<![^\r\n])[ \t]*(?:#|//)[^\r\n]*")
 _WORD, _BREAK, _LINE = re.compile(_COMMENT.pattern + rb"|(\S+)"), re.compile(rb"\s"), re.compile(rb"[\r\n]")
 _UTF16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"H\0": "utf-16-le", b"\0H": "utf-16-be"}
-"""What a file in it begins with -> its name."""
+"""First bytes of a file -> its encoding."""
 
 
 class Words:
-    """The file's words one by one, without lines of comment (`#`, `//`), with errors that name the file."""
+    """The file's words one by one, without comment lines (`#`, `//`), with errors that name the file."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -38,7 +38,7 @@ class Words:
             raise self.error(f"cannot be read ({error.strerror})", "check its permissions") from None
         if wide := _UTF16.get(self._content[:2]):
             self._content = self._content.decode(wide, "replace").encode()
-        # One after the other: the words of a hostile file never become millions of Python objects.
+        # One after another: the words of a hostile file never become millions of Python objects.
         self._found, self._place = _WORD.finditer(self._content), 0
         self._rest = ""
 
@@ -66,7 +66,7 @@ class Words:
             raise self.error(f"'{found[:40]}' stands where '{word}' should")
 
     def label(self, label: str) -> None:
-        """Expect words and a colon, which may stand apart from them and right before what follows."""
+        """Expect words and a colon, which may be separate from them and directly before what follows."""
         found = self.next()
         while ":" not in found and label.lower().startswith(found.lower()):
             found += f" {self.next()}"
@@ -91,7 +91,7 @@ class Words:
         return int(word)
 
     def numbers(self, most: int) -> np.ndarray:
-        """All that follows as numbers (n,), or so many of them where there are more."""
+        """All that follows as numbers (n,), at most `most` of them."""
         values, start = [np.zeros(0)], self._place
         while most and start < len(self._content):
             gap = _LINE.search(self._content, start + PIECE, start + 2 * PIECE)

@@ -45,7 +45,7 @@ def read(content: bytes, subject: str) -> RawGroom:
     if held != total:
         raise bad_file(subject, f"its segments make {held} points but the header says {total}", "it is damaged")
     points = floats(content, at, 3 * total, subject, f"{total} points").reshape(-1, 3)
-    if not flags & _SEGMENTS:  # only now, as the points have shown that so many strands fit the file
+    if not flags & _SEGMENTS:  # only now: the points have shown that the file can hold this many strands
         counts = np.full(strands, segments + 1, np.int32)
     at += 12 * total
     widths = np.array([thickness], np.float32)
@@ -56,7 +56,7 @@ def read(content: bytes, subject: str) -> RawGroom:
     if flags & _TRANSPARENCY:
         transparency = floats(content, at, total, subject, "transparency")
         at += 4 * total
-    # Of a header that was left at zero, black is no colour that somebody chose.
+    # In a header left at zero, black is not a colour that anybody chose.
     color = np.array([color], np.float32) if any(color) else None
     if flags & _COLOR:
         color = floats(content, at, 3 * total, subject, "colours").reshape(-1, 3)

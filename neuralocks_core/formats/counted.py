@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USC-HairSalon `.data` and CT2Hair `.bin`: a number of strands, then each with its own number of vertices."""
+"""USC-HairSalon `.data` and CT2Hair `.bin`: the number of strands, then each strand with its number of vertices."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from neuralocks_core.formats.raw import RawGroom, bad_file, big_endian
 
 
 def read_hairsalon(content: bytes, subject: str) -> RawGroom:
-    """USC-HairSalon (Hu et al. 2015): x y z a vertex, metres, Y up. Strands of one vertex are strands without hair.
+    """USC-HairSalon (Hu et al. 2015): x y z per vertex, metres, Y up. Strands of one vertex have no hair.
 
     Args:
         content: the whole file.
@@ -19,7 +19,7 @@ def read_hairsalon(content: bytes, subject: str) -> RawGroom:
 
 
 def read_ct2hair(content: bytes, subject: str) -> RawGroom:
-    """CT2Hair (Shen et al. 2023): x y z in millimetres, the normal, and a label a vertex; Y up.
+    """CT2Hair (Shen et al. 2023): x y z in millimetres, normal and label per vertex; Y up.
 
     Args:
         content: the whole file.
@@ -44,7 +44,7 @@ def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroo
             "it is truncated",
         )
     counts = _counts(words, strands, components, subject)
-    # What is neither the first word nor a strand's count is vertices.
+    # Everything but the first word and the strands' counts is vertices.
     ends = 1 + np.cumsum(1 + counts.astype(np.int64) * components)
     vertices = np.ones(ends[-1], np.bool_)
     vertices[0] = False
@@ -56,12 +56,12 @@ def _read(content: bytes, subject: str, components: int, unit: float) -> RawGroo
 
 
 def _fits(begin: np.ndarray, components: int, words: int) -> bool:
-    """Whether a file of so many words may begin with this number of strands, and of the first one's vertices."""
+    """Whether a file of this many words may begin with these two numbers, of strands and of the first one's vertices."""
     return len(begin) == 2 and 0 < int(begin[0]) < words and 0 <= int(begin[1]) * components <= words
 
 
 def _counts(words: np.ndarray, strands: int, components: int, subject: str) -> np.ndarray:
-    """(S,) int32 vertices of each strand; each count stands right after the strand before."""
+    """(S,) int32 vertices of each strand; each count follows directly after the strand before."""
     first = int(words[1])
     stride = 1 + first * components
     if 0 <= first and 1 + strands * stride <= len(words):

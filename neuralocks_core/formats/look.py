@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ROUNDING = 1e-3
-"""So far beyond 0 to 1 a number is rounded, not wrong."""
+"""A number outside 0 to 1 by no more than this is rounded, not wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +18,11 @@ class Look:
     color: np.ndarray | None = None
     """(P, 3) or (1, 3) float32, red, green and blue from 0 to 1, as in the file."""
     opacity: np.ndarray | None = None
-    """(P,) or (1,) float32 from 0 to 1; left out where nothing is transparent."""
+    """(P,) or (1,) float32 from 0 to 1; left out if nothing is transparent."""
 
 
 def checked_look(color: np.ndarray | None, transparency: np.ndarray | None, subject: str) -> tuple[Look, list[str]]:
-    """A file's colours (P, 3) or (1, 3) and transparency (P,) or (1,), without what cannot be one, and a line on that."""
+    """A file's colours (P, 3) or (1, 3) and transparency (P,) or (1,), without impossible values, and a line about them."""
     notes = []
     color = _within(color, f"{subject}: its colours", notes)
     transparency = _within(transparency, f"{subject}: its transparencies", notes)

@@ -27,7 +27,7 @@ class RawGroom:
     transparency: np.ndarray | None = None
     """(P,), or (1,) for all, from 0 to 1, or None."""
     unit: float | None = None
-    """Metres per unit where the format prescribes one."""
+    """Metres per unit, if the format prescribes it."""
     up: str = "Y"
     """The upward axis usual for the format."""
     notes: list[str] = field(default_factory=list)
@@ -35,17 +35,17 @@ class RawGroom:
 
 
 def bad_file(subject: str, fact: str, remedy: str = "export it again") -> NeuralocksError:
-    """The error for a file that cannot be what it says."""
+    """The error for a file whose content cannot be right."""
     return NeuralocksError(f"{subject}: {fact}; {remedy}")
 
 
 def big_endian(subject: str) -> NeuralocksError:
-    """The error for a file whose numbers have their bytes in the other order."""
+    """The error for a file whose numbers have the other byte order."""
     return bad_file(subject, "is written big-endian, which the format is not", "export it little-endian")
 
 
 def floats(content: bytes, offset: int, count: int, subject: str, what: str) -> np.ndarray:
-    """(count,) little-endian float32 at a byte offset, not copied; refused where the file is too short for them.
+    """(count,) little-endian float32 at a byte offset, not copied; refused if the file is too short.
 
     Python integers do not overflow, so the check holds for any offset and count that a file may claim.
     """

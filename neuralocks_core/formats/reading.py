@@ -16,10 +16,10 @@ from neuralocks_core.groom import LARGEST_COORDINATE, Groom
 from neuralocks_core.strands.arclength import count_pointlike
 
 EXTENSIONS = (".tfx", ".hair", ".data", ".bin")
-"""What `read` knows by name; the content decides where it says what it is."""
+"""Extensions that `read` knows; content that identifies its format takes precedence."""
 
 LARGEST_FILE = 4 * 2**30
-"""Bytes; a groom of a million strands of 100 vertices is a third of it."""
+"""Bytes; a groom of a million strands of 100 vertices has a third of this."""
 
 PACKED = {
     b"\x1f\x8b\x08": "gzip",
@@ -28,26 +28,26 @@ PACKED = {
     b"\xfd7zXZ": "xz",
     b"\x28\xb5\x2f\xfd": "zstd",
 }
-"""How packed files begin, of which none is read."""
+"""First bytes of compressed files, none of which is read."""
 PACKED_NAMES = ("", *EXTENSIONS, ".gz", ".zip", ".bz2", ".xz", ".zst")
-"""Endings of names of grooms that are packed: much else is, such as a model."""
+"""Extensions of compressed grooms: many other files are compressed too, such as a model."""
 
 SCALP = 0.16
 """Width of a narrow scalp [m]."""
 NARROW, WIDE = 0.1, 0.3
-"""Widths [m] below and above which a scalp is told to be none of a person's: the hair may be a part of a head's, or have
-another unit than was taken.
+"""Widths [m] below and above which a note says that a scalp is not a person's: the hair may be a part of a head's, or have
+another unit than the one assumed.
 """
 
 WIDEST = 0.005
-"""A hair wider than this [m] says that the file's thickness is in another unit than its points."""
+"""A hair wider than this [m] means that the file's thickness is in another unit than its points."""
 
 
 def read(path: str | Path, unit: str | float | None = None, up: str | None = None) -> Groom:
     """The groom in a TressFX, Cem Yuksel, USC-HairSalon or CT2Hair file.
 
     Args:
-        path: the file; its stem becomes the groom's name.
+        path: the file; its stem becomes the name of the groom.
         unit: metres per unit of the file, or "mm", "cm", "m", "in"; left out, the unit that the format
             prescribes, else the one of mm, cm and m that suits a human scalp.
         up: "Y" or "Z", the file's upward axis; left out, the one usual for the format.
@@ -93,7 +93,7 @@ def read_with_look(
             fact = f"its format counts in {_name(scale)}, which makes it {scale * size:.3g} m of hair"
             notes.append(f"{path}: {fact}; import --unit {_name(likely)}?")
     axis = wanted_axis or raw.up
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows or is no number is dealt with below
+    with np.errstate(over="ignore", invalid="ignore"):  # overflow and NaN are handled below
         points = points * np.float32(scale)
         widths = None if raw.widths is None else raw.widths.astype(np.float32) * np.float32(scale)
     if axis == "Z":
@@ -137,7 +137,7 @@ def _raw(path: Path, content: bytes) -> RawGroom:
     try:
         return _reader(path, content)(content, str(path))
     except NeuralocksError:
-        # Asked only now: a format whose files begin with a number may begin with any.
+        # Checked only now: the files of this format begin with a number, which may be any number.
         packed = next((name for begin, name in PACKED.items() if content.startswith(begin)), None)
         if packed is None or path.suffix.lower() not in PACKED_NAMES:
             raise
@@ -145,7 +145,7 @@ def _raw(path: Path, content: bytes) -> RawGroom:
 
 
 def _reader(path: Path, content: bytes):
-    """The reader of a format, by content where the format marks itself, else by extension."""
+    """The reader of a format, by content if the format marks itself, else by extension."""
     suffix = path.suffix.lower()
     if content[:4] == b"HAIR":
         return cemyuksel.read
@@ -180,13 +180,13 @@ def _scalp(raw: RawGroom, points: np.ndarray) -> float:
 
 
 def _likely_unit(extent: float, units=(1.0, 0.01, 0.001)) -> float:
-    """The one of the units [m] by which an extent is nearest to a narrow scalp's, in ratio."""
+    """The unit [m] by which an extent is nearest to a narrow scalp's width, as a ratio."""
     return min(units, key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / SCALP)))
 
 
 def _taken(scalp: float, unit: float) -> str:
-    """Which unit was taken and how wide it makes the scalp, whether that is odd, and how wide inches would, where they suit a
-    narrow one better.
+    """Which unit was taken and how wide it makes the scalp; whether that is odd; and how wide inches would make it, if they fit a
+    narrow scalp better.
     """
     inch = UNITS["in"]
     if scalp <= 0:

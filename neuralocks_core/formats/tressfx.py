@@ -16,9 +16,9 @@ HEADERS = {3: 296, 4: 160}
 def read(content: bytes, subject: str) -> RawGroom:
     """Parse a binary .tfx file.
 
-    Version 4 stores float4 positions (the fourth is the inverse mass) at a byte offset held at byte 12,
-    version 3 float3 at the one held at byte 144; 0 there means right after the header. Version 4 may hold a
-    texture coordinate and a thickness for each strand.
+    Version 4 stores float4 positions (the fourth is the inverse mass) at the byte offset held at byte 12; version 3 stores
+    float3 at the one held at byte 144. An offset of 0 means right after the header. Version 4 may also hold a texture
+    coordinate and a thickness for each strand.
 
     Args:
         content: the whole file.

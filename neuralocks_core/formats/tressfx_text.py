@@ -14,11 +14,11 @@ from neuralocks_core.formats.raw import RawGroom, bad_file
 
 _HEADER_LINES = 1000
 _BEGINNING = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|#[^\n]*\n)*version", re.IGNORECASE)
-"""A version, after a byte order mark, blank lines and comments."""
+"""The version, after an optional byte order mark, blank lines and comments."""
 
 
 def recognised(content: bytes) -> bool:
-    """Whether a file begins as one of this format."""
+    """Whether a file begins like one of this format."""
     return _BEGINNING.match(content[: 1 << 16]) is not None
 
 
@@ -40,7 +40,7 @@ def read(content: bytes, subject: str) -> RawGroom:
     points, counts, uv = array("f"), array("i"), array("f")
     left = 0
     while line:
-        # Exporters of ZBrush's curves put commas between the coordinates.
+        # Exporters of ZBrush curves put commas between the coordinates.
         words = (line.replace(b",", b" ") if left else line).split(None, 6)
         if not words or words[0].startswith(b"#"):
             pass
@@ -110,7 +110,7 @@ def _numbers(words: list[bytes], subject: str, number: int) -> list[float]:
 
 
 def _count(word: bytes, subject: str, number: int) -> int:
-    # Nine digits fit 32 bits; a file that claims more than it holds is refused at its end.
+    # Nine digits fit in 32 bits; a file that claims more than it holds is refused at its end.
     if not (word.isdigit() and len(word) <= 9):
         raise bad_file(subject, f"line {number} does not give a number of vertices")
     return int(word)

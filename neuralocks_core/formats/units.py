@@ -11,7 +11,7 @@ UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
 
 def metres_per_unit(unit: str | float) -> float:
-    """Metres per unit, of a name in UNITS (in either case) or a number of metres.
+    """Metres per unit, from a name in UNITS (upper or lower case) or a number of metres.
 
     Raises:
         NeuralocksError: it is neither.
@@ -26,7 +26,7 @@ def metres_per_unit(unit: str | float) -> float:
 
 
 def upward_axis(up: str) -> str:
-    """The axis "Y" or "Z", of either letter in either case.
+    """The axis "Y" or "Z", from either letter in upper or lower case.
 
     Raises:
         NeuralocksError: it is neither.

@@ -26,7 +26,7 @@ MOST_STRANDS = 150_000
 __all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "from_head", "grow"]
 
 _ROOTS, _AXES = 80, 430
-"""Thousandths of the work of many strands after which their roots are placed, and their axes grown."""
+"""Progress in thousandths, for many strands, when their roots are placed, and when their axes are grown."""
 _ROOT_WIDTH, _TIP_WIDTH = 9e-5, 5e-5  # [m], real hair
 
 
@@ -45,10 +45,10 @@ def grow(
         style: one of `STYLES`.
         scalp: where hair grows, in bind space.
         count: how many strands, 1 to 150,000.
-        seed: the same one gives the same groom.
-        body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made of them,
-            which is worth keeping for several styles; without one, a usual head, neck and shoulders.
-        variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
+        seed: the same seed gives the same groom.
+        body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made from them,
+            which is worth keeping for several styles; without one, a typical head, neck and shoulders.
+        variation: number of a variation of the style, with another cut, parting, waves and direction; 0 is the style itself.
         progress: called with (done, total, message).
 
     Raises:
@@ -108,7 +108,7 @@ def _site(style: Style, scalp: Scalp, count: int, random: np.random.Generator, s
     guides = np.arange(clumps)  # roots come in random order: the first ones are as good as any
     ragged = 0.15 * style.shape.clump_spacing * size * random.normal(size=(count, 3))
     seen = (roots.place - scalp.head_centre) / scalp.radius
-    apart = np.zeros(count) if style.zone is None else 10.0 * style.zone(seen)  # metres no search will cross
+    apart = np.zeros(count) if style.zone is None else 10.0 * style.zone(seen)  # farther than any search reaches [m]
     tree = cKDTree(np.column_stack([roots.place[guides], apart[guides]]))
     nearest = tree.query(np.column_stack([roots.place + ragged, apart]))[1]
     nearest[guides] = guides

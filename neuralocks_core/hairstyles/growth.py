@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Growing strands step by step: combed near the scalp, falling farther on, sliding over what is in the way."""
+"""Growing strands step by step: combed near the scalp, falling farther on, sliding over obstacles."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ DOWN = np.array([0.0, -1.0, 0.0])
 
 @dataclass(eq=False)
 class Site:
-    """What a style may read of each root, scaled so that every head looks alike."""
+    """What a style may read about each root, scaled so that all heads look alike."""
 
     roots: Roots
-    """Places and normals."""
+    """Positions and normals."""
     seen: np.ndarray
-    """(S, 3) place from the head's centre, in head radii: +X the left, +Y up, +Z the face."""
+    """(S, 3) position relative to the head's centre, in head radii: +X the left, +Y up, +Z the face."""
     guide: np.ndarray
     """(S,) int, the strand that leads the clump."""
     of_clump: np.ndarray
@@ -35,7 +35,7 @@ class Site:
         return Site(self.roots.rows(part), *rest)
 
     def along_scalp(self, direction: np.ndarray) -> np.ndarray:
-        """(S, 3) unit: a direction (S, 3) or (3,) laid flat on the scalp."""
+        """(S, 3) unit: a direction (S, 3) or (3,) projected onto the scalp."""
         normal = self.roots.normal
         direction = np.broadcast_to(direction, normal.shape)
         flat = direction - (direction * normal).sum(axis=1, keepdims=True) * normal
@@ -61,9 +61,9 @@ class Plan:
     margin: np.ndarray
     """(S,) distance kept from skin once grown out; gives a style its volume."""
     side: np.ndarray
-    """(S,) -1 or 1: which side of the face the strand keeps to; 0 may hang over it."""
+    """(S,) -1 or 1: which side of the face the strand keeps to; 0 may hang over the face."""
     cut: np.ndarray
-    """(S,) height in head radii from the head's centre at which scissors cut; -inf nowhere."""
+    """(S,) height in head radii from the head's centre at which scissors cut; -inf for no cut."""
 
     def rows(self, part: slice) -> Plan:
         """Some of the strands."""
@@ -77,7 +77,7 @@ CHUNK = 4096
 
 
 def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
-    """(S, steps, 3) float32 [m] strands from their roots, cut and divided evenly."""
+    """(S, steps, 3) float32 [m] strands from their roots, cut and evenly spaced."""
     points = np.empty((len(plan.length), steps, 3), np.float32)
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
@@ -99,7 +99,7 @@ def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int)
         falls = smooth(grown / (plan.comb_reach * size))[:, None]
         target = unit(plan.comb * (1 - falls) + plan.fall * falls)
         rate = np.minimum(plan.turn * step / size, 1.0)[:, None]
-        # Hair that stands straight up has no way to fall until its comb gives it one.
+        # Hair that stands straight up has no direction to fall in until its comb gives it one.
         stands = (direction * target).sum(axis=1, keepdims=True) < -0.6
         target = np.where(stands, unit(target + plan.comb), target)
         target = _past_shoulders(target, at, front, near, scalp)
@@ -119,7 +119,7 @@ def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int)
 
 
 def _beside_face(points: np.ndarray, side: np.ndarray, grown: np.ndarray, scalp: Scalp) -> np.ndarray:
-    """Points pushed sideways out of an egg in front of the face, the more the farther they have grown."""
+    """Points pushed sideways out of an egg shape in front of the face, more the farther they have grown."""
     seen = (points - scalp.head_centre) / scalp.radius
     inside = 1.0 - ((seen[:, 1] + 0.55) / 1.25) ** 2 - ((seen[:, 2] - 1.15) / 0.95) ** 2
     half_width = 0.72 * np.sqrt(np.maximum(inside, 0.0)) * smooth((grown - 0.01) / 0.07)
@@ -131,7 +131,7 @@ def _beside_face(points: np.ndarray, side: np.ndarray, grown: np.ndarray, scalp:
 def _past_shoulders(
     target: np.ndarray, at: np.ndarray, front: np.ndarray, near: np.ndarray, scalp: Scalp
 ) -> np.ndarray:
-    """Directions (S, 3) that lead long hair before or behind the shoulders instead of out over the arms."""
+    """Directions (S, 3) that lead long hair in front of or behind the shoulders instead of out over the arms."""
     seen = (at - scalp.head_centre) / scalp.radius
     low = smooth((-seen[:, 1] - 0.7) / 0.8)
     inward = -0.45 * np.sign(seen[:, 0]) * smooth((np.abs(seen[:, 0]) - 0.6) / 0.5)
@@ -140,7 +140,7 @@ def _past_shoulders(
 
 
 def _cut(points: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Strands that end where they first sink below a height (S,) [m], divided evenly again."""
+    """Strands cut where they first sink below a height (S,) [m], evenly spaced again."""
     below = points[:, :, 1] < height[:, None]
     first = np.where(below.any(axis=1), below.argmax(axis=1), points.shape[1])
     cut = np.flatnonzero((first < points.shape[1]) & (first > 1))
@@ -155,7 +155,7 @@ def _cut(points: np.ndarray, height: np.ndarray) -> np.ndarray:
 
 
 def at_vertices(points: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(S, M, 3): points (S, K, 3) read at fractional vertex numbers (S, M)."""
+    """(S, M, 3): points (S, K, 3) interpolated at fractional vertex numbers (S, M)."""
     vertex = np.clip(place.astype(np.int64), 0, points.shape[1] - 2)
     part = (place - vertex)[..., None].astype(points.dtype)
     rows = np.arange(len(points))[:, None]
@@ -163,7 +163,7 @@ def at_vertices(points: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def evenly(points: np.ndarray, count: int) -> np.ndarray:
-    """(S, count, 3): strands (S, K, 3) divided evenly in arc length."""
+    """(S, count, 3): strands (S, K, 3) evenly spaced in arc length."""
     step = np.linalg.norm(np.diff(points, axis=1), axis=2)
     arc = np.concatenate([np.zeros((len(points), 1)), np.cumsum(step, axis=1, dtype=np.float64)], axis=1)
     share = arc / np.maximum(arc[:, -1:], 1e-12)
@@ -178,6 +178,6 @@ def evenly(points: np.ndarray, count: int) -> np.ndarray:
 
 
 def smooth(x: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, smooth between."""
+    """0 below 0, 1 above 1, smooth in between."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Styles whose hair is not tied: each says how the strands of every root grow."""
+"""Styles whose hair is not tied: each defines how a strand grows from every root."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from neuralocks_core.rotation import unit
 
 @dataclass(frozen=True)
 class Loose(Style):
-    """A style that says how strands grow step by step from each root."""
+    """A style that defines how strands grow step by step from each root."""
 
     plan: Callable[[Site], Plan]
 
@@ -109,7 +109,7 @@ def _bob(site: Site) -> Plan:
 
 
 def _bangs(seen: np.ndarray) -> np.ndarray:
-    """(S,) bool: a triangle of the top and the whole forehead."""
+    """(S,) bool: a triangle on top of the head and the whole forehead."""
     x, y, z = seen.T
     return (z > 0.25 + 0.5 * np.abs(x)) & (np.abs(x) < 0.75) & (y > 0.25)
 
@@ -139,7 +139,7 @@ def _fringe(site: Site) -> Plan:
 
 def _pixie(site: Site) -> Plan:
     x, y, z = site.seen.T
-    # Away from the whorl at the back of the crown; swept to one side in front.
+    # Away from the whorl at the back of the crown; in front, swept to one side.
     away = site.seen - [0.1, 0.85, -0.45]
     away = away + np.stack([0.8 * smooth((z - 0.2) / 0.6), 0 * x, 0 * x], axis=1)
     comb = site.along_scalp(unit(away) + 0.55 * (site.of_clump[:, :3] - 0.5))
@@ -189,7 +189,7 @@ def _standing(site: Site, length: np.ndarray, direction: np.ndarray) -> Plan:
 def _afro(site: Site) -> Plan:
     outward = unit(site.seen + [0.0, 0.15, -0.05])
     stray = 0.35 * (site.of_clump[:, :3] - 0.5) + 0.2 * (site.own[:, :3] - 0.5)
-    # To the surface of one ball around the head, whatever the root; shorter over ears and nape.
+    # Up to the surface of one ball around the head, from any root; shorter over ears and nape.
     reach = 1.95 - np.linalg.norm(site.seen, axis=1) - 0.35 * smooth((0.1 - site.seen[:, 1]) / 0.8)
     short = 0.35 + 0.65 * smooth(site.roots.border / 0.03)
     length = 0.1 * np.maximum(reach, 0.25) * short * (0.93 + 0.09 * site.of_clump[:, 3])

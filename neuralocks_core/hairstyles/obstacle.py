@@ -24,7 +24,7 @@ class Obstacle:
     Args:
         scalp: gives the head's place and size.
         body: points (V, 3) [m] and triangles (F, 3) of the body or head in bind space; without one, a head,
-            neck and shoulders of usual proportions stand in.
+            neck and shoulders of typical proportions take its place.
     """
 
     def __init__(self, scalp: Scalp, body: tuple[np.ndarray, np.ndarray] | None = None) -> None:
@@ -50,7 +50,7 @@ class Obstacle:
             points: (N, 3) [m]; outside the grid the nearest value on its border is taken.
         """
         distance, out = np.empty(len(points), np.float32), np.empty((len(points), 3), np.float32)
-        for start in range(0, len(points), _CHUNK):  # no more at a time than the cache holds
+        for start in range(0, len(points), _CHUNK):  # only as many at a time as the cache holds
             part = slice(start, start + _CHUNK)
             distance[part], out[part] = self._distance(points[part])
         return distance, out
@@ -78,10 +78,10 @@ class Obstacle:
 
 
 def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(N,) signed distance to a mesh by its nearest corner or face middle.
+    """(N,) signed distance to a mesh from its nearest corner or face centre.
 
-    Near the surface the distance is that to the sample's tangent plane. That is coarser than `collider.Collider` and
-    many times faster; grown hair keeps some millimetres away.
+    Near the surface, it is the distance to the sample's tangent plane. This is coarser than `collider.Collider` but many
+    times faster; grown hair keeps some millimetres away.
     """
     points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
@@ -99,27 +99,27 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     sample, normal = sample[inside], normal[inside]
     distance, nearest = search(cKDTree(sample), grid)
     plane = ((grid - sample[nearest]) * normal[nearest]).sum(axis=1)
-    flat = np.clip(2.0 - distance / 0.006, 0.0, 1.0)  # the plane's up to 6 mm away, the sample's beyond 12 mm
+    flat = np.clip(2.0 - distance / 0.006, 0.0, 1.0)  # the plane's up to 6 mm, the sample's beyond 12 mm
     return np.where(plane < 0, -1.0, 1.0) * (flat * np.abs(plane) + (1 - flat) * distance)
 
 
 def _without_pockets(field: np.ndarray, step: float) -> np.ndarray:
-    """Signed distances on a grid whose spacing is `step` [m], where what is shut off from outside is inside as well.
+    """Signed distances on a grid with spacing `step` [m], in which space that is sealed off from outside counts as inside.
 
-    Heads have eyes and a mouth modelled into them; without this a strand that once got in would find room there.
-    `body.hollows` is for a finer grid, and moves skin around its hollows a little, so that hair would grow otherwise.
+    Heads have eyes and a mouth modelled into them; without this, a strand that once got in would find room there.
+    `body.hollows` is for a finer grid, and moves skin around its hollows a little, so hair would grow differently.
     """
-    regions, count = ndimage.label(field > 0.5 * step)  # lips and lids stand a little open
+    regions, count = ndimage.label(field > 0.5 * step)  # lips and lids are slightly open
     if count < 2:
         return field
     outside = regions == 1 + np.argmax(np.bincount(regions.ravel())[1:])
     outside = ndimage.binary_dilation(outside, iterations=2, mask=field > 0)
-    depth = step * (ndimage.distance_transform_edt(~outside) - 1)  # at most the true one: up to a cell more is skin
+    depth = step * (ndimage.distance_transform_edt(~outside) - 1)  # at most the true depth: up to one cell more is skin
     return np.where(outside, field, np.minimum(field, -depth))
 
 
 def _stand_in(points: np.ndarray, scalp: Scalp) -> np.ndarray:
-    """(N,) about the signed distance to an ellipsoid head fitted to the scalp, a neck and shoulders."""
+    """(N,) approximate signed distance to an ellipsoid head fitted to the scalp, a neck and shoulders."""
     radius = scalp.radius
     p = points - scalp.head_centre
     own = scalp.points[np.unique(scalp.triangles)] - scalp.head_centre

@@ -13,8 +13,8 @@ from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rotation import unit
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
-# forehead, up is in skull heights from the head's centre. From the nape behind and over the ear, the
-# sideburn, to the forehead; read off a statistical head, on others at least plausible.
+# forehead, up is in skull heights from the head's centre. It goes from the nape behind and over the ear and the
+# sideburn to the forehead; read off a statistical head, at least plausible on others.
 _HAIRLINE = np.array(
     [
         *[(-1.0, -0.85), (-0.42, -0.80), (-0.22, -0.46)],
@@ -30,7 +30,7 @@ class Scalp:
     """Triangles that carry hair, in bind space: metres, Y up, face +Z."""
 
     points: np.ndarray
-    """(V, 3) float64 [m]; may be the whole body's, only the triangles count."""
+    """(V, 3) float64 [m]; may be the whole body's; only the triangles count."""
     triangles: np.ndarray
     """(F, 3) int, outward."""
     head_centre: np.ndarray
@@ -74,11 +74,11 @@ class Scalp:
 
         Args:
             count: how many.
-            random: draws the places.
+            random: source of the random positions.
         """
         areas = self._areas
         corners = self.points[self.triangles]
-        # One draw in each of equally large pieces of area: much more even than independent draws.
+        # One draw in each of equally large pieces of area is much more even than independent draws.
         at = (np.arange(2 * count) + random.random(2 * count)) / (2 * count) * areas.sum()
         triangle = np.minimum(np.searchsorted(np.cumsum(areas), at), len(areas) - 1)
         u, v = random.random((2, len(triangle)))
@@ -96,7 +96,7 @@ class Scalp:
         return Roots(place[order], normal, border[order] * 0.1 * self.radius)
 
     def _border_distance(self, places: np.ndarray) -> np.ndarray:
-        """(N,) distance [m] to the scalp's edge; large where it has none."""
+        """(N,) distance [m] to the scalp's edge; large if it has none."""
         edges = np.sort(
             np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
         )
@@ -109,7 +109,7 @@ class Scalp:
         return cKDTree(line).query(places)[0]
 
     def _surrounded(self, places: np.ndarray) -> np.ndarray:
-        """(N,) 0..1: less where scalp fills less than half of the neighbourhood, as on the corners of its edge."""
+        """(N,) 0..1: less where the scalp fills less than half of the neighbourhood, as on the corners of its edge."""
         every = places[:: max(1, len(places) // 5000)]
         if len(every) < 500:
             return np.ones(len(places))
@@ -131,7 +131,7 @@ class Roots:
     """(S,) distance to the hairline [m]."""
 
     def rows(self, index: slice | np.ndarray) -> Roots:
-        """Some of them."""
+        """Some of the roots."""
         return Roots(self.place[index], self.normal[index], self.border[index])
 
 
@@ -144,14 +144,14 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
         head_centre: (3,) [m], middle of the skull.
 
     Raises:
-        NeuralocksError: nothing of the mesh lies where a scalp would be.
+        NeuralocksError: no part of the mesh is where a scalp would be.
     """
     points = np.asarray(points, np.float64)
     triangles = np.asarray(triangles, np.int64)
     head_centre = np.asarray(head_centre, np.float64)
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     middle = (a + b + c) / 3 - head_centre
-    # The skull's radius: up from its centre, where nothing but skull lies.
+    # The skull's radius: up from its centre, where there is nothing but skull.
     above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06) & (middle[:, 1] > 0)
     if not above.any():
         raise NeuralocksError("scalp: no mesh lies above the head's centre; mark the scalp by hand")

@@ -18,7 +18,7 @@ class Shape:
     """Lengths in metres on a head of 0.1 m radius."""
 
     vertices: int = 24
-    """Points of a strand."""
+    """Vertices of a strand."""
     clump_spacing: float = 0.009
     """Distance between the roots of neighbouring clumps."""
     clumping: float = 0.6
@@ -28,7 +28,7 @@ class Shape:
     curl: float = 0.0
     """Radius of a helix."""
     pitch: float = 0.05
-    """Length of strand axis to one wave or turn."""
+    """Axis length of one wave or turn."""
     curl_from: float = 0.02
     """Axis length over which wave or curl grows to its full size."""
     scatter: float = 0.15
@@ -47,8 +47,8 @@ def shaped(
     Args:
         axis: strands before shaping [m].
         site: their roots and clumps.
-        shape: what to do.
-        obstacle: what they keep out of.
+        shape: how to shape them.
+        obstacle: what strands keep out of.
         size: head radius in units of 0.1 m.
         progress: called with (done, total, message).
     """
@@ -63,7 +63,7 @@ def shaped(
 
 
 def _swung(points: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, size: float) -> np.ndarray:
-    """`shaped` after the clumps, strand by strand."""
+    """The part of `shaped` after clumping, strand by strand."""
     if shape.vertices != points.shape[1]:
         place = np.linspace(0.0, points.shape[1] - 1, shape.vertices)
         points = _rounded(points, np.broadcast_to(place, (len(points), shape.vertices)))
@@ -72,7 +72,7 @@ def _swung(points: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, siz
     arc = length * share
     across, up = _frame(points)
     grown = smooth(arc / (shape.curl_from * size))
-    # One phase for a clump: its strands swing together, else curls become a haze.
+    # One phase for a clump: its strands swing together, otherwise curls become a haze.
     together = site.seen @ np.array([[0.5], [-0.9], [0.7]])
     turns = (1 - shape.unison) * site.of_clump[:, :1] + shape.unison * together
     turns = turns + shape.scatter * (site.own[:, :1] - 0.5)
@@ -94,7 +94,7 @@ def _swung(points: np.ndarray, site: Site, shape: Shape, obstacle: Obstacle, siz
 
 
 def _clumped(points: np.ndarray, site: Site, strength: float, size: float) -> np.ndarray:
-    """Strands drawn to their clump's leader, little near the root and most at the tip."""
+    """Strands pulled to their clump's leader, little near the root and most at the tip."""
     if strength <= 0:
         return points
     share = np.linspace(0.0, 1.0, points.shape[1], dtype=np.float32)[:, None]
@@ -107,13 +107,13 @@ def _clumped(points: np.ndarray, site: Site, strength: float, size: float) -> np
 
 
 def _rounded(points: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """`at_vertices`, without the corners: averaged over half a vertex to both sides."""
+    """`at_vertices` with rounded corners: averaged over half a vertex to both sides."""
     last = points.shape[1] - 1
     return sum(at_vertices(points, np.clip(place + shift, 0, last)) for shift in (-0.4, 0.0, 0.4)) / np.float32(3)
 
 
 def _frame(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors across each strand at each vertex (S, K, 3), carried along without twisting."""
+    """Two unit vectors across each strand at each vertex (S, K, 3), transported without twist."""
     tangent = unit(np.gradient(points, axis=1))
     level = np.cross(tangent[:, 0], [0.0, 1.0, 0.0])
     weak = np.linalg.norm(level, axis=1) < 0.1
@@ -137,7 +137,7 @@ def _wander(own: np.ndarray, arc: np.ndarray) -> np.ndarray:
 
 
 def _clear(points: np.ndarray, arc: np.ndarray, obstacle: Obstacle, size: float) -> np.ndarray:
-    """Strands outside the skin."""
+    """Strands pushed outside the skin."""
     margin = (0.0005 + 0.002 * smooth(arc / (0.02 * size))) * size
     flat = points.reshape(-1, 3)
     for _ in range(2):

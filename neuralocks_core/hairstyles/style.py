@@ -23,9 +23,9 @@ class Style(ABC):
     shape: Shape
     _: KW_ONLY
     density: Callable[[np.ndarray], np.ndarray] | None = None
-    """(S, 3) `Site.seen` to chances (S,) 0..1 that hair grows there; None everywhere."""
+    """`Site.seen` (S, 3) -> probability (S,) 0..1 that hair grows there; None means everywhere."""
     zone: Callable[[np.ndarray], np.ndarray] | None = None
-    """(S, 3) `Site.seen` to numbers (S,): no clump reaches from one zone into another."""
+    """`Site.seen` (S, 3) -> zone numbers (S,): no clump reaches from one zone into another."""
 
     @abstractmethod
     def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
@@ -33,4 +33,4 @@ class Style(ABC):
 
     @abstractmethod
     def varied(self, variation: Variation) -> Style:
-        """The same style, otherwise."""
+        """The style with a variation applied."""

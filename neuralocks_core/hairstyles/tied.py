@@ -21,12 +21,12 @@ _ON_HEAD, _TAIL = 18, 60
 
 @dataclass(frozen=True)
 class Tied(Style):
-    """A style that gathers hair in one place: where it is tied, and what becomes of the hair behind the tie."""
+    """A style that gathers hair in one place: where it is tied, and how the hair behind the tie goes on."""
 
     tie: tuple[float, float, float]
     """Direction of the tie from the head's centre."""
     tail: Callable[[Site, Knot, Scalp, Obstacle], np.ndarray]
-    """Points (S, M, 3) [m] behind the tie; all are called alike, and a bun keeps clear of nothing."""
+    """Points (S, M, 3) [m] behind the tie; all are called with the same arguments, though a bun ignores the obstacle."""
 
     def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
         """From the roots over the head, through the tie and on."""
@@ -52,7 +52,7 @@ class Knot:
     out: np.ndarray
     """(3,) unit, out of the head."""
     disc: np.ndarray
-    """(S, 2) place of each strand within the tied bundle, in a unit disc; neighbours on the scalp lie together."""
+    """(S, 2) position of each strand in the tied bundle, in a unit disc; neighbours on the scalp are neighbours in it."""
 
 
 def _knot(site: Site, tie: tuple[float, float, float], scalp: Scalp, obstacle: Obstacle) -> Knot:
@@ -74,13 +74,13 @@ def _across(out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _over_head(site: Site, ring: np.ndarray, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
-    """(S, _ON_HEAD, 3) the shortest way over the head from each root to its place in the tie."""
+    """(S, _ON_HEAD, 3) the shortest path over the head from each root to its place in the tie."""
     start, end = site.roots.place - scalp.head_centre, ring - scalp.head_centre
     high, far = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
     a, b = unit(start), unit(end)
     angle = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))[:, None]
     share = np.linspace(0.0, 1.0, _ON_HEAD)
-    # From far round the head the shortest way is any way, and over the face: those go by the temples.
+    # From far round the head the shortest path is ambiguous, or crosses the face: such hair goes by the temples.
     far_round = smooth((angle - 1.2) / 0.7)[..., None] * np.sin(np.pi * share)[None, :, None]
     x = site.seen[:, :1]
     temple = np.concatenate([0.9 * np.tanh(x / 0.06), 0.55 + 0 * x, 0 * x], axis=1)[:, None]

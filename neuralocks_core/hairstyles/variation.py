@@ -19,16 +19,16 @@ from neuralocks_core.rotation import unit
 
 @dataclass(frozen=True)
 class Variation:
-    """Lengths in metres on a head of 0.1 m radius; each field says what it does to a style."""
+    """Lengths in metres on a head of 0.1 m radius; each field describes a change of a style."""
 
     length: float
-    """Times the length of what is not tied, before scissors."""
+    """Factor on the length of hair that is not tied, before scissors."""
     keep: float
     """Share of each strand that scissors leave."""
     layers: float
-    """Share by which scissors leave less of some strands, clump by clump."""
+    """Share that scissors cut further off some strands, clump by clump."""
     volume: float
-    """Times the distance kept from the skin."""
+    """Factor on the distance kept from the skin."""
     lift: float
     """How much more strands rise at the root, as a slope."""
     comb: float
@@ -36,7 +36,7 @@ class Variation:
     drift: tuple[float, float, float]
     """Added to the direction of the fall."""
     turn: float
-    """Times how fast strands begin to fall."""
+    """Factor on how fast strands begin to fall."""
     hem: float
     """Added to the height of a straight cut, in head radii."""
     tie: tuple[float, float, float]
@@ -52,7 +52,7 @@ class Variation:
 
     @classmethod
     def numbered(cls, number: int, style: str) -> Variation:
-        """Variation `number` of a style, the same at any time."""
+        """Variation `number` of a style, always the same for the same number."""
         random = np.random.default_rng([number, *style.encode()])
         between, times = random.uniform, lambda low, high: float(np.exp(random.uniform(np.log(low), np.log(high))))
         often = random.random(4) < [0.6, 0.5, 0.5, 0.35]
@@ -81,7 +81,7 @@ class Variation:
         )
 
     def of_shape(self, shape: Shape) -> Shape:
-        """What is done to strands as they are shaped."""
+        """A style's `Shape` with this variation."""
         values = {name: factor * getattr(shape, name) for name, factor in self.shape.items()}
         values["clumping"] = min(values["clumping"], 0.95)
         if self.wave and not shape.wave and not shape.curl:
@@ -89,7 +89,7 @@ class Variation:
         return replace(shape, **values)
 
     def of_plan(self, plan: Plan, site: Site) -> Plan:
-        """How strands grow."""
+        """A style's `Plan` with this variation."""
         normal = site.roots.normal
         sideways = np.cross(normal, plan.comb)
         comb = unit(np.cos(self.comb) * plan.comb + np.sin(self.comb) * sideways)

@@ -20,16 +20,16 @@ def adhesion(
 ) -> Tensor:
     """Energy `k sum m mean_n |(x - x_n) - (x0 - x0_n)|^2` over the neighbours at rest.
 
-    The paper's `|x - x_n|^2` pulls neighbours into one point. Both are means over the neighbours that there are,
-    weighted by vertex mass. No gradient goes into the neighbours: each pair counts in both its vertices, so the force is
-    the reference solver's and not twice as much; in the paper's form it is the energy's own.
+    The paper's `|x - x_n|^2` pulls neighbours into one point. Both forms are means over the existing neighbours, weighted by
+    vertex mass. No gradient goes into the neighbours: each pair counts at both its vertices, so the force equals the
+    reference solver's and not twice that; in the paper's form it is the energy's full gradient.
 
     Args:
         x: (..., S, K, 3) points in canonical space [m].
         rods: the strands at rest.
         neighbours: (..., S, K, N) indices into the S K vertices, -1 for none (`locks.neighbours`).
         stiffness: [1/s^2], a number or (..., S, 1).
-        paper: measure from nothing, not from the offset at rest, with the whole gradient.
+        paper: measure from zero instead of the rest offset, with the full gradient.
 
     Returns:
         (..., S) energy per unit line density [m^3/s^2].

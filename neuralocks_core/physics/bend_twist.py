@@ -17,11 +17,11 @@ class Cosserat(Enum):
     """How edge orientations are found."""
 
     EXACT = "exact"
-    """Parallel transport along every edge; on a CPU as a loop, elsewhere as a scan."""
+    """Parallel transport along every edge; as a loop on a CPU, else as a scan."""
     SCAN = "scan"
     """The same, always as a scan of few and large operations."""
     LOOP = "loop"
-    """The same, always edge after edge."""
+    """The same, always edge by edge."""
     DIRECT = "direct"
     """The paper's fast transport, straight from the root edge."""
     CONSTANT = "constant"
@@ -33,10 +33,10 @@ def bend_twist(
 ) -> Tensor:
     """Energy `k/2 sum l |Omega|^2`, `Omega = 2/l (Im(conj(q_i) q_{i+1}) - Im(conj(q0_i) q0_{i+1}))`.
 
-    l is the rest length that belongs to the vertex between two edges. `EXACT` is the default, not the paper's
+    l is the rest length that belongs to the vertex between the two edges. `EXACT` is the default, not the paper's
     `DIRECT`, because straight transport gives curls a twist that is not there and is singular where an edge
-    points against the root edge. `CONSTANT` is `k/2 sum 1/l |e - e0|^2` over the edges behind the first, in
-    the same units; unlike the others it has no limit as strands are cut finer, but is four times as much for twice the edges.
+    points against the root edge. `CONSTANT` is `k/2 sum 1/l |e - e0|^2` over all edges after the first, in
+    the same units; unlike the others it does not converge as strands are subdivided: twice the edges give four times the energy.
 
     Args:
         x: (..., S, K, 3) points in canonical space, where the clamped root edge does not turn [m].
@@ -55,7 +55,7 @@ def bend_twist(
 
 
 def bend_difference(x: Tensor, rest: Tensor, form: Cosserat = Cosserat.EXACT) -> Tensor:
-    """`l/2 Omega`: how much each turn between edges differs from that at rest, (..., S, K-2, 3), without unit."""
+    """`l/2 Omega`: how much each turn between edges differs from its rest value, (..., S, K-2, 3), without unit."""
     turns, rest_turns = _turns(x, form), _turns(rest, form)
     if form is Cosserat.DIRECT:
         # Straight transport may put the two on opposite sides of the double cover: take the nearer sign. Exact

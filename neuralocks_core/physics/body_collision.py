@@ -14,17 +14,17 @@ from neuralocks_core.strands.strand_set import CLAMPED
 def body_collision(
     x: Tensor, rods: Rods, planes: Tensor, stiffness: float | Tensor = COLLISION, margin: float | Tensor = MARGIN
 ) -> Tensor:
-    """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`: deep vertices of an untrained
-    network must not drown the rest.
+    """Energy `k sum m max(D - d(x), 0)^3`, its depth linear beyond `LINEAR`: so deep vertices of an untrained
+    network do not drown the rest.
 
-    Weighted by vertex mass, which the paper's sum is not. The clamped vertices count nothing: they lie on the
+    Weighted by vertex mass, which the paper's sum is not. The clamped vertices do not count: they are on the
     scalp.
 
     Args:
         x: (..., S, K, 3) points [m].
         rods: the strands at rest.
         planes: (..., S, K, 4) outward normal n and offset o of the nearest body element in the same space,
-            `d = n . x - o`; found once for the state that is penalised.
+            `d = n . x - o`; found once for the penalised state.
         stiffness: k [1/(m s^2)], a number or (..., S, 1).
         margin: D [m], a number or (..., S, K): never more than a vertex has at rest.
 

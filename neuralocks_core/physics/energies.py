@@ -22,7 +22,7 @@ from neuralocks_core.physics.stretch import stretch
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What acts on the strands at one moment; whatever is None switches its potential off.
+    """What acts on the strands at one moment; None switches a potential off.
 
     Attributes:
         gravity: (..., 3) in head axes [m/s^2].
@@ -30,9 +30,9 @@ class Surroundings:
         margin: (S, K) or a number [m].
         distance: (..., S, K) to the body, for the style [m].
         neighbours: (S, K, N), see `adhesion`.
-        before: (..., S, K, 3) points one step ago, in the head's frame of now [m].
-        before2: (..., S, K, 3) points two steps ago, in the head's frame of now [m].
-        moved_before: (..., S, K, 3) points one step ago, in the head's frame of then [m].
+        before: (..., S, K, 3) points one step ago, in the head's current frame [m].
+        before2: (..., S, K, 3) points two steps ago, in the head's current frame [m].
+        moved_before: (..., S, K, 3) points one step ago, in the head's frame at that time [m].
         dt: step [s].
     """
 
@@ -70,7 +70,7 @@ def energies(
     form: Cosserat = Cosserat.EXACT,
     paper_adhesion: bool = False,
 ) -> dict[str, Tensor]:
-    """Every potential of the strands but self-collision, which costs more than all others and is summed over fewer poses.
+    """Every potential of the strands except self-collision, which costs more than all others and is summed over fewer poses.
 
     Args:
         x: (..., S, K, 3) points in canonical space [m].
@@ -78,11 +78,11 @@ def energies(
         around: gravity, body, neighbours and the past.
         stiffness: constants.
         form: of the bend-twist potential.
-        paper_adhesion: without rest distance.
+        paper_adhesion: the paper's form, without the rest offset.
 
     Returns:
         Energy per unit line density of each strand, (..., S) [m^3/s^2], by name. Divided by the strand's length
-        they are energies per unit mass [m^2/s^2].
+        it is an energy per unit mass [m^2/s^2].
     """
     terms = {
         "stretch": stretch(x, rods, stiffness.stretch),

@@ -17,7 +17,7 @@ def gravity(x: Tensor, rods: Rods, direction: Tensor, weight: float | Tensor = 1
     Args:
         x: (..., S, K, 3) points in canonical space [m].
         rods: the strands at rest.
-        direction: (..., 3) gravity in the same axes, so `R_head^T g` [m/s^2]; dimensions before the last are those
+        direction: (..., 3) gravity in the same axes, that is `R_head^T g` [m/s^2]; dimensions before the last are those
             of x before S.
         weight: factor on both, a number or (..., S, 1).
 

@@ -21,8 +21,8 @@ def hair_style(x: Tensor, rods: Rods, distance: Tensor, stiffness: float | Tenso
     Args:
         x: (..., S, K, 3) points in canonical space, where the posed groom is the rest shape [m].
         rods: the strands at rest.
-        distance: (..., S, K) s, distance of each vertex to the body [m]; no gradient goes through it, or hair
-            would flee from the body to be free of its style.
+        distance: (..., S, K) s, distance of each vertex to the body [m]; no gradient goes through it; otherwise hair
+            would flee from the body to escape its style.
         stiffness: [1/s^2], a number or (..., S, 1).
 
     Returns:

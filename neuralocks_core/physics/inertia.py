@@ -11,7 +11,7 @@ from neuralocks_core.physics.rods import Rods
 def inertia(x: Tensor, before: Tensor, before2: Tensor, rods: Rods, dt: float, *, detach: bool = True) -> Tensor:
     """Energy `1/(2 dt^2) (x - x^)^T M (x - x^)` with `x^ = 2 x_{t-1} - x_{t-2}`.
 
-    All points must be in one frame that does not accelerate: the head's own frame of one moment will do, its
+    All points must be in one frame that does not accelerate: the head's frame at one moment will do, its
     frame at each moment will not.
 
     Args:
@@ -34,11 +34,11 @@ def inertia(x: Tensor, before: Tensor, before2: Tensor, rods: Rods, dt: float, *
 def damping(moved: Tensor, moved_before: Tensor, rods: Rods, dt: float, rate: float | Tensor) -> Tensor:
     """Energy `c / (2 dt) sum m |x_t - x_{t-1}|^2` in the head's frame, so that rigid motion is not braked.
 
-    The paper has no damping term; implicit integration brakes in its stead, by an amount that depends on the step.
+    The paper has no damping term; implicit integration brakes instead, by an amount that depends on the step.
 
     Args:
-        moved: (..., S, K, 3) points, or displacements, now, in the head's frame of now [m].
-        moved_before: (..., S, K, 3) those one step ago in the head's frame of then; detached here.
+        moved: (..., S, K, 3) points, or displacements, now, in the head's current frame [m].
+        moved_before: (..., S, K, 3) the same one step ago, in the head's frame at that time; detached here.
         rods: the strands at rest.
         dt: step [s].
         rate: c [1/s], a number or (..., S, 1).

@@ -31,7 +31,7 @@ class Rods:
 
 
 def rods(rest: Tensor, *, supported: bool = True) -> Rods:
-    """Measures strands at rest.
+    """Measure strands at rest.
 
     Args:
         rest: (..., S, K, 3) canonical points, root first [m].

@@ -19,9 +19,9 @@ from neuralocks_core.physics.rods import Rods
 STIFFNESS = 0.3
 """[m^2/s^2], on relative density."""
 FEW = 1536
-"""Vertices, of 64 strands, that are compared each with each; of more, each with those near it."""
+"""Up to this many vertices (of 64 strands), all pairs are compared; above it, only near ones."""
 PAIRS = 1_000_000
-"""Pairs of vertices in memory at a time, of about 0.3 kB each."""
+"""Pairs of vertices in memory at a time, about 0.3 kB each."""
 
 
 def self_collision(
@@ -34,9 +34,9 @@ def self_collision(
 ) -> Tensor:
     """Energy `k sum m max(rho / rho_rest - 1, 0)^3`.
 
-    The paper's `max(rho - rho_rest, 0)^3` has a constant that changes with the number of strands; it is taken with
-    `relative=False`, and then k is in [m^8/s^2]. The rest density is each vertex's own, measured on the groom, or
-    the groom's own locks would be pressure.
+    The paper's `max(rho - rho_rest, 0)^3` has a constant that changes with the number of strands; select it with
+    `relative=False`, and then k is in [m^8/s^2]. The rest density is each vertex's own, measured on the groom; otherwise
+    the groom's own locks would cause pressure.
 
     Args:
         x: (..., S, K, 3) points [m].
@@ -72,19 +72,19 @@ def density(x: Tensor, mass: Tensor) -> Tensor:
 
 
 def _by_all(points: Tensor, mass: Tensor) -> Tensor:
-    """Densities (..., N) of points (..., N, 3) from all pairs at once: the fastest for few."""
+    """Densities (..., N) of points (..., N, 3) from all pairs at once, the fastest way for few points."""
     square = (points[..., :, None, :] - points[..., None, :, :]).square().sum(-1)
     return (mass[..., None, :] * kernel(_root(square), SMOOTHING)).sum(-1)
 
 
 def by_near(points: Tensor, mass: Tensor) -> Tensor:
-    """Densities (N,) of points (N, 3) from the pairs that the kernel reaches, which are found again for the gradient:
-    no more than about PAIRS are in memory at a time.
+    """Densities (N,) of points (N, 3) from the pairs within the kernel's reach. The gradient searches them again, so that only
+    about PAIRS are in memory at a time.
     """
     places = points.detach().cpu().double().numpy()
     everywhere = cKDTree(places)
-    reach = 2.001 * SMOOTHING  # a little too far: what rounding lets in counts nothing
-    # Successive vertices of a strand have about as many near them.
+    reach = 2.001 * SMOOTHING  # slightly too far: pairs that rounding lets in count nothing
+    # Successive vertices of a strand have about the same number of near ones.
     near = np.repeat(everywhere.query_ball_point(places[::8], reach, return_length=True), 8)[: len(places)]
     starts = np.flatnonzero(np.diff(np.cumsum(near) // PAIRS, prepend=-1))
 
@@ -100,7 +100,7 @@ def by_near(points: Tensor, mass: Tensor) -> Tensor:
 
 
 def _root(square: Tensor) -> Tensor:
-    """Distances; the root of zero has no gradient, and a vertex and itself have none to give."""
+    """Distances; the root of zero has no gradient, and a vertex paired with itself needs none."""
     return square.clamp_min(1e-16).sqrt()
 
 

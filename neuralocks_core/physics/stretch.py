@@ -12,8 +12,8 @@ from neuralocks_core.physics.rods import Rods
 def stretch(x: Tensor, rods: Rods, stiffness: float | Tensor = STRETCH, *, per_edge: bool = False) -> Tensor:
     """Energy `k/2 sum l0 ((l - l0) / l0)^2`.
 
-    The paper's `k/2 sum (l - l0)^2` depends on how many edges a strand is cut into; it is taken with `per_edge`,
-    and then k is in [m/s^2].
+    The paper's `k/2 sum (l - l0)^2` depends on how many edges a strand is cut into; select it with `per_edge`;
+    k is then in [m/s^2].
 
     Args:
         x: (..., S, K, 3) points [m].

@@ -10,7 +10,7 @@ from torch.nn.functional import normalize, one_hot, pad
 FOLD = 1e-6
 """Smallest 1 + cos of a turn: keeps opposite edges finite in value and gradient."""
 DIRECT_FOLD = 1e-3
-"""The same of `direct_frames`, which meets opposite edges in every curl."""
+"""The same for `direct_frames`, which meets opposite edges in every curl."""
 
 
 def turn(a: Tensor, b: Tensor, fold: float = FOLD) -> Tensor:
@@ -47,7 +47,7 @@ def direct_frames(edges: Tensor) -> Tensor:
 
 
 def loop_frames(edges: Tensor) -> Tensor:
-    """Exact parallel transport along every edge, one after the other: (..., E, 3) -> (..., E, 4)."""
+    """Exact parallel transport along every edge, one after another: (..., E, 3) -> (..., E, 4)."""
     steps = _steps(edges)
     frames = [torch.zeros_like(steps[..., 0, :])]
     frames[0][..., 0] = 1.0
@@ -72,12 +72,12 @@ def scan_frames(edges: Tensor) -> Tensor:
 
 
 def _steps(edges: Tensor) -> Tensor:
-    """The turns (..., E - 1, 4) from each edge to the next, all of unit length: they are multiplied on along the strand.
+    """The turns (..., E - 1, 4) from each edge to the next, all of unit length, since they are multiplied along the strand.
 
-    An edge of no length goes on as the one before it. A fold, half a turn about any axis across, has no gradient.
+    A zero-length edge continues the one before it. A fold, half a turn about any perpendicular axis, has no gradient.
     """
     steps = turn(edges[..., :-1, :], edges[..., 1:, :])
-    if (steps.detach().square().sum(-1) > 0.999).all():  # nearly always, and what follows takes time
+    if (steps.detach().square().sum(-1) > 0.999).all():  # nearly always, and the rest takes time
         return steps
     there = (edges != 0).any(-1)
     first = there.byte().argmax(-1, keepdim=True)

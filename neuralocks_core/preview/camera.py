@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 ANGLE = 24.0
-"""Of a picture's height, as its camera sees it [degrees]."""
+"""The camera's vertical field of view [degrees]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera of a view ANGLE.
+    """A pinhole camera with the field of view ANGLE.
 
     Attributes:
         eye, target: (3,) [m].

@@ -24,8 +24,8 @@ class Detail:
     """How finely hair is drawn.
 
     Attributes:
-        strands: of a larger groom only so many, of a smaller one copies beside its own.
-        vertices: of each.
+        strands: how many are drawn: a selection from a larger groom, or a smaller groom's with copies beside them.
+        vertices: of each strand.
         scale: how many times larger to draw before reducing.
         width: of a strand, in pixels of the larger drawing.
     """
@@ -38,14 +38,14 @@ class Detail:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is to be seen, from arrays.
+    """What to draw, as arrays.
 
     Attributes:
         times: of the frames (T,) [s].
         head: rigid transforms bind world -> posed world of the head (T, 4, 4).
         facing: rotation (3, 3) whose transpose's third column is where the face looks in bind pose.
         centre: middle of the head in bind pose (3,) [m].
-        counts: vertices of each strand (S,); none where all hair is mesh hair.
+        counts: vertices of each strand (S,); none if all hair is mesh hair.
         rest: points of strands, or of mesh hair, in bind pose (P, 3) [m].
         hair: frame number -> strand points (P, 3) [m], world.
         triangles: of the body (F, 3), or None.
@@ -70,10 +70,10 @@ class Scene:
 
 
 class Film:
-    """A scene with its camera, strands and colours made ready.
+    """A scene prepared with camera, strands and colours.
 
     Args:
-        scene: what is to be seen.
+        scene: what to draw.
         width, height: of a picture in pixels.
         detail: how finely hair is drawn.
         calm: time [s] over which the camera's path is smoothed.
@@ -130,11 +130,11 @@ class Film:
         return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
 
     def close(self) -> None:
-        """Let go of what the canvas holds."""
+        """Free the resources of the canvas."""
         self._canvas.close()
 
     def _pick(self, strands: int) -> None:
-        """Which strands are drawn, how they are resampled, and where copies lie beside them."""
+        """Choose the strands to draw, how they are resampled, and the offsets of their copies."""
         scene, rng = self.scene, np.random.default_rng(3)
         starts = np.cumsum(scene.counts) - scene.counts
         usable = np.flatnonzero(scene.counts > 1)
@@ -150,7 +150,7 @@ class Film:
         beside = rng.normal(0, 0.5 * spacing, (len(rows) * copies, 1, 3))
         beside[::copies] = 0
         self._tone = np.exp(rng.normal(0, 0.25, (len(rows) * copies, 1, 1)))
-        # Copies keep apart along the strand but close up towards the tip, as locks do.
+        # Copies stay apart along the strand but converge towards the tip, as locks do.
         self._beside = beside * np.linspace(1, 0.45, self.detail.vertices)[None, :, None]
 
     def _own(self, points: np.ndarray) -> np.ndarray:
@@ -187,12 +187,12 @@ class Film:
         reach = np.linalg.norm(scene.rest - scene.centre, axis=1).max()
         step = np.median(np.diff(scene.times)) if len(scene.times) > 1 else 1.0
         smooth = _blurred(centre, self._calm / step)
-        # How far the head strays from the smooth path, so that a jump does not leave the picture.
+        # How far the head strays from the smooth path, so that it stays in the picture during a jump.
         stray = np.abs(centre - smooth).max()
         high = 0.15 + 0.60 * min(reach, 0.6) + 0.6 * min(stray, 0.3)
         front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
         front /= np.linalg.norm(front)
-        # Where the face looks on average, so that a shot of somebody's back does not show the back only.
+        # The average direction of the face, so that a shot in which the character turns does not show only its back.
         turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]
         self._front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
         self._aims = smooth - [0, 0.36 * min(reach, 0.6), 0]

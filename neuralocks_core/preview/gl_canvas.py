@@ -31,7 +31,7 @@ _WHOLE = """
 #version 330
 void main() { gl_Position = vec4(gl_VertexID % 2 * 4 - 1, gl_VertexID / 2 * 4 - 1, 0, 1); }
 """
-# The drawing's colours are multiplied by its coverage already, which is 0 or 1: the edge of hair gets no fringe.
+# The drawing's colours are already multiplied by its coverage, which is 0 or 1: the edge of hair gets no fringe.
 _REDUCE = """
 #version 330
 uniform sampler2D drawing;
@@ -51,18 +51,18 @@ void main() {
 
 
 class GlCanvas:
-    """Draws with OpenGL 3.3, larger than asked for, and then reduces.
+    """Draws with OpenGL 3.3 at a larger size, then reduces the picture.
 
     It belongs to the thread that made it.
 
     Args:
         width, height: of a picture in pixels.
-        triangles: of the body (F, 3) int; none where it is not drawn.
-        strands: how many there will be in each picture, of `detail.vertices` points each.
+        triangles: of the body (F, 3) int; none if it is not drawn.
+        strands: number of strands in each picture, of `detail.vertices` points each.
         detail: how finely; see `film.Detail`.
 
     Raises:
-        Exception: there is no way to draw here; of which kind is the driver's choice.
+        Exception: drawing is impossible here; its type depends on the driver.
     """
 
     def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
@@ -75,7 +75,7 @@ class GlCanvas:
             raise
 
     def _fit_out(self, triangles: np.ndarray, strands: int, detail) -> None:
-        """Make all that a picture needs, in the context that is there."""
+        """Create everything that a picture needs in the current context."""
         context, (width, height) = self._context, self.size
         large = (width * detail.scale, height * detail.scale)
         self._drawing = context.texture(large, 4)
@@ -94,14 +94,14 @@ class GlCanvas:
         """An image (height, width, 3) uint8.
 
         Args:
-            camera: what it is seen by.
+            camera: the camera of the picture.
             body: points (V, 3) [m], or None for no body; body_colours: (V, 3) sRGB in 0..1.
             hair: points (P, 3) [m], strand after strand; hair_colours: (P, 3).
         """
         with self._context as context:
             self._coloured["view"].write(_view(camera, self.size[0] / self.size[1]).T.astype("f4").tobytes())
             context.enable_only(moderngl.DEPTH_TEST)
-            context.line_width = self._width  # a driver may know lines of one pixel only
+            context.line_width = self._width  # a driver may support only lines of one pixel
             self._large.use()
             self._large.clear()
             if body is not None:
@@ -117,11 +117,11 @@ class GlCanvas:
         return np.ascontiguousarray(pixels.reshape(*self.size[::-1], 3)[::-1])
 
     def close(self) -> None:
-        """Free what the driver holds."""
+        """Free the driver's resources."""
         self._context.release()
 
     def _shape(self, cells: np.ndarray):
-        """Buffers of the points and colours that cells name by number, and the array that draws them; None for none."""
+        """Buffers of the points and colours that cells name by number, and the array that draws them; None without cells."""
         if not cells.size:
             return None
         context, points = self._context, int(cells.max()) + 1
@@ -143,7 +143,7 @@ class GlCanvas:
 
 
 def _context() -> moderngl.Context:
-    """By EGL no display is needed; elsewhere than on Linux the default needs none."""
+    """EGL needs no display; outside Linux, the default needs none either."""
     if sys.platform == "linux":
         try:
             return moderngl.create_context(standalone=True, backend="egl")
@@ -153,7 +153,7 @@ def _context() -> moderngl.Context:
 
 
 def _view(camera: Camera, aspect: float) -> np.ndarray:
-    """What takes points (x, y, z, 1) [m] to OpenGL's clip space (4, 4)."""
+    """Matrix (4, 4) that takes points (x, y, z, 1) [m] to OpenGL's clip space."""
     turned = np.eye(4)
     turned[:3, :3] = camera.axes.T
     turned[:3, 3] = -camera.axes.T @ camera.eye

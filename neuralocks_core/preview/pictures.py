@@ -21,11 +21,11 @@ PANELS, MOST_PANELS = 6, 12
 STANDING = 4.0
 """Seconds that the camera takes to go round a single frame."""
 PALETTE, DITHER = 5, 6.0
-"""A .gif takes its colours from so many frames of the clip; they are dithered by so much of 255."""
+"""A .gif takes its colours from PALETTE frames of the clip; dithering changes them by DITHER of 255."""
 
 PICTURE = Detail(16000, 24, 3, 2)
 CLIP = Detail(4000, 12, 2, 3)
-"""A quarter of the strands, wider, with half the vertices: in motion it looks the same, and is drawn far sooner."""
+"""A quarter of the strands, wider, with half the vertices: in motion it looks the same, and it draws much faster."""
 
 
 def render(
@@ -44,8 +44,8 @@ def render(
     """Write a strip of pictures (.png) or a clip (.mp4, .gif).
 
     Args:
-        scene: what is to be seen.
-        path: the file to write; its ending chooses the kind.
+        scene: what to draw.
+        path: the file to write; its extension chooses the format.
         size: width and height of one picture in pixels.
         frames: numbers of the scene's frames: a strip shows these, or PANELS of them if there are more than MOST_PANELS; a clip
             goes from the first to the last. All if left out.
@@ -57,7 +57,7 @@ def render(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the ending is unknown, a library is missing, or the file cannot be written.
+        NeuralocksError: the extension is unknown, a library is missing, or the file cannot be written.
     """
     path = as_path(path, "path")
     if path.suffix.lower() not in SUFFIXES:
@@ -71,7 +71,7 @@ def render(
         first = np.linspace(0, len(chosen) - 1, PALETTE).astype(int)
         chosen, seen_from = (np.concatenate([each[first], each]) for each in (chosen, seen_from))
     width, height = size or ((440, 620) if still else (480, 600))
-    # Single pictures keep the head in their middle; in a clip the camera lags behind, so that the body is seen to move.
+    # Single pictures keep the head in the middle; in a clip the camera lags behind, so that the body visibly moves.
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
     say = progress or silent
     with atomic_write(path) as part, closing(Film(scene, width, height, detail, calm)) as film:
@@ -134,7 +134,7 @@ def _gif(part: Path, images: Iterator[np.ndarray], count: int, rate: float) -> N
     _, height, width, _ = shown.shape
     pixels = Image.fromarray(shown[:, ::2, ::2].reshape(1, -1, 3))
     palette = pixels.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3)
-    # Ordered dithering keeps the backdrop smooth, and still; what is diffused would crawl.
+    # Ordered dithering keeps the backdrop smooth, and still; error diffusion would crawl.
     pattern = np.tile(DITHER * (_bayer(8)[..., None] - 63 / 128), (height // 8 + 1, width // 8 + 1, 1))
 
     def reduced(image: np.ndarray):
@@ -160,7 +160,7 @@ def _mp4(part: Path, images: Iterator[np.ndarray], count: int, rate: float) -> N
 
     first = next(images)
     high, wide = (side // 2 * 2 for side in first.shape[:2])
-    # The encoder's own default takes three times the cores for the same size and look.
+    # The encoder's own default uses three times as many cores for the same size and look.
     fast = {"codec": "libx264", "quality": 8, "output_params": ["-preset", "veryfast"]}
     quiet = {"macro_block_size": 2, "ffmpeg_log_level": "quiet"}
     try:
@@ -169,14 +169,14 @@ def _mp4(part: Path, images: Iterator[np.ndarray], count: int, rate: float) -> N
             for image in chain([first], images):
                 encoder.send(np.ascontiguousarray(image[:high, :wide]))
     except OSError as error:
-        if error.errno is not None:  # else the encoder has ended, and takes no more pictures
+        if error.errno is not None:  # else the encoder has ended and accepts no more pictures
             raise
     if _frames_of(part) < count:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _frames_of(clip: Path) -> int:
-    """Pictures that can be read back from a clip: its encoder's exit status is not told."""
+    """Number of pictures that can be read back from a clip: the encoder's exit status is unknown."""
     import imageio_ffmpeg
 
     try:

@@ -7,13 +7,13 @@ from neuralocks_core.preview.camera import ANGLE, Camera
 from neuralocks_core.preview.shading import backdrop
 
 LONGEST = 64
-"""Samples of a segment, and along each side of a triangle, at most."""
+"""Most samples of a segment, and along each side of a triangle."""
 
 
 class PlainCanvas:
-    """Draws by sampling every triangle and segment a pixel or so apart and keeping the nearest sample of a pixel.
+    """Draws by sampling every triangle and segment a pixel or so apart and keeping the nearest sample in each pixel.
 
-    Slower and plainer than OpenGL, and works wherever numpy does. Arguments as of `GlCanvas`.
+    Slower and plainer than OpenGL, but works wherever numpy does. Arguments as for `GlCanvas`.
     """
 
     def __init__(self, width: int, height: int, triangles: np.ndarray, strands: int, detail):
@@ -32,7 +32,7 @@ class PlainCanvas:
         image = np.zeros(self._wide * self._high, np.uint32)
         if samples:
             pixel, depth, colour = (np.concatenate(parts) for parts in zip(*samples, strict=True))
-            # Far samples first: the last one written to a pixel is the nearest. Numbers of 16 bits are sorted by counting.
+            # Far samples first: the last one written to a pixel is the nearest. 16-bit numbers are radix-sorted.
             near, far = depth.min(), depth.max()
             rank = (65535 * ((far - depth) / max(far - near, 1e-9))).astype(np.uint16)
             order = np.argsort(rank, kind="stable")
@@ -59,7 +59,7 @@ class PlainCanvas:
         which = np.repeat(np.arange(len(steps)), steps)
         part = (np.arange(len(which)) - (np.cumsum(steps) - steps)[which]) / steps[which].astype(np.float32)
         place = start[which] + part[:, None] * way[which]
-        # The colour of the nearer end: they lie close together, and mixing would cost as much as all the rest.
+        # The colour of the nearer end: the ends are close together, and mixing would cost as much as all the rest.
         colour = colours.reshape(self._shape)[:, :-1].ravel()[which]
         result = []
         for aside in np.arange(self._width) - (self._width - 1) // 2:
@@ -68,7 +68,7 @@ class PlainCanvas:
         return result
 
     def _surface(self, seen: np.ndarray, colours: np.ndarray) -> list[tuple]:
-        """Samples of the triangles that face the camera, as of `_segments`."""
+        """Samples of the triangles that face the camera, as in `_segments`."""
         corners = seen[self._triangles]
         (ax, ay), (bx, by) = (corners[:, 1, :2] - corners[:, 0, :2]).T, (corners[:, 2, :2] - corners[:, 0, :2]).T
         low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
@@ -87,7 +87,7 @@ class PlainCanvas:
         return result
 
     def _kept(self, x, y, depth, colour) -> tuple:
-        """Of samples (n,), those before the camera and in the picture: pixel, depth, colour."""
+        """Those of samples (n,) in front of the camera and in the picture: pixel, depth, colour."""
         kept = (x >= 0) & (x < self._wide) & (y >= 0) & (y < self._high) & (depth > 0)
         return y[kept].astype(np.int32) * self._wide + x[kept].astype(np.int32), depth[kept], colour[kept]
 
@@ -95,7 +95,7 @@ class PlainCanvas:
 def composite(image: np.ndarray, scale: int, backdrop: np.ndarray) -> np.ndarray:
     """A drawing (scale H, scale W, 4) uint8, reduced and laid over the backdrop (H, W, 3).
 
-    Its colours are multiplied by its coverage already, which is 0 or 255: the edge of hair gets no fringe.
+    Its colours are already multiplied by its coverage, which is 0 or 255: the edge of hair gets no fringe.
     """
     total = np.zeros((*backdrop.shape[:2], 4), np.uint32)
     for row in range(scale):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colours for hair and body in a preview: light along the tangent, and shadow by how much hair lies in front."""
+"""Colours for hair and body in a preview: light along the tangent, and shadow by the amount of hair in front."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ RIM = np.array([-0.35, 0.55, -0.9]) / np.linalg.norm([-0.35, 0.55, -0.9])
 CELL = 0.006
 """Width of a cell of the shadow map [m]."""
 MOST_CELLS = 120
-"""Along each side of the shadow map."""
+"""Most cells along each side of the shadow map."""
 COVER = 2.2
-"""Width of all strands side by side [m]: what dims the light, whatever number of strands is drawn."""
+"""Width of all strands side by side [m]: determines how much light is dimmed, for any number of drawn strands."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,14 @@ class Look:
 def hair_colours(
     points: np.ndarray, counts: np.ndarray, to_eye: np.ndarray, centre: np.ndarray, axes: np.ndarray, look: Look
 ) -> tuple[np.ndarray, "ShadowMap"]:
-    """Linear colours (P, 3) of strand vertices, and the shadow that the hair throws.
+    """Linear colours (P, 3) of strand vertices, and the shadow that the hair casts.
 
     Diffuse light and two highlights along the tangent (Kajiya and Kay 1989; the second one shifted and tinted as in
     Marschner et al. 2003), dimmed by the hair in front.
 
     Args:
         points: (P, 3) [m] world, all strands with the same number of vertices.
-        counts: vertices of each strand (S,), all alike.
+        counts: vertices of each strand (S,), all equal.
         to_eye: unit vector towards the camera (3,).
         centre: middle of the head (3,) [m].
         axes: light axes, columns right, up, front (3, 3).
@@ -95,7 +95,7 @@ def body_colours(
         towards = axes @ direction
         clear = 1.0 if shadow is None else np.exp(-0.8 * shadow.depth(points + 0.004 * normals, towards))[:, None]
         facing = (normals @ towards)[:, None]
-        # Light that scatters under the skin reaches round the edge of the shadow, reddish.
+        # Light scattered under the skin reaches past the edge of the shadow, reddish.
         soft = np.clip((facing + 0.25) / 1.25, 0, 1) ** 1.5 * np.array([1, 0.92, 0.88]) + 0.04
         light += power * clear * soft * np.array(tint)
     sky = np.clip(0.5 + 0.5 * (normals @ (axes @ np.array([0, 1.0, 0])))[:, None], 0, 1)
@@ -114,13 +114,13 @@ def backdrop(width: int, height: int) -> np.ndarray:
 
 
 class ShadowMap:
-    """How much hair lies between a point and a light far away.
+    """How much hair is between a point and a distant light.
 
     Seen from each light, strand vertices fall into the cells of a box, and each column is summed from the light on.
 
     Args:
         points: (P, 3) [m].
-        area: what each vertex covers [m^2].
+        area: area that each vertex covers [m^2].
     """
 
     def __init__(self, points: np.ndarray, area: np.ndarray):
@@ -130,9 +130,9 @@ class ShadowMap:
     def depth(self, queries: np.ndarray, towards: np.ndarray) -> np.ndarray:
         """Optical depth (Q,) of the hair in front of each query (Q, 3) [m]; light comes from `towards`."""
         axes, low, cell, summed = self._seen_from(towards)
-        # One array a coordinate: several times as fast as rows of three.
+        # One array per coordinate: several times as fast as rows of three.
         place = (axes.T @ queries.T.astype(np.float32) - low[:, None]) / cell
-        # Half a cell towards the light, or a vertex would lie in its own shadow.
+        # Half a cell towards the light, or a vertex would be in its own shadow.
         place[0] += np.float32(0.5)
         last = np.array(summed.shape, np.float32)[:, None] - 1
         outside = ((place[1:] < 0) | (place[1:] > last[1:])).any(axis=0)
@@ -158,7 +158,7 @@ class ShadowMap:
         if key not in self._columns:
             side = np.cross(towards, [0.0, 1.0, 0.0] if abs(towards[1]) < 0.9 else [1.0, 0.0, 0.0])
             side /= np.linalg.norm(side)
-            # The way to the light first: whole layers are summed at once.
+            # The axis towards the light comes first: whole layers are summed at once.
             axes = np.stack([towards, side, np.cross(towards, side)], axis=1).astype(np.float32)
             seen = axes.T @ self.points.T.astype(np.float32)
             low, high = seen.min(axis=1), seen.max(axis=1)
@@ -174,7 +174,7 @@ class ShadowMap:
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """Linear light to display values in 0..1, with soft shoulders instead of clipped highlights."""
+    """Linear light to display values in 0..1, with a soft shoulder instead of clipped highlights."""
     toned = 1 - np.exp(-1.25 * np.maximum(linear, 0).astype(np.float32))
     return np.clip(np.where(toned < 0.0031308, 12.92 * toned, 1.055 * toned ** (1 / 2.4) - 0.055), 0, 1)
 
@@ -182,7 +182,7 @@ def srgb(linear: np.ndarray) -> np.ndarray:
 def _highlight(along, across, shift, sharpness):
     """sin^(2 sharpness) of the angle (S, N) between the half vector and the tangent, bent outward by a part of its length.
 
-    `along` and `across` (S, N) are the half vector's parts along the tangent and along outward, which is square to it.
+    `along` and `across` (S, N) are the half vector's parts along the tangent and along outward, which is perpendicular to it.
     """
     cosine = (along + shift * across) / np.sqrt(1 + shift**2)
     return np.exp(sharpness * np.log1p(-np.minimum(cosine**2, 0.999999)))

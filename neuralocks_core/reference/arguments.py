@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of the simulators' arguments: a wrong shape or number is named before anything is computed."""
+"""Checks of the simulators' arguments: a wrong shape or number is reported before anything is computed."""
 
 from dataclasses import asdict
 from typing import Any
@@ -11,14 +11,14 @@ from neuralocks_core.materials import Material
 
 
 def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
-    """bend [m^4/s^2], weight [times gravity], damping [1/s] and clumping [1/s^2], each (S,), finite and not negative.
+    """bend [m^4/s^2], weight [factor on gravity], damping [1/s] and clumping [1/s^2], each (S,), finite and not negative.
 
     Args:
-        material: an object or a mapping of these names, each a number or (S,); what it lacks is `Material`'s default.
+        material: an object or a mapping with these names, each a number or (S,); missing ones have `Material`'s default.
         strands: S.
 
     Raises:
-        NeuralocksError: any other number, or a wrong shape.
+        NeuralocksError: a number is invalid, or a shape is wrong.
     """
     found = {}
     for name, default in asdict(Material()).items():
@@ -52,7 +52,7 @@ def check_neighbours(neighbours: np.ndarray | None, strands: int) -> np.ndarray:
 
 
 def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np.ndarray, np.ndarray]:
-    """First frame's points (V, 3) and the faces (F, 3).
+    """The first frame's points (V, 3), and the faces (F, 3).
 
     Raises:
         NeuralocksError: too few frames, wrong shapes, faces out of range.

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from neuralocks_core.rig.chains import HairChains
 
 CORNERS = 8
-"""Points of each joint's mesh that meet the body. With spheres at the ends and middles of the bones alone the mesh lay 24 mm
-deep in the body at worst; with these 4 mm."""
+"""Points of each joint's mesh that collide with the body. With only spheres at the ends and middles of the bones, the mesh was up
+to 24 mm deep in the body; with these points, up to 4 mm."""
 BONE_RADIUS = 0.012
 """[m] kept from the body by the bones of hair without a mesh."""
 
@@ -32,10 +32,10 @@ class BodyPoints:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Points of the hair that meet the body.
+    """Points of the hair that collide with the body.
 
     Attributes:
-        joint: which one each is fixed to, (Q,).
+        joint: which joint each is fixed to, (Q,).
         points: canonical bind pose, (Q, 3) [m].
         radius: distance kept from the body, (Q,) [m]; less where a point is nearer at rest.
     """
@@ -73,16 +73,14 @@ class Contacts:
 
 
 class NearestVertices:
-    """The bodies of one step, points and normals (C, P, 3), to be asked for what is near."""
+    """The bodies of one step, points and normals (C, P, 3), for nearest-vertex queries."""
 
     def __init__(self, points, normals):
         self.points, self.normals = points, normals
         self._trees = [cKDTree(p, balanced_tree=False, compact_nodes=False) for p in points]
 
     def planes(self, where):
-        """Of the body vertex nearest to each of `where` (C, Q, 3): normals n (C, Q, 3) and offsets d (C, Q), distance
-        = n.x - d.
-        """
+        """Plane n.x = d of the body vertex nearest to each of `where` (C, Q, 3): normals n (C, Q, 3) and offsets d (C, Q)."""
         nearest = np.stack([tree.query(points)[1] for tree, points in zip(self._trees, where)])
         rows = np.arange(len(where))[:, None]
         normals = self.normals[rows, nearest].astype(float)

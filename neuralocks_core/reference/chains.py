@@ -5,7 +5,7 @@ Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per u
 
     sum m / (2 h^2) |x - y|^2 + sum m c / (2 h) |x - x_before|^2 + bend(D) - sum m (g + support) x + contact(x)
 
-with x the bones' far ends in the head's frame now and y where free flight would have taken them. What meets the body are
+with x the bones' far ends in the head's current frame, and y where free flight would have taken them. The contacts are
 points of the hair's mesh, each fixed to one joint, against the plane of the nearest body vertex.
 """
 
@@ -19,7 +19,7 @@ from neuralocks_core.rig.rods import RodTree
 from neuralocks_core.rotation import from_quaternion, quaternion_product
 
 ITERATIONS = 2
-"""Gauss-Newton steps to each step in time."""
+"""Gauss-Newton steps per time step."""
 
 
 class ChainSolver:
@@ -29,12 +29,12 @@ class ChainSolver:
         chains: the hair joints.
         tree: their masses, stiffnesses and rest support.
         damping: of motion in the head's frame [1/s].
-        weight: times gravity.
-        contacts: what meets the body; ends and middles of the bones if left out.
+        weight: factor on gravity.
+        contacts: what collides with the body; ends and middles of the bones if left out.
     """
 
     STIFFNESS = 4e4
-    """Of contact, per unit of the mass that a joint moves [1/s^2]: one g presses it 0.25 mm deep."""
+    """Contact stiffness per unit of the mass that a joint moves [1/s^2]: one g presses it in by 0.25 mm."""
 
     def __init__(
         self,
@@ -66,8 +66,8 @@ class ChainSolver:
         Args:
             heads: canonical space to world, (C, T, 4, 4).
             step: time between samples [s].
-            body: what the hair rests on.
-            substeps: steps of integration a sample.
+            body: the body to collide with.
+            substeps: integration steps per sample.
             warm_up: steps at the first pose before the motion begins, so that it begins at rest.
         """
         heads = np.asarray(heads, float)
@@ -168,7 +168,7 @@ class ChainSolver:
 
 
 def _between(a, b, share):
-    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations the nearest to the blend of the matrices."""
+    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations nearest to the blend of the matrices."""
     if share >= 1:
         return b
     result = (1 - share) * a + share * b

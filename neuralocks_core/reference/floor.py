@@ -15,16 +15,16 @@ from neuralocks_core.reference.solver import simulate
 
 @dataclass(frozen=True)
 class Floor:
-    """Error of the forgetful reference against the one that remembers, at the frames looked at."""
+    """Error of the restarted reference relative to the continuous one, at the compared frames."""
 
     history: int
-    """Frames it knows."""
+    """Frames that the restarted reference knows."""
     frames: np.ndarray
-    """Those looked at."""
+    """The compared frames."""
     median: float
     """Motion error of the median strand, relative to hair carried rigidly (= 1)."""
     rms: float
-    """The same over all strands together: those that came to rest elsewhere weigh most."""
+    """The same over all strands together, dominated by those that came to rest elsewhere."""
     position_percent: float
     """Mean distance in percent of strand length."""
 
@@ -42,22 +42,22 @@ def stateless_floor(
     progress: Progress | None = None,
     **options: Any,
 ) -> Floor:
-    """Restart the reference at rest `history` frames before each frame looked at, and compare.
+    """Restart the reference at rest `history` frames before each compared frame, and compare.
 
-    Hair that slid over a shoulder stays there; whoever sees only the last N frames cannot know. A network whose
-    error is near this one has nothing left to learn (docs/architecture.md, Reference). It costs `history / every`
-    times a simulation.
+    Hair that slid over a shoulder stays there; a method that sees only the last N frames cannot know it. A network whose
+    error is near this one has nothing left to learn (docs/architecture.md, Reference). The cost is `history / every`
+    times that of a simulation.
 
     Args:
         rest, head, body, triangles, material: as in `simulate`.
         history: frames of motion that the method may see.
-        every: look at each n-th frame, from `history` on.
-        truth: (T, S, K, 3) points of `simulate` over the whole clip, where they are at hand.
+        every: compare every n-th frame, from `history` on.
+        truth: (T, S, K, 3) points of `simulate` over the whole clip, if available.
         progress: called with restarts done, all restarts, message.
         options: of `simulate`; the same for both.
 
     Raises:
-        NeuralocksError: the clip is not longer than the history, or as `simulate`.
+        NeuralocksError: the clip is not longer than the history, or the errors of `simulate`.
     """
     count = len(head)
     if history < 1 or every < 1 or count <= history + every:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the solver needs of a rod at rest: lengths, masses, curvature in the twist-free frame, support."""
+"""What the solver needs from a rod at rest: lengths, masses, curvature in the twist-free frame, support."""
 
 from dataclasses import dataclass
 
@@ -21,9 +21,9 @@ class RestRods:
     mass: np.ndarray
     """(S, K) half the adjacent rest lengths [m]."""
     curl: np.ndarray
-    """(S, K, 3) rest bend vector sin(theta/2) * axis at each interior vertex, carried back to the root edge's frame."""
+    """(S, K, 3) rest bend vector sin(theta/2) * axis at each interior vertex, transported back to the root edge's frame."""
     support: np.ndarray
-    """(S, K, 3) force that holds the bind pose [m^2/s^2]; zero where it is switched off."""
+    """(S, K, 3) force that holds the bind pose [m^2/s^2]; zero if switched off."""
 
 
 def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
@@ -35,7 +35,7 @@ def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
             rest and droops, as in the paper.
 
     Raises:
-        NeuralocksError: wrong shape, not finite, or an edge without length.
+        NeuralocksError: wrong shape, not finite, or an edge of zero length.
     """
     points = np.asarray(points, np.float64)
     if points.ndim != 3 or points.shape[1] < 3 or points.shape[2] != 3:

@@ -21,18 +21,18 @@ SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 
 @dataclass(frozen=True, eq=False)
 class SimulatedHair:
-    """T frames of S simulated strands, in canonical space, which leaves out the head's own motion."""
+    """T frames of S simulated strands, in canonical space, so without the head's own motion."""
 
     points: np.ndarray
     """(T, S, K, 3) float32 [m]."""
     planes: np.ndarray | None
-    """(T, S, K, 4) float32: body plane n, d next to each vertex, n.x - d its signed distance [m]; NO_PLANE if
-    it is farther than 2 cm. None where they are not asked for."""
+    """(T, S, K, 4) float32: body plane n, d nearest to each vertex, n.x - d its signed distance [m]; NO_PLANE if
+    it is farther than 2 cm. None if not requested."""
     residual: np.ndarray
-    """(T,) rms over strands and vertices of the net force left per mass, in 9.81 m/s^2 whatever the gravity; neighbours
-    and body planes as last looked at. Where rounding stops a strand before its tolerance it is not to be trusted."""
+    """(T,) rms over strands and vertices of the remaining net force per mass, in 9.81 m/s^2 whatever the gravity, with neighbours
+    and body planes as last updated. It is unreliable if rounding stops a strand before its tolerance."""
     iterations: np.ndarray
-    """(T,) mean Newton steps a strand took for the frame."""
+    """(T,) mean Newton steps per strand for the frame."""
 
 
 def simulate(
@@ -60,35 +60,35 @@ def simulate(
 ) -> SimulatedHair:
     """Simulate strands on a moving head and body by implicit Euler (docs/architecture.md, Physics).
 
-    Before the first frame the head moves at constant velocity without rotating and the hair is at rest in it. Any
+    Before the first frame the head moves at constant velocity without rotating and the hair is at rest relative to it. Any
     motion is stable: lengths are exact by construction and every step lowers an energy.
 
     Args:
         rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.
         head: (T, 4, 4) canonical -> world, rigid, one per frame.
-        body: (T, V, 3) world points [m] of the body, or None for no contact; without substeps each frame is looked at
+        body: (T, V, 3) world points [m] of the body, or None for no contact; without substeps each frame is read
             once, in order.
         triangles: (F, 3) of the body, outward (counter-clockwise), closed where hair may touch it.
         material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `Material()`.
         dt: time between frames [s].
-        substeps: steps a frame.
-        iterations: most Newton steps a step.
+        substeps: steps per frame.
+        iterations: most Newton steps per step.
         tolerance: a strand is solved when the rms net force is below this fraction of its weight.
         rest_support: bind pose is an equilibrium.
-        neighbours: (S, N) int strands whose same vertices hold on to this one's (clumping), -1 for none.
-        start: (S, K, 3) canonical points at the first frame; None: the equilibrium of the first pose, looked for from
+        neighbours: (S, N) int strands whose corresponding vertices are tied to this one's (clumping), -1 for none.
+        start: (S, K, 3) canonical points at the first frame; None: the equilibrium of the first pose, searched from
             the rest shape.
         bind_body: (V, 3) canonical body in bind pose, for the distance at rest; None: taken from the first frame.
-        margin: distance kept from the body [m], or a vertex's own distance at rest where that is less.
+        margin: distance kept from the body [m], or a vertex's own distance at rest if that is less.
         collision: stiffness of the contact [1/(m s^2)].
         gravity: [m/s^2].
         volume: stiffness against strands crowding closer than at rest [m^2/s^2], 0 for none; see `volume`.
-        planes: return the body planes, more memory than the points.
+        planes: return the body planes, which take more memory than the points.
         device: "cpu", "cuda" or "cuda:N".
         progress: called with frames done, all frames, message.
 
     Raises:
-        NeuralocksError: shapes, values or device unfit; the message names the argument.
+        NeuralocksError: unsuitable shapes, values or device; the message names the argument.
     """
     rods = rest_rods(rest, rest_support=rest_support)
     strands, vertices = rods.mass.shape
@@ -101,7 +101,7 @@ def simulate(
             f"substeps {substeps}, iterations {iterations}, margin {margin}: give whole steps, metres"
         )
     way, frames = head_motion(head, substeps), len(head)
-    # about the head's first place: far from the world's origin rounding would decide
+    # relative to the head's first position: far from the world's origin, rounding would dominate
     away = way.origin[0]
     way = replace(way, origin=way.origin - away)
     material = check_material(material, strands)
@@ -147,14 +147,14 @@ def simulate(
 
 
 def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> SimulatedHair:
-    """Arrays to be filled in."""
+    """Arrays to fill."""
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     near = np.zeros((*points.shape[:3], 4), np.float32) if planes else None
     return SimulatedHair(points, near, np.zeros(frames), np.zeros(frames))
 
 
 def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:
-    """Put hair where it starts, by default in the equilibrium of the first pose, moving along with the head."""
+    """Put hair at its start, by default in the equilibrium of the first pose, moving along with the head."""
     stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
     if start is None:
         stepper.settle(SETTLE_DT, iterations)
@@ -163,7 +163,7 @@ def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, i
 
 
 def _between(body: Any, step: int, substeps: int) -> np.ndarray:
-    """Body points at a substep: straight between frames."""
+    """Body points at a substep: linear between frames."""
     frame, part = divmod(step, substeps)
     if part == 0:
         return np.asarray(body[frame])

@@ -34,7 +34,7 @@ class SpringSettings:
 def spring_bones(
     chains: HairChains, heads: np.ndarray, step: float, settings: SpringSettings = SpringSettings()
 ) -> np.ndarray:
-    """Turns (C, T, N, 4) wxyz, canonical, of joints that swing as spring bones.
+    """Turns (C, T, N, 4) wxyz, canonical, of joints that swing like spring bones.
 
     Args:
         chains: the hair joints.

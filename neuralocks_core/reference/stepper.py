@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The time steps of `solver.simulate`, one after the other on a device."""
+"""The time steps of `solver.simulate`, one after another on a device."""
 
 from collections.abc import Sequence
 
@@ -12,12 +12,12 @@ from neuralocks_core.reference.rest import RestRods
 from neuralocks_core.warp_device import start_warp
 
 REACH = 0.1
-"""[m] how far a vertex looks for the body; also how deep a vertex may sink and still be brought back."""
+"""[m] search radius of a vertex for the body; also how deep a vertex may sink and still be pushed out."""
 NEAR = 0.02
 """[m] planes farther away are not reported."""
 CHUNKS = (3, 3, 100)
-"""Newton steps between two looks at the body and at the neighbours. Three looks a step, however many iterations: at
-clumping 240 strands that pull on each other are up to 2.7 mm from where they would settle, at 60 about 0.1 mm."""
+"""Newton steps between two updates of body planes and neighbours. Three updates per step, for any number of iterations: at
+clumping 240, strands that pull on each other are up to 2.7 mm from where they would settle, at 60 about 0.1 mm."""
 
 
 class Stepper:
@@ -32,7 +32,7 @@ class Stepper:
         gravity: [m/s^2].
         tolerance: rms net force per mass [m/s^2] below which a strand is solved.
         volume: stiffness against crowding [m^2/s^2], 0 for none.
-        device: of warp.
+        device: warp's name of the device.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Stepper:
             self.volume = Volume(self.rest, self.constants.mass, volume)
 
     def _upload_strands(self, rods: RestRods, material: dict[str, np.ndarray], neighbours: np.ndarray) -> None:
-        """What stays the same for the whole simulation."""
+        """Upload what stays the same for the whole simulation."""
         from neuralocks_core.reference.kernels import energy as energy_kernels
 
         wp = self.wp
@@ -87,7 +87,7 @@ class Stepper:
             self.neighbours = wp.empty((0, self.strands), dtype=wp.int32, device=self.device)
 
     def _empty_state(self, margin: float, collision: float) -> None:
-        """Arrays that every step writes, with no body near."""
+        """Allocate the arrays that every step writes, with no body near."""
         from neuralocks_core.reference.kernels import banded as banded_kernels
         from neuralocks_core.reference.kernels import energy as energy_kernels
 
@@ -107,7 +107,7 @@ class Stepper:
         self.used, self.wake = (self._empty(wp.int32, (self.strands,)) for _ in range(2))
         self.points = self._empty(wp.vec3, shape[::-1])
         self.planes = self._empty(wp.vec4, shape[::-1])
-        # a CPU runs its threads one after the other: one scratch column stays in the cache
+        # a CPU runs its threads one after another: one scratch column stays in the cache
         self.stride = 0 if self.device.is_cpu else 1
         column = (self.vertices, self.strands if self.stride else 1)
         self.scratch = self._columns(banded_kernels.Scratch(), column)
@@ -131,7 +131,7 @@ class Stepper:
         self.mesh.refit()
 
     def begin(self, turn: np.ndarray, origin: np.ndarray, points: np.ndarray) -> None:
-        """Set the first pose, the head's rotation (4,) xyzw and place (3,) [m], and (S, K, 3) canonical points [m]."""
+        """Set the first pose, the head's rotation (4,) xyzw and position (3,) [m], and (S, K, 3) canonical points [m]."""
         self._pose(turn, origin)
         self.x.assign(np.ascontiguousarray(np.swapaxes(points @ self._matrix().T + origin, 0, 1)))
         self._add_drift()
@@ -149,14 +149,14 @@ class Stepper:
                 break
 
     def start_moving(self, before: np.ndarray) -> None:
-        """Give every vertex the velocity that the head has when it came from `before` one step ago."""
+        """Give every vertex the velocity of a head that was at `before` one step ago."""
         shift = before - np.array(self.origin)
         self.before.assign(self.x.numpy() + shift)
         self._moving = False
 
     def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
-        """Advance by `dt` [s] to a new pose of the head, rotation (4,) xyzw and place (3,) [m], in at most `iterations`
-        Newton steps; the body has been moved.
+        """Advance by `dt` [s] to a new pose of the head, rotation (4,) xyzw and position (3,) [m], in at most `iterations`
+        Newton steps; the body has already been moved.
         """
         wp = self.wp
         old_turn, old_origin = self.turn, self.origin
@@ -170,7 +170,7 @@ class Stepper:
             self._moving = True
         if self.mesh is not None:
             self._add_drift()
-            # not at the predicted state, which may lie behind the body's far side
+            # not at the predicted state, which may be past the body's far side
             self._run(self.kernels.carry_along, (self.carry, self.carry_origin, self.last, self.x))
             self._look(self.x, 1)
         args = (self.turn, self.origin, self.rest, self.constants.length, self.last, self.before, self.x)
@@ -179,7 +179,7 @@ class Stepper:
         self._solve(dt, iterations, settling=0)
 
     def read(self, points: np.ndarray, planes: np.ndarray | None) -> tuple[float, float]:
-        """Write (S, K, 3) and, where wanted, (S, K, 4) canonical; return residual and Newton steps as `solver.SimulatedHair` has them."""
+        """Write (S, K, 3) and, if wanted, (S, K, 4) canonical; return residual and Newton steps as in `solver.SimulatedHair`."""
         args = (self.turn, self.origin, NEAR, self.x, self.load.plane, self.points, self.planes)
         self._run(self.kernels.to_canonical, args)
         points[:] = self.points.numpy()
@@ -231,7 +231,7 @@ class Stepper:
         self._run(self.kernels.body_planes, args)
 
     def _add_drift(self) -> None:
-        """Count how far the body went in the head's frame: no vertex's distance from it can have shrunk by more."""
+        """Add up how far the body moved in the head's frame: no vertex's distance to it can have shrunk by more."""
         if self.mesh is not None:
             now = (self._body_now - np.array(self.origin)) @ self._matrix()
             self.drift += float(np.sqrt(np.square(now - self._body_in_head).sum(1).max()))

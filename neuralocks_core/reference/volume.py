@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Strands keep their volume: a smoothed density that may not rise above the groom's own.
 
-The energy is that of `physics.self_collision` (paper section 3.4.2, equation 5, on relative density). It ties every
-strand to all around it, so the solver takes it as a force that is looked up anew between its Newton solves, with a
-spring to where the vertex is now that keeps a step from overshooting.
+The energy is that of `physics.self_collision` (paper section 3.4.2, equation 5, on relative density). It couples every
+strand to all strands around it. So the solver treats it as a force that is updated between its Newton solves, with a
+spring to the vertex's current position that keeps a step from overshooting.
 """
 
 import warp as wp
@@ -13,7 +13,7 @@ from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
 
 class Volume:
-    """Densities of all vertices and the force that follows.
+    """Densities of all vertices and the resulting force.
 
     Args:
         rest: (K, S) vec3d rest points on the device.
@@ -32,7 +32,7 @@ class Volume:
         self._run(kernels.densities, rest, self.rest_density)
 
     def push(self, x: array_vec, target: array_vec, pull: array_real) -> None:
-        """Add the force at (K, S) points `x` to the springs pull/2 |x - target|^2 that the solver follows."""
+        """Add the force at (K, S) points `x` to the springs pull/2 |x - target|^2 of the solver."""
         self._look(x)
         self._run(kernels.densities, x, self.pressure)
         wp.launch(kernels.pressures, dim=self.mass.shape, inputs=[self.rest_density, self.pressure], device=self.device)

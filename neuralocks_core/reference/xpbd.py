@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Extended position based dynamics: the simulator that games use, as the baseline of speed and accuracy."""
+"""Extended position based dynamics: the simulator that games use, as a baseline for speed and accuracy."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -36,13 +36,13 @@ def simulate_xpbd(
 ) -> SimulatedHair:
     """Simulate strands by XPBD on the energies of `solver.simulate`, with one iteration in each of many substeps.
 
-    It starts from the rest shape (there is no equilibrium solve) and has no ties between neighbours. Edges stretch by
-    what one pass leaves; stiffness holds as far as the substeps carry it.
+    It starts from the rest shape (there is no equilibrium solve) and has no ties between neighbours. Edges keep the stretch that
+    one pass leaves; how stiff hair really is depends on the number of substeps.
 
     Args:
         rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, device, progress: as in
             `solver.simulate`.
-        substeps: in a frame.
+        substeps: per frame.
 
     Returns:
         As `solver.simulate`; residual is NaN (nothing is solved for), iterations are the substeps.
@@ -74,7 +74,7 @@ def simulate_xpbd(
 
 
 class _Hair:
-    """Strands on a device, and the body around them. Arrays there are (K, S), points from the head's place along world axes."""
+    """Strands on a device, and the body around them. Arrays are (K, S), points relative to the head's position in world axes."""
 
     def __init__(self, rods: RestRods, way: HeadMotion, material: dict, margin: float, gravity: float, device: str):
         self.wp = wp = start_warp(device)
@@ -98,7 +98,7 @@ class _Hair:
         self.mesh = None
 
     def begin(self, first: np.ndarray, drift: np.ndarray) -> None:
-        """At rest in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
+        """Start at rest in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
         self.x = self._vectors(self.rods.points @ first.T)
         self.velocity = self._vectors(np.broadcast_to(drift, self.rods.points.shape))
 
@@ -114,7 +114,7 @@ class _Hair:
         self.limit = self._reals(np.minimum(self.margin, (near[..., :3] * self.rods.points).sum(-1) - near[..., 3]))
 
     def look(self, body: np.ndarray, a: int, b: int) -> None:
-        """Move the body to points (V, 3) from the head's place, and find what is near when the head has gone from substep a to b."""
+        """Move the body to points (V, 3) relative to the head, and find what is near as the head goes from substep a to b."""
         self.surface.assign(np.asarray(body, np.float32))
         self.mesh.refit()
         before, turn = (self.wp.quat(*self.way.turn[i]) for i in (a, b))
@@ -134,7 +134,7 @@ class _Hair:
         )  # fmt: skip
 
     def read(self, head: np.ndarray, points: np.ndarray) -> None:
-        """Write (S, K, 3) canonical, for the head (4, 4) of this moment."""
+        """Write (S, K, 3) canonical, for the current head (4, 4)."""
         points[:] = np.swapaxes(self.x.numpy(), 0, 1) @ np.asarray(head, float)[:3, :3]
 
     def _run(self, kernel: object, dim: int | tuple, *inputs) -> None:

@@ -11,26 +11,26 @@ from neuralocks_core.rig.network import RigModel, RigSampler
 from neuralocks_core.rotation import angle_between, flat, rotation_part, volumes
 
 TURNED = np.radians(0.5)
-"""A carrier that is turned against the head by no more [rad] all the while is one with it, and so is one that is shifted by no
-more than `SHIFTED`: files round."""
+"""A carrier that never turns relative to the head by more than this [rad], and never shifts by more than `SHIFTED`, counts as one
+with the head: files round."""
 SHIFTED = 0.002
-"""[m]."""
+"""[m], see `TURNED`."""
 
 
 class CarriedHair:
     """The turns of a model's joints on one character in one clip.
 
-    A chain below a bone that moves against the head hangs as if that bone were the head: gravity, motion and neck are read as
-    they are seen from it.
+    A chain below a bone that moves relative to the head behaves as if that bone were the head: gravity, motion and neck are read
+    as seen from it.
 
     Args:
         model: the network.
-        joints: where its joints are in the skeleton, (N,).
+        joints: indices of its joints in the skeleton, (N,).
         character: skeleton and head.
         clip: its motion.
 
     Attributes:
-        carriers: the joints as whose motion chains move, ascending.
+        carriers: the joints that carry chains, ascending.
     """
 
     def __init__(self, model: RigModel, joints: np.ndarray, character: Character, clip: Clip):
@@ -56,8 +56,8 @@ def _carried_by(character: Character, joint: int) -> Character:
 
 
 def _moves_apart(character: Character, clip: Clip, joint: int) -> bool:
-    """Whether a joint ever lies otherwise on the head than in the bind pose. One that a scale of zero hides, or that is
-    mirrored, has no turn to read; the head's serves.
+    """Whether a joint is ever placed differently on the head than in the bind pose. A joint that a scale of zero hides, or that is
+    mirrored, has no readable rotation; the head's is used.
     """
     linear = clip.joints[:, joint, :3, :3]
     if joint == character.head or flat(linear).any() or (volumes(linear) <= 0).any():

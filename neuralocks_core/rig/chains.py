@@ -13,9 +13,9 @@ from neuralocks_core.anatomy.joint_names import carrier, leaf, prefixed_otherwis
 from neuralocks_core.errors import NeuralocksError
 
 SAME_AXES = 1e-5
-"""Axes that differ by less are the same: one rig read in two programs."""
+"""Axes that differ by less are the same: one rig, read by two programs."""
 SIZES = (0.7, 1.4)
-"""So many times as large a character may be as the one that a model was trained for: turns do not depend on size, but how
+"""How many times as large a character may be as the one that a model was trained for: turns do not depend on size, but how
 fast gravity swings hair does, by its square root."""
 
 
@@ -26,9 +26,9 @@ class HairChains:
     Attributes:
         names: last path parts of the joints, (N).
         joints: their indices in the skeleton, (N,).
-        parents: index of the moving joint that carries each one, -1 where the head does, (N,).
-        chain: which chain each belongs to, (N,).
-        origins: where each one turns, canonical, (N, 3) [m].
+        parents: index of the moving joint that carries each one, -1 if the head does, (N,).
+        chain: the chain that each belongs to, (N,).
+        origins: the pivot of each one, canonical, (N, 3) [m].
         axes: bind axes of each one as columns, canonical, (N, 3, 3).
         bone_joint: which joint moves each bone, (M,); a branching joint moves several.
         bone_end: moving joint at a bone's far end, -1 for a free end, (M,).
@@ -88,7 +88,7 @@ class HairChains:
 
     @property
     def ways(self) -> np.ndarray:
-        """From each joint's carrier, the head's origin for the first ones, to it, (N, 3) [m]."""
+        """Vectors from each joint's carrier, the head's origin for first joints, to the joint, (N, 3) [m]."""
         return self.origins - np.where((self.parents >= 0)[:, None], self.origins[self.parents], 0)
 
     @property
@@ -98,15 +98,15 @@ class HairChains:
 
     @property
     def tops(self) -> list[str]:
-        """Names of the first joints."""
+        """Names of the chains' first joints."""
         return [self.names[root] for root in self.roots]
 
     def chain_name(self, chain: int) -> str:
-        """A chain goes by its first joint."""
+        """A chain has the name of its first joint."""
         return self.names[self.roots[chain]]
 
     def chain_length(self, chain: int) -> float:
-        """Longest way along the bones of a chain [m]."""
+        """Longest path along the bones of a chain [m]."""
         reach = np.zeros(len(self))
         for bone in np.argsort(-self.bone_joint, kind="stable"):
             end = reach[self.bone_end[bone]] if self.bone_end[bone] >= 0 else 0.0
@@ -115,15 +115,15 @@ class HairChains:
         return float(reach[self.roots[chain]])
 
     def levels(self) -> list[np.ndarray]:
-        """Joints by depth, so that each level can be posed at once."""
+        """Joints by depth, so that each level is posed at once."""
         depth = np.zeros(len(self), int)
         for joint, parent in enumerate(self.parents):
             depth[joint] = depth[parent] + 1 if parent >= 0 else 0
         return [np.flatnonzero(depth == level) for level in range(depth.max() + 1)]
 
     def named_as(self, names, below: np.ndarray) -> "HairChains":
-        """These chains with the names that they have in another copy of the rig, where only what all names begin with is
-        another: a namespace, an exporter's prefix. Themselves where they are there, or where that does not tell.
+        """These chains with their names in another copy of the rig that has another common prefix: a namespace, or an exporter's.
+        Returned unchanged if the names are there, or if the prefix is ambiguous.
 
         Args:
             names, below: as for `match`.
@@ -133,8 +133,8 @@ class HairChains:
         return replace(self, names=renamed) if renamed else self
 
     def match(self, names, below: np.ndarray) -> np.ndarray:
-        """Indices (N,) of these joints among `names`, joint paths, those for which `below` (J,) says that they hang from the
-        head: what a tail or a coat calls its joints is its own matter.
+        """Indices (N,) of these joints among `names`, joint paths, of which only those below the head count (`below` (J,)):
+        joints of a tail or a coat may have the same names.
 
         Raises:
             NeuralocksError: one is missing or ambiguous, that is, the model was trained for other chains.
@@ -166,14 +166,14 @@ class HairChains:
         return np.array(joints, int)
 
     def check_same(self, other: "HairChains") -> float:
-        """Refuse a model that was trained for chains of another shape: bones off by more than 2 %, all sizes alike, or a
-        hierarchy that differs.
+        """Refuse a model that was trained for chains of another shape: bones that differ by more than 2 %, apart from overall
+        size, or another hierarchy.
 
         Returns:
-            how many times as large the other chains are: 1 where they are the same size within 2 %, else within `SIZES`.
+            how many times as large the other chains are: 1 if the size is the same within 2 %, else within `SIZES`.
 
         Raises:
-            NeuralocksError: names the joint, or says by how much the size is another.
+            NeuralocksError: the message names the joint, or the ratio of the sizes.
         """
         order = {name: index for index, name in enumerate(other.names)}
         for index, name in enumerate(self.names):
@@ -189,7 +189,7 @@ class HairChains:
                 )
         ways, ways_there = self.ways, other.ways[[order[name] for name in self.names]]
         lengths = np.linalg.norm(ways, axis=1)
-        told = lengths > 1e-3  # a joint may lie in its carrier
+        told = lengths > 1e-3  # a joint may coincide with its carrier
         ratio = float(np.median(np.linalg.norm(ways_there, axis=1)[told] / lengths[told])) if told.any() else 1.0
         for size in (1.0, ratio):
             off = np.linalg.norm(size * ways - ways_there, axis=1)
@@ -209,14 +209,14 @@ class HairChains:
         return size
 
     def turns_on(self, other: "HairChains", turns: np.ndarray) -> np.ndarray:
-        """Turns of these joints in the bind axes that they have in `other`, a rig that `check_same` let pass: the same
-        rotation in space is other numbers there once the rig went through another exporter.
+        """Turns of these joints in the bind axes that they have in `other`, a rig that `check_same` accepted: after another
+        exporter, the same rotation in space has other numbers.
 
         Args:
             turns: (..., N, 4) wxyz in these chains' own bind axes.
 
         Returns:
-            (..., N, 4) wxyz, bit for bit the same where the axes are the same.
+            (..., N, 4) wxyz, bit for bit the same if the axes are the same.
         """
         order = {name: index for index, name in enumerate(other.names)}
         there = other.axes[[order[name] for name in self.names]]
@@ -232,7 +232,7 @@ class HairChains:
 
     @classmethod
     def from_json(cls, values: dict) -> "HairChains":
-        """From what `to_json` gave.
+        """Build it from the output of `to_json`.
 
         Raises:
             NeuralocksError: the values are not those of hair chains.

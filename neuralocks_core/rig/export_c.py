@@ -15,13 +15,13 @@ from neuralocks_core.rotation import rotation_part, to_quaternion
 
 _TEXTS = Path(__file__).parent
 _AT_ONCE = 4
-"""Rows of a layer that are added at a time."""
+"""Rows of a layer that are summed at a time."""
 _WIDTH = 8
-"""Columns of a layer are a multiple of it: what vector units take at once."""
+"""Columns of a layer are a multiple of this, the width of vector units."""
 HISTORY_BYTES = 10_304
-"""Size of the struct of history.h.in, of which a dynamic model needs one for each character."""
+"""Size of the struct of history.h.in, a dynamic model needs one per character."""
 MADE = "Made by `neuralocks rig export-c`"
-"""What both files say in their first lines."""
+"""Text in the first lines of both files."""
 
 
 def made_here(path) -> bool:
@@ -39,11 +39,11 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
     Args:
         model: the trained model.
         path: header to write.
-        prefix: of every name in it, so that several models can live in one program.
+        prefix: prefix of every name in it, so that one program can use several models.
 
     Raises:
-        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, the example's place is taken
-            by another file, or the model reads what the header does not compute.
+        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, another file has the example's
+            name, or the model reads inputs that the header does not compute.
     """
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
@@ -115,7 +115,7 @@ def _binds(chains: HairChains) -> np.ndarray:
     """Bind axes of the joints as quaternions (N, 4) wxyz.
 
     Raises:
-        NeuralocksError: some are mirrored or flat, as no training has them.
+        NeuralocksError: some are mirrored or flat, which no training has.
     """
     return to_quaternion(rotation_part(chains.axes, "model: bind axes of its joints"))
 
@@ -146,7 +146,7 @@ def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:
 def _padded(layers, joints: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Weights (in, out) and biases of the C layers, zeros added so that no loop has a remainder.
 
-    The last layer gives x of all joints, then y, then z, so that joints are turned many at a time.
+    The last layer gives x of all joints, then y, then z, so that many joints are turned at once.
     """
     result, rows = [], _round_up(layers[0][0].shape[1], _AT_ONCE)
     for index, (weight, bias) in enumerate(layers):
@@ -170,9 +170,9 @@ def _round_up(count: int, unit: int) -> int:
 
 def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
     """Outer products whose inner loop has a constant length, so that it vectorises. Blocks of columns keep the sums in
-    registers, four rows at a time spare three of four trips to memory, and rows are added in the order in which
-    matrix libraries add them, bias last, so that the rounding is theirs. The first layer is summed in double precision, as
-    everywhere: it has many large terms.
+    registers, and four rows at a time save three of four memory accesses. Rows are added in the order of matrix libraries,
+    bias last, so that rounding is the same. The first layer is summed in double precision, as everywhere: it has many large
+    terms.
     """
     block = next(size for size in (48, 40, 32, 24, 16, 8) if columns % size == 0)
     total, kind, zero, narrow = "s[k]", "float", "0.0f", ""
@@ -195,7 +195,7 @@ def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str
 
 
 def _parts_for(model: RigModel, text: str) -> str:
-    """A template without its marks, and for a quasi-static model without what lies between @IF_DYNAMIC@ and @END@."""
+    """A template without its markers; for a quasi-static model also without the text between @IF_DYNAMIC@ and @END@."""
     return re.sub(r"@IF_DYNAMIC@\n(.*?)@END@\n", r"\1" if model.dynamic else "", text, flags=re.S)
 
 
@@ -206,7 +206,7 @@ def _example(model: RigModel, header: str, prefix: str) -> str:
 
 
 def _reads(model: RigModel) -> str:
-    """A line of the header's comment with the joints that the inputs are of, if the model file has their names."""
+    """A line of the header's comment that names the joints of the inputs, if the model file has their names."""
     reads = model.training.get("reads")
     if not isinstance(reads, dict) or not all(isinstance(name, str) for name in reads.values()):
         return ""
@@ -228,7 +228,7 @@ def _facing(model: RigModel) -> str:
 
 
 def _plain(text: str) -> str:
-    """What may stand in a comment, whoever made the model, in plain ASCII: a compiler may read it in any code page."""
+    """Text that is safe in a comment, whoever made the model, in plain ASCII: a compiler may read it in any code page."""
     return re.sub(r"[^\w ,.:-]", "_", text[:300]).encode("ascii", "backslashreplace").decode()
 
 
@@ -242,6 +242,6 @@ def _double(value) -> str:
 
 
 def _c_text(name: str) -> str:
-    """A name as UTF-8 inside a C string literal, in plain ASCII: three octal digits end by themselves."""
+    """A name as UTF-8 inside a C string literal, in plain ASCII: octal escapes end after three digits."""
     plain = [chr(byte).isalnum() or chr(byte) in " _-.:" for byte in range(128)] + [False] * 128
     return "".join(chr(byte) if plain[byte] else f"\\{byte:03o}" for byte in name.encode("utf-8", "replace"))

@@ -14,17 +14,17 @@ from neuralocks_core.rig.measuring import driving, measured_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 UNNAMED = 3
-"""Joints in a row that drive skin below a head may be hair, whatever they are called."""
+"""A row of this many joints that drive skin below a head may be hair, whatever their names."""
 CAP = 0.7
 """Share of the head's width and depth that skin must cover to be a cap."""
 
 
 FAN = 3
-"""Chains that hang from one joint: fewer may be a branching one."""
+"""Least number of chains below one joint: fewer may be one branching chain."""
 
 
 class NoHairChains(NeuralocksError):
-    """No joint is hair, or none has the names that were given."""
+    """No joint is hair, or none has the given names."""
 
 
 def find_chains(
@@ -38,8 +38,8 @@ def find_chains(
 
     Args:
         character: skeleton and head.
-        meshes: the skinned meshes; without them only names decide and free ends are bones without a joint of their own.
-        patterns: names by hand.
+        meshes: the skinned meshes; without them only names decide, and free ends are bones without a joint of their own.
+        patterns: names given by the user.
 
     Raises:
         NoHairChains: there are none.
@@ -52,14 +52,14 @@ def find_chains(
 
 
 def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHairChains:
-    """The error for a character without a chain, with the likely cause: hair that hangs from elsewhere, that has no skin, or
-    that no name tells.
+    """The error for a character without a chain, with the likely cause: the hair's joints are elsewhere, drive no skin, or have
+    names that do not say hair.
     """
     skeleton, head = character.skeleton, character.head
     names, below = skeleton.names, skeleton.below(head)
     others = ", ".join(leaf(names[j]) for j in skeleton.children[head][:8]) or "nothing"
     remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
-    # Elsewhere a tail is a tail.
+    # Outside the head, `tail` means a tail.
     elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(names[j])]
     bare = [j for j in np.flatnonzero(below) if j != head and says_hair(names[j])]
     unnamed = left_out(character, meshes or [])
@@ -77,14 +77,14 @@ def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHair
 def left_out(
     character: Character, meshes: list[SkinnedMesh], chains: HairChains | None = None, least: int = UNNAMED
 ) -> list[int]:
-    """First joints of chains below the head that may be hair, but move with none: of names that say nothing, in a mesh that the
-    body drives, too.
+    """First joints of chains below the head that may be hair but are not moved: their names say nothing, and they are in a mesh
+    that the body drives, too.
 
     Args:
         character: skeleton and head.
         meshes: the skinned meshes.
-        chains: those that were found; None where there are none.
-        least: of so many joints in a row that drive skin.
+        chains: the found ones; None if there are none.
+        least: least number of joints in a row that drive skin.
     """
     skeleton, found = character.skeleton, []
     drives = driving(skeleton, meshes)
@@ -116,7 +116,7 @@ def of_the_body(character: Character, meshes: list[SkinnedMesh] | None) -> np.nd
 
 
 def fits(name: str, pattern: str) -> bool:
-    """Whether a joint's path, or its last part, is one that a pattern stands for."""
+    """Whether a joint's path, or its last part, matches a pattern."""
     return fnmatch.fnmatchcase(name, pattern) or fnmatch.fnmatchcase(leaf(name), pattern)
 
 
@@ -141,7 +141,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"skeleton: joint '{leaf(names[hits[0]])}' does not hang below the head joint '{head}', but from '{above}': name that "
             f"with --head {above}, as in training, or name other joints"
         )
-    hits = inside  # what a tail or a coat calls its joints is its own matter
+    hits = inside  # joints of a tail or a coat may have the same names
     inner = np.zeros(len(names), bool)
     for joint, parent in enumerate(parents):
         inner[joint] = parent >= 0 and (inner[parent] or parent in hits)
@@ -161,10 +161,10 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         hair = any(says_hair(names[j]) for j in [joint, *steered])
         if meshes and not used[tree].any():
             continue
-        # Below a jaw or a hat only a name makes hair.
+        # Below a jaw or a hat, only a name identifies hair.
         worn = worn or says_face(names[joint]) and not hair
         below = [(child, worn) for child in children[joint]]
-        # A holder that drives nothing is no bone of hair: its children are. Without meshes only a fan tells.
+        # A holder that drives nothing is not a hair bone: its children are. Without meshes, only a fan reveals a holder.
         if (not used[joint] and below and not steered) if meshes else len(below) > 1:
             todo += below
             continue
@@ -180,8 +180,8 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
 
 
 def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[SkinnedMesh] | None) -> list[int]:
-    """What rides on a joint that drives nothing itself but is a bone of hair, as in a chain of controls: one other joint goes on
-    from it, on which something rides, too. Taken for a holder, it would leave each bone to turn about a pivot of its own.
+    """Riders of a joint that drives nothing itself but is a hair bone, as in a chain of controls: one other joint that has riders
+    too continues from it. Taken for a holder, it would leave each bone to turn about a pivot of its own.
     """
     skeleton = character.skeleton
     riding = riders(skeleton, joint, used)
@@ -192,15 +192,15 @@ def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Sk
 
 
 def _only_shares(skeleton: Skeleton, joint: int, used: np.ndarray, meshes: list[SkinnedMesh]) -> bool:
-    """Whether chains fan out from a joint to which smoothed weights give a part of their roots, but no skin of its own."""
+    """Whether chains fan out from a joint that has a part of their roots by smoothed weights, but no skin of its own."""
     fan = [child for child in skeleton.children[joint] if used[skeleton.below(child)].any()]
     only = np.arange(len(skeleton.names)) == joint
     return len(fan) >= FAN and not any((mesh.weight_on(only) > 0.55).any() for mesh in meshes)
 
 
 def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:
-    """Whether a joint drives the hair on top of the skull: skin nearly as wide and as deep as the head's own. Turned, it
-    would go through the forehead; what moves hangs from it.
+    """Whether a joint drives the hair on top of the skull: skin nearly as wide and as deep as the head's own. If it turned, it
+    would go through the forehead; the joints below it move.
     """
     sizes = []
     for owner in (joint, character.head):

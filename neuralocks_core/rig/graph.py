@@ -6,7 +6,7 @@ import numpy as np
 from neuralocks_core.onnx_graph import OnnxGraph
 
 _FLOAT, _DOUBLE = 1, 11
-"""Of onnx.TensorProto."""
+"""Types of onnx.TensorProto."""
 
 
 def rig_graph(model) -> bytes:
@@ -17,14 +17,14 @@ def rig_graph(model) -> bytes:
     """
     graph = OnnxGraph("rig")
     limits = np.asarray(model.limits, np.float32)
-    # As the header has it: NaN, which is above nothing, counts as the least. Max and Min would hand it on.
+    # As in the header: NaN, which compares false, becomes the lower limit. Max and Min would pass it on.
     least = graph.constant("least", -limits)
     above = graph.node("Greater", ["features", least], "above")
     value = graph.node("Where", [above, "features", least], "raised")
     value = graph.node("Min", [value, graph.constant("most", limits)], "clipped")
     value = graph.node("Cast", [value], "wide", to=_DOUBLE)
     for index, (weight, bias) in enumerate(model.layers):
-        if index == 0:  # as `RigModel` does, in double precision
+        if index == 0:  # in double precision, as `RigModel` does
             weight, bias = weight.astype(float), bias.astype(float)
         names = [value, graph.constant(f"weight{index}", weight), graph.constant(f"bias{index}", bias)]
         value = graph.node("Gemm", names, f"layer{index}", transB=1)

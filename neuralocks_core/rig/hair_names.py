@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joint names that say hair, and those that say another part of the head or what it wears."""
+"""Joint names that mean hair, and those that mean another part of the head or what it wears."""
 
 import re
 
@@ -11,7 +11,7 @@ _HAIR_ALONE = (
 )
 _HAIR = f"{_HAIR_ALONE}|bang(?!le)|fringe|tress|strand|kami|dread|bun(?!ny)|wig(?!gle)"
 _HAIR_OR_FACE = "lock(?!et)|curl"
-"""What features do, too: lips and tongues curl."""
+"""Words that also fit features: lips and tongues curl."""
 _FEATURES = "(?:left|right)?eye|lid|brow(?!n)|jaw|tongue|teeth|tooth|lip|mouth|nose|nostril|lash|oris|snout|muzzle|beak"
 _FACE = (
     f"{_FEATURES}|cheek|chin|face|facial|ear|earring|temple|forehead"
@@ -26,8 +26,8 @@ _HAIR_ANYWHERE = re.compile(
     "|髪|アホ毛|アホゲ|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ|ちょんまげ|触角"
     r"|髮|刘海|马尾|辫|鬓|呆毛|[头前后侧长]发|发(?![^\W\da-z左右])|머리카락|앞머리|뒷머리|옆머리"
 )
-"""Wherever in a name they stand, but 发, which also begins other words, at a word's end; those of MikuMikuDance rigs come in
-files with UTF-8 names."""
+"""They count anywhere in a name, except 发, which also begins other words and counts only at a word's end; names in
+MikuMikuDance rigs come in files with UTF-8 names."""
 _FACE_ANYWHERE = re.compile(
     "headphone|headset|headband|headdress|headgear|headwear"
     "|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|耳|鼻|頬|ほほ|ひげ|髭|角"
@@ -38,11 +38,11 @@ _WORN_IN_HAIR = re.compile(
     r"hair(?:pin|clip|band|tie|bow|accessor|ornament|decor|net|flower)|ribbon"
     r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止)|发(?:带|夹|卡|箍|簪|圈|绳)"
 )
-"""Ribbons and pins are stiff, or have an animation of their own: they ride on the hair or the head."""
+"""Ribbons and pins are stiff or have their own animation: they ride on the hair or the head."""
 
 
 def says_hair(name: str) -> bool:
-    """Whether a joint's path or name says hair: `Hair_L.001`, `frontHair2` and `PigTail_L` do, `earring` and `hairpin` do not."""
+    """Whether a joint's path or name means hair: `Hair_L.001`, `frontHair2` and `PigTail_L` do, `earring` and `hairpin` do not."""
     whole = _whole(name)
     if _WORN_IN_HAIR.search(whole):
         return False
@@ -50,18 +50,18 @@ def says_hair(name: str) -> bool:
         return True
     if _begins(name, _HAIR_OR_FACE):
         return not _begins(name, _FEATURES)
-    # Below a head these are hair, unless another word says what is meant: `brow_tail`, まつ毛.
+    # Below a head these are hair, unless another word says otherwise: `brow_tail`, まつ毛.
     return not says_face(name) and (_begins(name, "tail|tuft") or "毛" in whole)
 
 
 def says_hair_alone(name: str) -> bool:
-    """Whether a joint's path or name says hair wherever the joint hangs: below a chest a fringe or a tail is a garment's."""
+    """Whether a joint's path or name means hair anywhere in a skeleton: below a chest, a fringe or a tail is a garment's."""
     whole = _whole(name)
     return not _WORN_IN_HAIR.search(whole) and bool(_begins(name, _HAIR_ALONE) or _HAIR_ANYWHERE.search(whole))
 
 
 def says_face(name: str) -> bool:
-    """Whether a joint's path or name says a part of the face, or what a head wears."""
+    """Whether a joint's path or name means a part of the face, or what a head wears."""
     whole = _whole(name)
     return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _WORN_IN_HAIR.search(whole))
 

@@ -2,8 +2,8 @@
 """Posing hair chains and their skin in the head's frame, for many poses at once.
 
 A joint's turn D is measured from its bind pose relative to its carrier, in canonical axes: G_j = G_parent D_j,
-with G = 1 for the head. In the joint's own bind axes B it is B^T D B, which is what an animation system
-multiplies to the joint's local bind rotation from the right.
+with G = 1 for the head. In the joint's own bind axes B it is B^T D B, by which an animation system
+multiplies the joint's local bind rotation from the right.
 """
 
 import numpy as np
@@ -12,12 +12,11 @@ from neuralocks_core.rig.chains import HairChains
 
 
 def half_turns(raw: np.ndarray, max_angle: float) -> np.ndarray:
-    """Quaternions (..., 4) wxyz of any finite vectors (..., 3): vector part raw * s / sqrt(1 + |raw|^2), s =
+    """Quaternions (..., 4) wxyz from any finite vectors (..., 3): vector part raw * s / sqrt(1 + |raw|^2), s =
     sin(max_angle / 2).
 
-    Smooth and without singularity, zero for zero, and bounded by `max_angle` [rad] whatever the input; needs
-    square roots only, so that it costs next to nothing in C. A rotation vector under a tanh would need a sine
-    and a tanh per joint.
+    Smooth and without singularity, zero for zero, and bounded by `max_angle` [rad] for any input; needs only square
+    roots, so it costs almost nothing in C. A rotation vector limited by a tanh would need a sine and a tanh per joint.
     """
     vector = raw * (np.sin(max_angle / 2) / np.sqrt(1 + np.sum(raw * raw, axis=-1, keepdims=True)))
     scalar = np.sqrt(np.maximum(1 - np.sum(vector * vector, axis=-1, keepdims=True), 0))
@@ -25,7 +24,7 @@ def half_turns(raw: np.ndarray, max_angle: float) -> np.ndarray:
 
 
 def pose_chains(chains: HairChains, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (B, N, 3, 3) in canonical axes -> rotations G (B, N, 3, 3) since bind and joint positions (B, N, 3) [m]."""
+    """Turns (B, N, 3, 3) in canonical axes -> rotations G (B, N, 3, 3) from the bind pose and joint positions (B, N, 3) [m]."""
     rotations = np.empty_like(turns)
     positions = np.empty(turns.shape[:2] + (3,), turns.dtype)
     for level in chains.levels():

@@ -15,12 +15,12 @@ from neuralocks_core.rotation import rotation_part
 NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 DRIVEN = 0.3
-"""Skin that a joint moves with more than this share of its weight tells how far its bone reaches."""
+"""Skin on which a joint has more than this weight determines how far its bone reaches."""
 UNEVEN = 1.01
-"""Joints that are scaled so many times more along one axis than along another are refused."""
+"""Joints scaled this many times more along one axis than along another are refused."""
 SHORT, SHORT_AFTER = 0.01, 0.2
-"""Skin that passes a last joint by less than this is no bone of its own: of a chain of one joint [m], of others in lengths of the
-bone before."""
+"""Skin that extends past a last joint by less than this is not a bone of its own: for a chain of one joint in [m], for others in
+lengths of the bone before."""
 
 
 class UnevenJoint(NeuralocksError):
@@ -33,11 +33,11 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     Args:
         character: whose skeleton they are in.
         tops: first joints of the subtrees, ascending.
-        meshes: the skinned meshes, which tell where free ends lie.
+        meshes: the skinned meshes, which tell where free ends are.
 
     Raises:
         NeuralocksError: no joint moves, a bone has no length, two hair joints share a name, a chain's first joint has the
-            name of another one below the head, or one is mirrored or unevenly scaled.
+            name of another joint below the head, or a joint is mirrored or unevenly scaled.
     """
     skeleton = character.skeleton
     places = character.canonical(skeleton.bind[:, :3, 3])
@@ -53,7 +53,7 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     double = next((n for n in names if names.count(n) > 1), None)
     if double:
         raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give each its own name")
-    # A model tells joints of one name apart by what they hang from, but for the first of a chain.
+    # A model tells joints with the same name apart by their parents, except for the first of a chain.
     below = [leaf(skeleton.names[j]) for j in np.flatnonzero(skeleton.below(character.head))]
     double = next((name for name, j in zip(names, joints) if j in tops and below.count(name) > 1), None)
     if double:
@@ -79,8 +79,8 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
 
 
 def placed_chains(chains: HairChains, character: Character) -> HairChains:
-    """A model's chains as they lie in the bind pose of a character, found by the names of their joints alone: the hair's mesh
-    may be hidden, of a lower level of detail, or in another file.
+    """A model's chains as they are in the bind pose of a character, found only by the names of their joints: the hair's mesh may be
+    hidden, of a lower level of detail, or in another file.
 
     Args:
         chains: the model's; their `bones` are kept.
@@ -98,7 +98,7 @@ def placed_chains(chains: HairChains, character: Character) -> HairChains:
 
 
 def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Canonical places (N, 3) [m] of joints (N,) in the bind pose, and their axes there as columns (N, 3, 3)."""
+    """Canonical positions (N, 3) [m] of joints (N,) in the bind pose, and their axes there as columns (N, 3, 3)."""
     bind = character.skeleton.bind[joints]
     _check_scale(character.skeleton, joints)
     axes = character.bind_to_canonical[:3, :3] @ rotation_part(bind, "hair joint in bind pose")
@@ -106,10 +106,10 @@ def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndar
 
 
 def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
-    """Last joints that hang at a joint's own place and drive skin, as the deforming ones of a control rig: they turn with it.
+    """Leaf joints at a joint's own position that drive skin, such as the deform joints of a control rig: they turn with it.
 
     Args:
-        skeleton: bind pose, in which places are compared [m].
+        skeleton: bind pose, in which positions are compared [m].
         joint: index in the skeleton.
         drives: which joints drive skin, (J,) bool.
     """
@@ -119,8 +119,8 @@ def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
 
 
 def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict, dict]:
-    """Joints that move -> their row among the hair joints, -> the free end of their bone (3,) [m], if they have one, and
-    -> the joints at the other ends of their bones.
+    """Three dicts of the joints that move: their row among the hair joints; the free end of their bone (3,) [m], if they have one;
+    and the joints at the other ends of their bones.
     """
     skeleton = character.skeleton
     drives = driving(skeleton, meshes)
@@ -145,7 +145,7 @@ def driving(skeleton: Skeleton, meshes: list[SkinnedMesh] | None) -> np.ndarray:
 
 
 def _bones(skeleton: Skeleton, rows: dict, free: dict, ends: dict, places: np.ndarray) -> tuple[list, list, np.ndarray]:
-    """Each bone's joint and the one at its end (-1: none that moves), as rows, and its vector (M, 3) [m]."""
+    """Each bone's joint and the moving one at its end (-1: none), as rows, and its vector (M, 3) [m]."""
     bone_joint, bone_end, bones = [], [], []
     for joint, row in rows.items():
         for end, place in [(rows.get(child, -1), places[child]) for child in ends[joint]] or [(-1, free[joint])]:
@@ -162,8 +162,8 @@ def _bones(skeleton: Skeleton, rows: dict, free: dict, ends: dict, places: np.nd
 
 
 def _carrying(skeleton: Skeleton, order: list[int], drives: np.ndarray) -> set[int]:
-    """Those of these joints that drive skin or have skin further down: end joints may have ends of their own, which
-    exporters add. All of them where none drives any, as in a rig that nobody has skinned yet.
+    """Those of these joints that drive skin or have skin further down: end joints may have end joints of their own, which
+    exporters add. All of them if none drives any, as in a rig that is not skinned yet.
     """
     carries = set()
     for joint in order:
@@ -180,8 +180,8 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
 
     Args:
         own: the joint, and those that ride on it.
-        is_top: a chain of this joint alone, which points where its skin does; others go on as the bone before.
-        places: of all joints in canonical space, (J, 3) [m].
+        is_top: a chain of this joint alone, which points where its skin does; others continue the bone before.
+        places: positions of all joints in canonical space, (J, 3) [m].
     """
     joint, parent = own[0], int(character.skeleton.parents[own[0]])
     mask = np.isin(np.arange(len(places)), own)
@@ -196,7 +196,7 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
         return None
     along = along / size
     length = float((reach @ along).max())
-    # Skin that hardly passes the joint belongs to the bone before it: the joint is that bone's end.
+    # Skin that extends little past the joint belongs to the bone before it: the joint is that bone's end.
     if length < (SHORT if is_top else SHORT_AFTER * size):
         return None
     return places[joint] + length * along

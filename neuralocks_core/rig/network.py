@@ -22,18 +22,18 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import half_turns
 
 DYNAMIC_BINS = (1,) * 6 + (2,) * 4 + (3,) * 4 + (4,) * 2 + (6,) * 2
-"""46 steps of 1/30 s: a second and a half, finest where it is newest."""
+"""46 steps of 1/30 s: a second and a half, finest for the newest ones."""
 POSE = 15
 """Numbers of the pose and of gravity's direction; the history follows."""
 LARGEST = 1e15
-"""Numbers whose squares single precision still holds."""
+"""Numbers up to this have squares that single precision can hold."""
 MAX_ANGLE = 2.4
-"""Largest turn of a joint [rad] of what is trained."""
+"""Largest turn of a joint [rad] in trained models."""
 _CHUNK = 1024
 
 
 def rig_spec(dynamic: bool = False) -> BoundarySpec:
-    """What the network reads of the body."""
+    """The network's inputs from the body."""
     bins = DYNAMIC_BINS if dynamic else ()
     return BoundarySpec(bins=bins, pose_joints=("neck", "upper_chest"), chest=False, taper=0.3)
 
@@ -52,7 +52,7 @@ class RigModel:
         chains: the joints that it moves.
         spec: what it reads of the body.
         layers: weights (out, in) and biases (out,) float32 in SI units; ReLU between them.
-        limits: largest magnitude that is read of each input, (F,).
+        limits: limit on the magnitude of each input, (F,).
         max_angle: largest turn of a joint [rad].
         training, report, credits: the model card.
     """
@@ -99,20 +99,20 @@ class RigModel:
         return bool(self.spec.bins)
 
     def evaluate(self, features: np.ndarray) -> np.ndarray:
-        """Turns of all hair joints, of one avatar (F,) or a batch (B, F).
+        """Turns of all hair joints for one avatar (F,) or a batch (B, F).
 
         Args:
-            features: as `RigSampler.features` or the exported header give them; anything is allowed.
+            features: as from `RigSampler.features` or the exported header; any values are allowed.
 
         Returns:
             unit quaternions (N, 4) or (B, N, 4) wxyz float32 in the joints' bind axes: local rotation = bind
-            local rotation * this.
+            local rotation * q.
 
         Raises:
-            NeuralocksError: the features are not as many as the model reads.
+            NeuralocksError: the number of features is not the model's.
         """
         features = np.asarray(features)
-        if features.dtype != np.float32:  # numbers that single precision has no room for are beyond the limits anyway
+        if features.dtype != np.float32:  # numbers too large for single precision are beyond the limits anyway
             features = np.clip(features, -LARGEST, LARGEST).astype(np.float32)
         if features.ndim not in (1, 2) or features.shape[-1] != self.inputs:
             raise NeuralocksError(f"features: shape {features.shape}; the model reads {self.inputs} numbers per avatar")
@@ -125,8 +125,8 @@ class RigModel:
 
     def _raw(self, rows: np.ndarray) -> np.ndarray:
         (weight, bias), *others = self.layers
-        # Over a hundred large terms: in single precision their order would show, and every library has its own.
-        value = np.fmin(np.fmax(rows, -self.limits), self.limits)  # NaN counts as the least, as in the header
+        # Over a hundred large terms: in single precision their order would matter, and it differs between libraries.
+        value = np.fmin(np.fmax(rows, -self.limits), self.limits)  # NaN becomes the lower limit, as in the header
         value = value.astype(float) @ weight.T.astype(float)
         value = (value + bias).astype(np.float32)
         for weight, bias in others:
@@ -136,7 +136,7 @@ class RigModel:
         return value
 
     def canonical_turns(self, features: np.ndarray) -> np.ndarray:
-        """Turns (B, N, 4) wxyz float64 in canonical axes of features (B, F)."""
+        """Turns (B, N, 4) wxyz float64 in canonical axes for features (B, F)."""
         raw = self._raw(np.atleast_2d(np.asarray(features, np.float32))).reshape(-1, len(self.chains), 3).astype(float)
         return half_turns(np.einsum("nij,bnj->bni", self.chains.axes, raw), self.max_angle)
 
@@ -160,10 +160,10 @@ class RigModel:
 
     @classmethod
     def load(cls, path=None) -> "RigModel":
-        """Read a model file; the shipped one where none is named.
+        """Read a model file; the shipped one if none is named.
 
         Raises:
-            NeuralocksError: it is missing, damaged, of a later format or no model of mesh hair.
+            NeuralocksError: it is missing, damaged, of a later format or not a model of mesh hair.
         """
         path = model_file.shipped("rig") if path is None else path
         meta = model_file.read(path, "rig").meta
@@ -185,13 +185,12 @@ class RigModel:
             raise
         except KeyError as error:
             raise NeuralocksError(f"its description lacks {error}; get an undamaged copy") from None
-        except (TypeError, ValueError, AttributeError, OverflowError):  # whose own words tell a user nothing
+        except (TypeError, ValueError, AttributeError, OverflowError):  # whose own messages mean nothing to a user
             raise NeuralocksError("its description is unreadable; get an undamaged copy") from None
 
 
 class RigSampler:
-    """What a rig model reads of one character in one clip, at any time: the same whatever the clip's rate and the
-    order of asking.
+    """What a rig model reads about one character in one clip, at any time: independent of the clip's rate and the order of calls.
 
     Args:
         spec: what is read.
@@ -214,7 +213,7 @@ def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray)
 
     Args:
         spec: what the network reads; its history stays zero.
-        relative: rotations of neck and upper chest relative to the head, since bind, canonical axes, (n, 2, 3, 3).
+        relative: rotations of neck and upper chest relative to the head, from the bind pose, canonical axes, (n, 2, 3, 3).
         gravity: its direction in the head's frame, (n, 3).
     """
     result = np.zeros((len(relative), len(feature_columns(spec))), np.float32)
@@ -224,7 +223,7 @@ def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray)
 
 
 def input_limits(spec: BoundarySpec) -> np.ndarray:
-    """Largest sensible magnitude of each input (F,): what a damaged caller sends beyond is cut off."""
+    """Largest sensible magnitude of each input (F,): larger values, as from a faulty caller, are clipped."""
     # The sampler lists the bins one after another, each with effective gravity [g], then angular velocity [rad/s].
     one = [BoundarySampler.GRAVITY_LIMIT] * 3 + [BoundarySampler.SPIN_LIMIT] * 3
     history = np.tile(one, len(spec.bins))

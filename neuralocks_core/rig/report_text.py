@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a rig model, as training leaves it in the model file, in words."""
+"""The report of a rig model, as training writes it to the model file, in words."""
 
 
 def report_lines(report: dict) -> list[str]:

@@ -13,15 +13,15 @@ from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 from neuralocks_core.skinned_body import Body
 
 ROOM = 0.2
-"""So far beyond where hair rests [m] it could come to touch a body: the neck bends."""
+"""Hair may touch a body this far beyond where it rests [m], since the neck bends."""
 
 
 @dataclass(frozen=True, eq=False)
 class HairRig:
-    """What training, report and pictures need of a rig.
+    """What training, report and pictures need from a rig.
 
     Attributes:
-        character: its body holds no hair; without one where none of it is in the hair's reach, as shoes are not.
+        character: its body holds no hair; it has none if nothing is in the hair's reach, as with only shoes.
         chains: the hair joints.
         points: vertices that the hair joints move, canonical bind pose, (V, 3) [m].
         weights: on the head and on each hair joint, (V, 1 + N).
@@ -35,7 +35,7 @@ class HairRig:
     triangles: np.ndarray
 
     def in_reach(self, body: Body) -> np.ndarray:
-        """Which triangles (F,) bool of the character's body the hair could come to touch."""
+        """Which triangles (F,) bool of the character's body the hair could touch."""
         hair = np.concatenate([self.points, self.chains.origins])
         away = np.linalg.norm(self.character.canonical(body.points), axis=1)
         return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
@@ -44,8 +44,8 @@ class HairRig:
 def assemble_rig(
     character: Character, meshes: list[SkinnedMesh], chains: HairChains | list[str] | None = None
 ) -> HairRig:
-    """Part a character's meshes, which `character.body` holds one after another, by its hair chains: those given, or found by
-    patterns or by themselves, see `find_chains`.
+    """Split a character's meshes, which `character.body` holds one after another, by its hair chains: the given ones, those that
+    match patterns, or those that `find_chains` finds by itself.
     """
     if not isinstance(chains, HairChains):
         chains = find_chains(character, meshes, chains)
@@ -83,15 +83,15 @@ def assemble_rig(
 
 
 def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:
-    """Which joints (J,) are hair, with what hangs from it."""
+    """Which joints (J,) are hair or below hair."""
     return np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
 
 
 def _parted(meshes: list[SkinnedMesh], skeleton: Skeleton, head: int, moving: np.ndarray):
     """Which triangles are body and which vertices are hair.
 
-    A mesh that moving joints drive and nothing outside the head's subtree does is hair as a whole, with the cap
-    that is tied to the head; in one that is both, triangles that a moving joint touches are hair.
+    A mesh that moving joints drive, and nothing outside the head's subtree, is hair as a whole, including the cap that is
+    tied to the head; in a mesh that is both, triangles that a moving joint touches are hair.
 
     Returns:
         for each mesh (triangles of the body (F', 3), mask of hair vertices that move (V,)).

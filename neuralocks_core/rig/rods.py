@@ -15,11 +15,11 @@ class RigMaterial:
 
     Attributes:
         bend: bend and twist stiffness over line density [m^4/s^2].
-        weight: times gravity.
+        weight: factor on gravity.
         collision: stiffness of the body [1/(m s^2)], cubic, linear beyond 2 cm.
         margin: distance kept from the body [m]; never more than the vertex has at rest.
         damping: of motion in the head's frame [1/s] (dynamic variant).
-        rest_support: hold the bind pose against its own weight: it is as the artist wants it.
+        rest_support: hold the bind pose against its own weight: the artist modelled it that way.
     """
 
     bend: float = 1e-2
@@ -36,7 +36,7 @@ class RodTree:
     Attributes:
         mass: of each bone's far end, share of the total, (M,).
         stiffness: of each joint [m^2/s^2], energy = stiffness * 2 |Im q|^2, (N,).
-        support: force fixed in the head's axes that holds the bind pose, at each bone's far end [m/s^2], (M, 3).
+        support: force that holds the bind pose, fixed in the head's axes, at each bone's far end [m/s^2], (M, 3).
     """
 
     def __init__(self, chains: HairChains, material: RigMaterial):
@@ -51,7 +51,7 @@ class RodTree:
         gravity = GRAVITY * material.weight
         self.support = np.zeros((bones, 3))
         pull = np.zeros((bones, 3))
-        # Tip to root: what tension along the bone cannot carry of the weight is held.
+        # Tip to root: support takes the part of the weight that tension along the bone cannot carry.
         for bone in np.argsort(-chains.bone_joint, kind="stable"):
             load = self.mass[bone] * gravity + sum((pull[b] for b in below[bone]), np.zeros(3))
             along = chains.bones[bone] / lengths[bone]

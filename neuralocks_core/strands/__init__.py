@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A groom as the network sees it: 24 vertices a strand, scalp frames, locks."""
+"""A groom as the network sees it: 24 vertices per strand, scalp frames, locks."""

@@ -15,7 +15,7 @@ head's height, and it is shorter than a hair is wide."""
 def resample(groom: Groom, vertices: int) -> tuple[np.ndarray, np.ndarray]:
     """Points that divide each strand into `vertices` - 1 pieces of equal arc length.
 
-    A strand that is already so divided keeps its own points, bit for bit.
+    A strand that is already divided like this keeps its own points, bit for bit.
 
     Args:
         groom: any vertex counts, zero and one included.
@@ -67,7 +67,7 @@ def count_pointlike(groom: Groom) -> int:
 
 
 def _keep_uniform(groom: Groom, own: np.ndarray, share: np.ndarray, valid: np.ndarray, sampled: np.ndarray) -> None:
-    """Put a strand's own points where they differ from the samples by rounding only."""
+    """Restore a strand's own points if the samples differ from them only by rounding."""
     vertices = sampled.shape[1]
     candidates = np.flatnonzero(valid & (groom.counts == vertices))
     index = groom.starts[candidates, None] + np.arange(vertices)

@@ -7,9 +7,9 @@ import numpy as np
 def bends(directions: np.ndarray) -> np.ndarray:
     """Bend vectors sin(angle / 2) n (..., E - 1, 3) between unit edges (..., E, 3).
 
-    n is what the second edge is turned about, by the smallest rotation. The axes start as the canonical ones at the root,
-    whose first edge is clamped, and turn from edge to edge by these rotations. So a strand that only turns as a whole
-    further down keeps its bends.
+    n is the axis of the smallest rotation from the first edge to the second. The axes start as the canonical ones at the root,
+    whose first edge is clamped, and turn from edge to edge by these rotations. So a part of a strand that only turns as a
+    whole keeps its bends.
     """
     edges = directions.reshape(-1, *directions.shape[-2:])
     count = edges.shape[1] - 1
@@ -17,7 +17,7 @@ def bends(directions: np.ndarray) -> np.ndarray:
     axes = np.broadcast_to(np.eye(3), (len(edges), 3, 3)).copy()
     for i in range(count):
         a, b = edges[:, i], edges[:, i + 1]
-        # An edge folded right back has no smallest rotation and gets a finite one.
+        # An edge folded straight back has no smallest rotation and gets a finite one.
         one_plus_cos = np.maximum(1.0 + (a * b).sum(-1, keepdims=True), 1e-6)
         bend = np.cross(a, b) / np.sqrt(2.0 * one_plus_cos)
         result[:, i] = np.einsum("sji,sj->si", axes, bend)

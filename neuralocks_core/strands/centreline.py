@@ -6,17 +6,17 @@ from __future__ import annotations
 import numpy as np
 
 SHARPEST = 0.9
-"""[rad] Largest turn from one network edge to the next. A rod that turns farther in one vertex is no rod any more: its
+"""[rad] Largest turn from one network edge to the next. A rod that turns farther at one vertex is no longer a rod: its
 bending cannot be told from aliasing of turns between the samples."""
 
 PASSES = 80
 
 
 def centre_lines(points: np.ndarray) -> np.ndarray:
-    """Strands smoothed just so far that no two edges meet at more than SHARPEST.
+    """Strands smoothed just enough that no two edges meet at more than SHARPEST.
 
-    Root and tip stay; strands without such a corner come back bit for bit. What is smoothed away, the turns of a tight
-    coil, is carried along by `Carrier`.
+    Root and tip stay; strands without such a corner are returned bit for bit. The detail that is smoothed away, such as the
+    turns of a tight coil, is carried along by `Carrier`.
 
     Args:
         points: (S, K, 3) [m].
@@ -33,7 +33,7 @@ def passes(points: np.ndarray) -> np.ndarray:
 
 
 def smoothed(values: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Values along strands (S, K, n), smoothed so many `times` (S,): displacements of a coil become those of its line."""
+    """Values along strands (S, K, n), smoothed `times` (S,) times: displacements of a coil become those of its line."""
     result = values.copy()
     for done in range(times.max(initial=0)):
         todo = np.flatnonzero(times > done)
@@ -55,7 +55,7 @@ def _centred(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _once(strands: np.ndarray) -> np.ndarray:
-    """Values along strands (S, K, n), changed in place: each halfway to the mean of those beside it, but for both ends."""
+    """Values along strands (S, K, n), changed in place: each moves halfway to the mean of its neighbours, except both ends."""
     strands[:, 1:-1] += 0.5 * (0.5 * (strands[:, :-2] + strands[:, 2:]) - strands[:, 1:-1])
     return strands
 

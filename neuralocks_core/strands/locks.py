@@ -1,29 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Locks: clusters of neighbouring roots, what their strands share, and neighbours of single vertices."""
+"""Locks: clusters of neighbouring roots, their mean codes, and neighbours of single vertices."""
 
 import numpy as np
 
 STRANDS_A_LOCK = 6
-"""Locks hold so many strands in the mean at least, or their mean codes say nothing."""
+"""Locks hold at least this many strands on average; otherwise their mean codes would mean nothing."""
 
 LOCK_SPACING = 0.012
-"""Distance between neighbouring locks [m] where there are strands enough. A length, not a number of strands,
-so that a groom of 120,000 strands has the same locks as the 3,000 of it that the network was trained on."""
+"""Distance between neighbouring locks [m] where there are enough strands. A length, not a number of strands,
+so that a groom of 120,000 strands has the same locks as the 3,000 of its strands that the network was trained on."""
 
 COARSER = 2**0.25
-"""Locks are farther apart by so much, and again, until they hold strands enough."""
+"""The spacing of locks grows repeatedly by this factor until they hold enough strands."""
 
 NEAREST, NEAR_RADIUS = 5, 0.01
-"""So many vertices at most adhere to each, within so many metres."""
+"""At most NEAREST vertices adhere to each one, within NEAR_RADIUS [m]."""
 
 MATES, MATE_RADIUS = 5, 0.02
-"""So many strands at most are tied to each, within so many metres."""
+"""At most MATES strands are tied to each one, within MATE_RADIUS [m]."""
 
 
 def lock_of_roots(roots: np.ndarray) -> np.ndarray:
-    """Strands of a lock have their roots by the same point of a lattice; the paper (section 3.3) leaves the clustering open.
-
-    Clusters that begin at random would all be others with one strand more, in another unit, or after an edit elsewhere.
+    """Strands belong to one lock if the same lattice point is nearest to their roots; the paper (section 3.3) leaves the clustering
+    open. Clusters with a random start would all change with one strand more, in another unit, or after an edit elsewhere.
 
     Args:
         roots: (S, 3) [m].
@@ -39,17 +38,17 @@ def lock_of_roots(roots: np.ndarray) -> np.ndarray:
             break
         spacing *= COARSER
     middle = np.stack([np.bincount(point, column) / size for column in roots.T], axis=1)
-    # The scalp only grazes some cells: their few strands go with the others around them.
+    # The scalp only grazes some cells: their few strands join those around them.
     lock = _tree(middle[3 * size * len(size) >= len(roots)]).query(roots)[1]
     return np.unique(lock, return_inverse=True)[1].astype(np.int32).ravel()
 
 
 def _lattice_points(places: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Which point of a face-centred cubic lattice (S,) is nearest to each place (S, 3) [m], and how many have each point."""
+    """Which point of a face-centred cubic lattice (S,) is nearest to each place (S, 3) [m], and how many places each point has."""
     exact = places * (np.sqrt(2) / spacing)
     whole = np.round(
         exact
-    )  # the lattice has those of even sum: the others move along the axis where they were rounded most
+    )  # the lattice has points of even sum: others move along the axis where they were rounded most
     odd = np.flatnonzero(whole.sum(axis=1) % 2)
     off = exact[odd] - whole[odd]
     axis = np.abs(off).argmax(axis=1)
@@ -69,7 +68,7 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
     Args:
         values: (S, D) of each strand.
         lock: (S,) int lock of each strand.
-        valid: (S,) bool, strands that count; a lock without any takes the mean over its placeholders.
+        valid: (S,) bool, strands that count; a lock without any uses the mean over its placeholders.
 
     Returns:
         (L, D) float32.
@@ -81,13 +80,13 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
 
 
 def neighbours(rest: np.ndarray) -> np.ndarray:
-    """The nearest vertices of other strands at rest, which adhesion keeps near.
+    """The nearest vertices of other strands at rest, which adhesion keeps close.
 
     Args:
         rest: (S, K, 3) [m].
 
     Returns:
-        (S, K, NEAREST) int32, index into the S K vertices, nearest first; -1 where there are fewer within NEAR_RADIUS.
+        (S, K, NEAREST) int32, index into the S K vertices, nearest first; -1 if there are fewer within NEAR_RADIUS.
     """
     strands, vertices = rest.shape[:2]
     points = np.asarray(rest, np.float64).reshape(-1, 3)
@@ -104,7 +103,7 @@ def neighbours(rest: np.ndarray) -> np.ndarray:
         first = np.argsort(~good, axis=1, kind="stable")[:, :NEAREST]
         pick = np.where(np.take_along_axis(good, first, 1), np.take_along_axis(index, first, 1), -1)
         found[todo, : pick.shape[1]] = pick
-        # Again, with more candidates, for those whose list ended before the radius did.
+        # Again, with more candidates, for those whose list ended before the radius was reached.
         short = (good.sum(axis=1) < NEAREST) & np.isfinite(distance[:, -1])
         if asked == len(points):
             break
@@ -113,21 +112,21 @@ def neighbours(rest: np.ndarray) -> np.ndarray:
 
 
 def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
-    """The strands of the same lock that lie nearest at rest, which clumping ties together.
+    """The strands of the same lock nearest at rest, which clumping ties together.
 
     Args:
         rest: (S, K, 3) [m].
         lock: (S,) int.
 
     Returns:
-        (S, MATES) int32, nearest first in the mean distance along the strands; -1 where there are fewer within MATE_RADIUS.
+        (S, MATES) int32, by ascending mean distance along the strands; -1 if there are fewer within MATE_RADIUS.
     """
     found = np.full((len(rest), MATES), -1, np.int32)
     order = np.argsort(lock, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(lock[order])) + 1):
         if len(members) < 2:
             continue
-        # Of a large lock only the strands with the nearest roots are looked at along their length.
+        # In a large lock, only the strands with the nearest roots are compared along their length.
         near = _tree(rest[members, 0]).query(rest[members, 0], min(len(members), 4 * MATES))[1]
         apart = np.linalg.norm(rest[members[near]] - rest[members][:, None], axis=-1).mean(axis=-1)
         apart[members[near] == members[:, None]] = np.inf
@@ -140,7 +139,7 @@ def lock_mates(rest: np.ndarray, lock: np.ndarray) -> np.ndarray:
 
 
 def tied_together(mates: np.ndarray) -> np.ndarray:
-    """Which strands (S,) int32 the ties of `mates` (S, M) join, directly or by others; numbered without gaps from 0."""
+    """Which strands (S,) int32 the ties of `mates` (S, M) join, directly or through others; numbered without gaps from 0."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -150,7 +149,7 @@ def tied_together(mates: np.ndarray) -> np.ndarray:
 
 
 def _tree(points: np.ndarray):
-    """Points by nearness. SciPy takes longer to import than all else that a network needs to run."""
+    """A search tree of points. SciPy is imported on use, since that takes longer than all other imports of running a network."""
     from scipy.spatial import cKDTree
 
     return cKDTree(points)

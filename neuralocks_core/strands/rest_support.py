@@ -11,7 +11,7 @@ def rest_force(direction: np.ndarray, mass: np.ndarray) -> np.ndarray:
 
     A groom is modelled with gravity already in it, so the paper's stress-free rest shape would droop a second
     time. Counting the tension from tip to root, `T_i = max(0, (T_{i+1} e_{i+1} + m g) . e_i)`, the support is
-    `T_i e_i - T_{i+1} e_{i+1} - m g`: nothing for hair that hangs straight, the whole weight for hair that
+    `T_i e_i - T_{i+1} e_{i+1} - m g`: zero for hair that hangs straight, the whole weight for hair that
     stands. Source: docs/architecture.md; the paper's choice is to have none.
 
     Args:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A groom as the network sees it: 24 vertices a strand, canonical space, scalp frames."""
+"""A groom as the network sees it: 24 vertices per strand, canonical space, scalp frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from neuralocks_core.character import Character
 
 CLAMPED = 2
-"""Of a strand's K vertices, so many at the root never move against the head."""
+"""Number of a strand's K vertices, at the root, that never move relative to the head."""
 
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""
@@ -28,13 +28,13 @@ __all__ = ["StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "
 
 @dataclass(frozen=True, eq=False)
 class StrandSet:
-    """What inference and training read of a groom; see `strands_on`."""
+    """A groom as inference and training read it; see `strands_on`."""
 
     rest: np.ndarray
-    """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; of curls finer than that,
+    """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; for curls finer than that,
     the line they wind around (`centreline`)."""
     valid: np.ndarray
-    """(S,) bool, false where the groom's strand has no two distinct points; all else there is a placeholder."""
+    """(S,) bool, false where the groom's strand has no two distinct points; its other values are placeholders."""
     uv: np.ndarray
     """(S, 2) float32 in [0, 1], direction of the root seen from the head's centre."""
     root_frame: np.ndarray
@@ -56,7 +56,7 @@ class StrandSet:
         return self.root_frame[:, 1]
 
     def subset(self, strands: np.ndarray) -> StrandSet:
-        """The same for the given strands only ((N,) indices or (S,) mask). Lock numbers stay as they are."""
+        """Only the given strands ((N,) indices or (S,) mask). Lock numbers stay as they are."""
         return StrandSet(
             rest=self.rest[strands],
             valid=self.valid[strands],
@@ -70,8 +70,8 @@ class StrandSet:
         )
 
     def whole_locks(self, count: int, seed: int = 0) -> np.ndarray:
-        """Indices of `count` valid strands at most, in whole locks but for the last, which are spread over the scalp by chance,
-        the same each time. With one seed, those of a smaller count are among those of a larger one.
+        """Indices of at most `count` valid strands, in whole locks except the last; the locks are chosen at random over the
+        scalp, always the same ones. With one seed, those of a smaller count are among those of a larger one.
         """
         usable = np.flatnonzero(self.valid)
         if len(usable) <= count:
@@ -83,12 +83,12 @@ class StrandSet:
         return np.sort(by_lock[:count])
 
     def carried(self, offset: np.ndarray) -> StrandSet:
-        """The same strands, each moved as a whole by `offset` (S, 1, 3) [m], canonical; what a network reads of them stays."""
+        """The same strands, each moved as a whole by `offset` (S, 1, 3) [m], canonical; a network's inputs do not change."""
         return replace(self, rest=self.rest + offset)
 
     @classmethod
     def joined(cls, sets: list[StrandSet]) -> StrandSet:
-        """Strand sets of one head, one after the other; each keeps its own locks."""
+        """Strand sets of one head, one after another; each keeps its own locks."""
         if len(sets) == 1:
             return sets[0]
         fields = ("rest", "valid", "uv", "root_frame", "length")
@@ -99,7 +99,7 @@ class StrandSet:
 
 
 def strands_on(character: Character, groom: Groom) -> StrandSet:
-    """The groom as the network sees it on a character's head: `strand_set` with where that lies.
+    """The groom as the network sees it on a character's head: `strand_set` with the position of that head.
 
     Args:
         character: whose head carries the hair.
@@ -115,7 +115,7 @@ def strand_set(
     head_centre: np.ndarray,
     facing: np.ndarray | None = None,
 ) -> StrandSet:
-    """The groom resampled to K vertices a strand, with what else the network reads of it.
+    """The groom resampled to K vertices per strand, with the other inputs of the network.
 
     Args:
         groom: in bind-world metres.
@@ -157,7 +157,7 @@ def scalp_local(strands: StrandSet) -> np.ndarray:
 def root_uv(roots: np.ndarray, head_centre: np.ndarray) -> np.ndarray:
     """(S, 2) float32 in [0, 1]: Lambert's equal-area azimuthal map of the root's direction, its pole at the crown.
 
-    It depends on no mesh's own chart, so one network serves any head. Singular only straight down, inside the neck.
+    It does not depend on a mesh's own UVs, so one network works for any head. Singular only straight down, inside the neck.
 
     Args:
         roots: (S, 3) [m] in canonical space.

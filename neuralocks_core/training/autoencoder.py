@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The strand autoencoder: a strand's rest shape in 32 numbers (paper section 3.2).
 
-The MLPs of the paper work beside linear maps that start as the principal components of all strands. 32 of these alone
+The MLPs of the paper work beside linear maps that start as the principal components of all strands. 32 components alone
 keep a strand within a millimetre, which the MLPs alone do not reach in minutes.
 """
 
@@ -32,17 +32,17 @@ def train_autoencoder(
     principal: bool = True,
     progress: Progress | None = None,
 ) -> StrandAutoencoder:
-    """Trains on all strands of all grooms and returns the autoencoder with frozen weights.
+    """Train on all strands of all grooms; returns the autoencoder with frozen weights.
 
-    Only the encoder goes on living; the decoder is there to show what a code is worth (`StrandAutoencoder.errors`).
+    Only the encoder is used later; the decoder shows how accurate a code is (`StrandAutoencoder.errors`).
 
     Args:
         shapes: (n, 24, 3) strands in scalp-local, root-relative coordinates, metres.
         seconds: wall-clock budget.
         steps: number of steps instead of a time budget; makes the result reproducible.
-        batch: strands a step.
+        batch: strands per step.
         rate: Adam's first step size; it falls to 1 % along a cosine.
-        seed: of the weights and the batches.
+        seed: random seed of weights and batches.
         principal: start from principal components; else the paper's MLPs alone.
         progress: called with done, total, message.
 
@@ -61,7 +61,7 @@ def train_autoencoder(
         model = StrandAutoencoder(principal=principal)
     model.set_normalisation(data)
     optimiser = torch.optim.Adam(model.parameters(), lr=rate)
-    # A millimetre on short hair is a larger part of its shape than on long hair.
+    # A millimetre is a larger part of the shape of short hair than of long hair.
     weight = 1.0 / (data[:, -3:].square().sum(1) + 0.05**2)
     weight = weight / weight.mean()
 
@@ -96,22 +96,20 @@ class StrandAutoencoder(nn.Module):
 
     @torch.no_grad()
     def set_normalisation(self, shapes: Tensor) -> None:
-        """Takes the mean of each coordinate, the spread of each vertex in all three, and the principal components from
-        (n, 72) shapes.
-        """
+        """Take mean of each coordinate, spread of each vertex in all three, and principal components from shapes (n, 72)."""
         self.mean.copy_(shapes.mean(0))
         spread = (shapes - self.mean).square().reshape(-1, K, 3).mean((0, 2)).sqrt()
-        # Vertices near the root hardly vary: dividing by nothing would make noise of them.
+        # Vertices near the root hardly vary: dividing by almost zero would amplify noise.
         spread = spread.clamp_min(max(float(spread.max()) * 0.1, 1e-4))
         self.scale.copy_((1.0 / spread).repeat_interleave(3))
         if self.into is None:
             return
         normal = ((shapes - self.mean) * self.scale).double()
-        _, directions = torch.linalg.eigh(normal.T @ normal / len(normal))  # in rising order
+        _, directions = torch.linalg.eigh(normal.T @ normal / len(normal))  # in ascending order
         kept = directions.flip(1)[:, : len(self.into.weight)].T.to(shapes.dtype)
         self.into.weight.copy_(kept)
         self.back.weight.copy_(kept.T)
-        for mlp in (self.encoder, self.decoder):  # which begin by adding nothing
+        for mlp in (self.encoder, self.decoder):  # which start by adding nothing
             mlp[-1].weight.zero_()
             mlp[-1].bias.zero_()
 

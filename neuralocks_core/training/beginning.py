@@ -30,7 +30,7 @@ class Beginning:
         path: the model file.
 
     Raises:
-        NeuralocksError: it is damaged, or no model for strands.
+        NeuralocksError: it is damaged, or not a model for strands.
     """
 
     def __init__(self, path: str | Path):
@@ -40,11 +40,11 @@ class Beginning:
 
     @property
     def credits(self) -> list[str]:
-        """Whose data it has learned from."""
+        """Whose data the model has learned from."""
         return list(self._meta["credits"])
 
     def card(self) -> dict:
-        """How the model was made, for the card of a training that begins with it."""
+        """How the model was made, for the card of a training that starts from it."""
         training = self._meta["training"]
         return {
             name: training[name]
@@ -53,17 +53,17 @@ class Beginning:
         }
 
     def check(self, spec: BoundarySpec, options, resume: bool) -> None:
-        """Refuse a training, begun or resumed, whose network is of another kind than the model's; see `differences`.
+        """Refuse a training, begun or resumed, whose network is of a different kind from the model's; see `differences`.
 
         Raises:
-            NeuralocksError: the model reads or answers something else.
+            NeuralocksError: the model has other inputs or outputs.
         """
         if other := self.differences(spec, options):
             remedy = "resume with the settings it began with" if resume else "begin with another model, or with nothing"
             raise NeuralocksError(f"{self.path}: differs from this training in {', '.join(other)}; {remedy}")
 
     def differences(self, spec: BoundarySpec, options) -> list[str]:
-        """In what the model's network is of another kind than a training's.
+        """How the kind of the model's network differs from a training's.
 
         Args:
             spec: what the training's network reads.
@@ -81,22 +81,22 @@ class Beginning:
         return [name for name, value in wanted.items() if has[name] != value]
 
     def coder(self) -> StrandAutoencoder:
-        """The strand encoder, frozen. Its decoder, which no model file has, is of no use."""
+        """The strand encoder, frozen. Its decoder has arbitrary weights, since model files have none."""
         layers = dict(self._graphs["encoder.onnx"].layers)
         flat = layers.pop("flat", None)
         coder = StrandAutoencoder(principal=flat is not None)
         with self._fits():
             for layer, (weight, bias) in zip(coder.encoder[::2], layers.values(), strict=True):
                 _fill(layer, weight, bias)
-            if flat is not None:  # whose bias, the mean's share, has no place of its own without a mean
+            if flat is not None:  # its bias, from the mean, has no place of its own without a mean
                 _fill(coder.into, flat[0])
                 coder.encoder[-1].bias += torch.from_numpy(flat[1])
         return coder.eval().requires_grad_(False)
 
     def fill(self, net: StrandNet) -> None:
-        """Make `net`, normalised already, give the model's answers, as if nothing had been in the part of the history that
-        only the model reads; what `net` alone reads or has changes no answer at first. What the normalisation left out, since it
-        did not vary, is read again: the model has learned from motion in which it did.
+        """Make `net`, already normalised, give the model's outputs, as if the part of the history that only the model reads were
+        empty; what only `net` reads or has changes no output at first. Inputs that the normalisation left out because they did not
+        vary are read again: the model has learned from motion in which they did.
         """
         frame, tail = self._graphs["frame.onnx"], self._graphs["tail.onnx"].constants
         layers = dict(frame.layers)
@@ -138,7 +138,7 @@ class Beginning:
         return _unfold(net.strand, *linear, net.strand_mean, net.strand_scale)
 
     def _before_smoothing(self) -> np.ndarray:
-        """(72, 72), from the right: undoes the smoothing that is folded into a model's last layer."""
+        """(72, 72), multiplied from the right: undoes the smoothing that is folded into a model's last layer."""
         along = np.linalg.inv(smoothing()) if self._meta["output"] == "direction" else np.eye(K)
         return np.kron(along.T, np.eye(3))
 
@@ -155,7 +155,7 @@ class Beginning:
 
 
 def kept_coder(work: Path) -> StrandAutoencoder:
-    """The encoder, frozen, of the training that has left this work folder behind."""
+    """The encoder, frozen, of the training that left this work folder."""
     saved, coder = work / CODES, StrandAutoencoder()
     if not saved.exists():
         return Beginning(work / BEGINNING).coder()
@@ -164,20 +164,20 @@ def kept_coder(work: Path) -> StrandAutoencoder:
 
 
 def _reads_all_of(spec: BoundarySpec, wanted: BoundarySpec) -> bool:
-    """Whether a network that reads `spec` reads what `wanted` tells, faded otherwise perhaps, and older history at most."""
+    """Whether a network with `spec` reads all that `wanted` has; it may fade differently and read older history."""
     newest = spec.bins[: len(wanted.bins)]
     return bool(newest) == bool(spec.bins) and replace(spec, bins=newest, taper=wanted.taper) == wanted
 
 
 def _fill(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray | None = None) -> None:
-    """From the (in, out) weight and the (out,) bias of a graph."""
+    """Fill a layer from the (in, out) weight and the (out,) bias of a graph."""
     layer.weight.copy_(_tensor(weight, layer.weight.T.shape).T)
     if bias is not None:
         layer.bias.copy_(_tensor(bias, layer.bias.shape))
 
 
 def _fill_deep(net: nn.Sequential, layers: dict, mean: Tensor, scale: Tensor) -> None:
-    """A deep map from the layers of a graph, the first of which reads what is not normalised."""
+    """Fill a deep map from the layers of a graph, the first of which reads inputs that are not normalised."""
     first, *others = zip(net[::2], layers.values(), strict=True)
     first[0].bias.copy_(_unfold(first[0], *first[1], mean, scale))
     for layer, (weight, bias) in others:
@@ -185,13 +185,13 @@ def _fill_deep(net: nn.Sequential, layers: dict, mean: Tensor, scale: Tensor) ->
 
 
 def _read_again(scale: Tensor, *layers: tuple[np.ndarray, np.ndarray]) -> None:
-    """Inputs that the layers of the model weigh, and that a normalisation left out."""
+    """Read inputs again that the model's layers weigh but a normalisation left out."""
     weighed = np.any([(weight != 0).any(axis=1) for weight, _ in layers], axis=0)
     scale[(scale == 0) & _tensor(weighed, scale.shape)] = 1.0
 
 
 def _unfold(layer: nn.Linear, weight: np.ndarray, bias: np.ndarray, mean: Tensor, scale: Tensor) -> Tensor:
-    """Give a layer that reads (x - mean) * scale the weight of one that reads x; returns the bias that makes both the same."""
+    """Give a layer that reads (x - mean) * scale the weight of one that reads x; returns the bias that makes both equal."""
     weight, bias = _tensor(weight, layer.weight.T.shape).double(), _tensor(bias, layer.weight.shape[:1]).double()
     layer.weight.copy_((weight / torch.where(scale > 0, scale, 1.0).double()[:, None]).T)
     return (bias + mean.double() @ weight).float()

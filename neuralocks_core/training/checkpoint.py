@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints that survive a kill: one .npz of plain arrays, replaced at once. No pickle."""
+"""Checkpoints that survive a kill: one .npz of plain arrays, replaced atomically. No pickle."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ KEPT = {
     "AdamW": {"step", "exp_avg", "exp_avg_sq"},
     "Muon": {"momentum_buffer"},
 }
-"""What each kind of optimiser keeps of a parameter: `step` is one number, all others are as many as the parameter has."""
+"""State of each kind of optimiser per parameter: `step` is one number, all others have the parameter's shape."""
 
 
 class _Unfit(ValueError):
-    """Why a checkpoint does not fit, in words for a user."""
+    """Why a checkpoint does not fit, in a user's words."""
 
 
 def save(
@@ -34,11 +34,11 @@ def save(
     Args:
         path: ends in `.npz`.
         meta: plain JSON values.
-        modules: by name; all their parameters and buffers are kept.
+        modules: by name; all their parameters and buffers are saved.
         optimisers: of the kinds in KEPT.
 
     Raises:
-        NeuralocksError: the file system refuses, or a number is not finite: what was there before stays.
+        NeuralocksError: the file system refuses, or a number is not finite; the old file stays.
     """
     try:
         arrays = {"meta": np.frombuffer(json.dumps(meta, allow_nan=False).encode(), np.uint8)}
@@ -67,8 +67,8 @@ def load(
 
     Args:
         path, modules, optimisers: as for `save`.
-        settings: must be what was saved as the JSON value of this name.
-        like: what else must be among the JSON values, of the same kinds; numbers not negative.
+        settings: must equal the saved JSON value of this name.
+        like: other required JSON values, as examples of their kinds; numbers must not be negative.
 
     Raises:
         NeuralocksError: it is damaged, or belongs to other settings.
@@ -93,7 +93,7 @@ def load(
         for place, optimiser in enumerate(optimisers):
             _fill(optimiser, {k: v for k, v in tensors.items() if k.startswith(f"optimiser/{place}/")})
     except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
-        # What numpy, json and torch say of damage is told to programmers.
+        # Errors of numpy, json and torch about damage are written for programmers.
         fact = error if isinstance(error, _Unfit) else "another network" if type(error) is RuntimeError else "damaged"
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
@@ -102,17 +102,17 @@ def load(
 
 
 def _alike(value, like) -> bool:
-    """Whether a JSON value is of the kind of another; a number not negative, and whole where that is."""
+    """Whether a JSON value is of the kind of another; a number must not be negative, and must be an integer if the other is."""
     if type(like) not in (int, float):
         return type(value) is type(like)
     return type(value) in {int, type(like)} and 0 <= value < float("inf")
 
 
 def _fill(optimiser: torch.optim.Optimizer, tensors: dict[str, torch.Tensor]) -> None:
-    """The state of an optimiser, which has none before its first step.
+    """Set the state of an optimiser, which has none before its first step.
 
     Raises:
-        ValueError: it is of other parameters, or of another optimiser.
+        ValueError: the state belongs to other parameters or another optimiser.
     """
     state: dict[int, dict] = {}
     for name, value in tensors.items():

@@ -11,21 +11,21 @@ import torch
 from neuralocks_core.errors import NeuralocksError
 
 Losses = Callable[[float], dict[str, torch.Tensor]]
-"""Share of the budget that is used (0..1) -> named, weighted losses of one batch; their sum is minimised."""
+"""Used share of the budget (0..1) -> named, weighted losses of one batch; their sum is minimised."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long and how fast.
+    """Budget and step sizes.
 
     Attributes:
-        minutes: wall-clock budget; `steps` wins where it is given.
+        minutes: wall-clock budget; `steps` takes precedence.
         steps: number of steps, which makes a run repeatable.
         rate: largest step size.
-        floor: share of it that is left at the end of the cosine.
+        floor: share of it at the end of the cosine.
         warm_up: steps in which the step size grows to `rate`.
         clip: largest norm of a step's gradient.
-        smoothing: steps over which the losses that are shown are averaged.
+        smoothing: steps over which displayed losses are averaged.
     """
 
     minutes: float = 10.0
@@ -60,20 +60,20 @@ def descend(
     done: float = 0.0,
     remedy: str = "",
 ) -> Iterator[Descended]:
-    """Minimise the sum of `losses` over what the optimisers hold; stop it by leaving the loop.
+    """Minimise the sum of `losses` over the parameters of the optimisers; leave the loop to stop.
 
     Args:
-        optimisers: each with parameters of its own; their step sizes are set anew before each step.
-        losses: called once a step; whatever else should happen now and then may happen in it.
+        optimisers: each with parameters of its own; their step sizes are set before each step.
+        losses: called once per step; it may also do other periodic work.
         schedule: budget and step sizes.
         step, done: where an earlier run with the same budget stopped.
-        remedy: what a user can do against losses that grow beyond numbers; a smaller `--set rate` if left out.
+        remedy: what a user can do if losses diverge; a smaller `--set rate` if left out.
 
     Yields:
         about once a second, and after the last step.
 
     Raises:
-        NeuralocksError: a loss or a weight is not finite when the next state is to be yielded.
+        NeuralocksError: a loss or a weight is not finite when the next state is due.
     """
     groups = [group for optimiser in optimisers for group in optimiser.param_groups]
     parameters = [p for group in groups for p in group["params"]]

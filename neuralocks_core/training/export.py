@@ -17,15 +17,15 @@ from neuralocks_core.training.networks import StrandNet, smoothing
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
     """The graphs that `model.write` stores, by file name.
 
-    Normalisation is folded into the weights, so all inputs are SI. What is computed once a frame or once a groom is stored in
-    float16 where a deep map is part of it, which keeps the file small (0.006 mm in the mean on the shipped shot); all is computed
-    in float32.
+    Normalisation is folded into the weights, so all inputs are SI. Parts that are computed once per frame or groom are stored in
+    float16 if they include a deep map, which keeps the file small (0.006 mm error on average on the shipped shot); all
+    computation is in float32.
 
     - `encoder.onnx`: `shape` (S, 72) scalp-local root-relative metres -> `code` (S, 32);
     - `strand.onnx`: `strand` (S, 142) -> `strand_part` (S, 256);
-    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256), and where the frame also changes the weights behind,
+    - `frame.onnx`: `frame` (1, F) -> `frame_part` (1, 256), and if the frame also changes the weights of the tail,
       `middle` (256, 256) and `out` (256, 72);
-    - `tail.onnx`: `strand_part` (S, 256), what `frame.onnx` gave, `anchor` (S, 72) offsets of the held bind pose,
+    - `tail.onnx`: `strand_part` (S, 256), the outputs of `frame.onnx`, `anchor` (S, 72) offsets of the held bind pose,
       `edges` (S, 72) rest edges of vertices 0 to 23, the first zero -> `offsets` (S, 72), `displacement` (S, 72).
     """
     into = None if autoencoder.into is None else _folded(autoencoder.into, autoencoder.mean, autoencoder.scale)
@@ -43,7 +43,7 @@ def _folded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(in, out) weight and (out,) bias of `layer((x - mean) * scale)`, summed in float64.
 
-    half: with the weight as float16 holds it, so that its rounding meets x - mean and not x.
+    half: use the weight rounded to float16, so that the rounding acts on x - mean and not on x.
     """
     weight = layer.weight.detach().double() * scale.double()
     if half:
@@ -58,7 +58,7 @@ def _weights(layer: nn.Linear | tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarr
 
 
 class _Graph(OnnxGraph):
-    """A graph of layers; weights behind a deep map of the frame are stored in float16."""
+    """A graph of layers; weights that follow a deep map of the frame are stored in float16."""
 
     def linear(self, value: str, layer, output: str | None = None, *, half: bool = False) -> str:
         """x W^T + b of a linear layer, or of its folded arrays; `half` stores W in float16."""
@@ -79,7 +79,7 @@ class _Graph(OnnxGraph):
         return value
 
     def half(self, name: str, array: np.ndarray) -> str:
-        """A constant that is stored in float16 and read as float32."""
+        """A constant stored in float16 and read as float32."""
         with np.errstate(over="ignore"):  # `constant` refuses infinity
             stored = self.constant(f"{name}.half", array.astype(np.float16))
         self.nodes.append(self.helper.make_node("Cast", [stored], [name], to=1))
@@ -148,7 +148,7 @@ def _frame_graph(net: StrandNet, output: str) -> bytes:
 
 
 def _tail_graph(net: StrandNet, output: str) -> bytes:
-    """Second layer, output layer, and `networks.deform` written in ONNX, so that all of it runs in the runtime's chunks."""
+    """Second layer, output layer, and `networks.deform` in ONNX, so that all of it runs in the runtime's chunks."""
     graph, hidden, width = _Graph("tail"), net.middle.in_features, net.out.out_features
     inputs = {"strand_part": ("S", hidden), "frame_part": (1, hidden), "anchor": ("S", width), "edges": ("S", width)}
     if net.motion == "modulated":
@@ -167,10 +167,10 @@ def _tail_graph(net: StrandNet, output: str) -> bytes:
 
 
 def _turned_edges(graph: _Graph, count: int) -> None:
-    """`change`, `edges` (S, 3 count) -> `displacement`: edges keep their length where they turn.
+    """`change`, `edges` (S, 3 count) -> `displacement`: edges turn and keep their length.
 
     Sums over x, y, z, their spreading, and the running sum along the strand are matrix products, so that all arrays stay
-    flat: runtimes do that three times as fast as sums over rows of three, and a scan.
+    flat: this is three times as fast in runtimes as sums over rows of three and a scan.
     """
     sums, eye = np.kron(np.eye(count), np.ones((3, 1))), np.eye(3)
     graph.constant("sums", sums.astype(np.float32))
@@ -192,7 +192,7 @@ def _turned_edges(graph: _Graph, count: int) -> None:
 
 
 def _read_out(output: str) -> np.ndarray:
-    """(3 K, 3 K) float32, from the right: what `networks.deform` does to offsets before it uses them."""
+    """(3 K, 3 K) float32, multiplied from the right: what `networks.deform` does to offsets first."""
     along = smoothing() if output == "direction" else np.eye(K)
     along[:CLAMPED] = 0
     return np.kron(along.T, np.eye(3)).astype(np.float32)

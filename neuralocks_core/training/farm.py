@@ -27,17 +27,17 @@ class RolloutFarm:
     """Processes that fill a folder with rollouts while training goes on; a context manager.
 
     Args:
-        scene: what to draw from.
+        scene: what to draw rollouts from.
         folder: where the files go, one per rollout, numbered.
-        count: how many to make.
-        processes: how many at a time.
+        count: number of rollouts to make.
+        processes: number of processes.
     """
 
     def __init__(self, scene: TrainingScene, folder: Path, count: int, processes: int = 1):
         self.folder, self.count = Path(folder), count
         self.folder.mkdir(parents=True, exist_ok=True)
         context = multiprocessing.get_context("spawn")
-        self._told, self._tell = context.Pipe(duplex=False)  # both kept: an end is closed with its last owner
+        self._told, self._tell = context.Pipe(duplex=False)  # both ends kept: an end closes with its last owner
         work = [(scene, self.folder, range(i, count, processes), self._tell) for i in range(processes)]
         self._processes = [context.Process(target=_work, args=each, daemon=True) for each in work]
 
@@ -46,7 +46,7 @@ class RolloutFarm:
             with _one_thread_each(), _without_interrupts():
                 for process in self._processes:
                     process.start()
-        except BaseException:  # one that cannot start leaves none of the others at work
+        except BaseException:  # if one cannot start, the others are stopped
             self.__exit__()
             raise
         return self
@@ -61,22 +61,22 @@ class RolloutFarm:
             leftover.unlink(missing_ok=True)
 
     def files(self, first: int | None = None) -> list[Path]:
-        """The rollouts that are there by now, in order: all, or those of the `first` so many numbers."""
+        """The rollouts that exist by now, in order: all, or those numbered below `first`."""
         if first is None:
             return sorted(self.folder.glob("*.npz"))
         return [path for path in (_path(self.folder, index) for index in range(first)) if path.exists()]
 
     @property
     def alive(self) -> bool:
-        """Whether any process still works."""
+        """Whether any process is still running."""
         return any(process.is_alive() for process in self._processes)
 
     def failed(self) -> bool:
-        """Whether a process ended by an error."""
+        """Whether a process ended with an error."""
         return any(process.exitcode not in (None, 0) for process in self._processes)
 
     def failure(self, then: str) -> NeuralocksError:
-        """Why it failed; `then` is what to do once that is mended."""
+        """Why it failed; `then` is what to do once the cause is fixed."""
         if self._told.poll():
             why = self._told.recv()
         elif any((process.exitcode or 0) < 0 for process in self._processes):
@@ -88,7 +88,7 @@ class RolloutFarm:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """What is started meanwhile computes in one thread: the trainer has the other cores."""
+    """Processes started in this block compute in one thread: the trainer has the other cores."""
     kept = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
     os.environ.update({name: "1" for name in kept})
     try:
@@ -100,19 +100,19 @@ def _one_thread_each() -> Iterator[None]:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Ctrl-C, which a terminal sends to all, comes at the end of this block; what is started in it never hears of it, and tells
-    no traceback.
+    """Ctrl-C, which a terminal sends to all processes, takes effect at the end of this block; processes started in it ignore it,
+    and print no traceback.
     """
     came = []
     try:
         before = signal.signal(signal.SIGINT, lambda *_: came.append(True))
-    except ValueError:  # not the main thread, which alone has a say in this
+    except ValueError:  # not the main thread, and only that may set signal handlers
         yield
         return
     held = None
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
-        resource_tracker.ensure_running()  # when the first process starts it, it lets signals through
-        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a handler is not inherited, this is
+        resource_tracker.ensure_running()  # if the first process starts it, it lets signals through
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # handlers are not inherited, the mask is
     try:
         yield
     finally:
@@ -124,7 +124,7 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def save(path: Path, rollout: Rollout) -> None:
-    """Write a rollout at once under its final name.
+    """Write a rollout atomically under its final name.
 
     Raises:
         NeuralocksError: the file system refuses.
@@ -133,15 +133,15 @@ def save(path: Path, rollout: Rollout) -> None:
 
 
 def load(path: Path, scene: TrainingScene | None = None) -> Rollout:
-    """Read what `save` wrote; of this scene, if one is given.
+    """Read what `save` wrote; it must belong to `scene`, if given.
 
     Raises:
-        NeuralocksError: it is damaged, as after a full disk or a power cut, or of something else.
+        NeuralocksError: it is damaged, as after a full disk or a power cut, or is not such a rollout.
     """
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
             values = {name: arrays[name] for name in arrays.files}
-        if "step" not in values:  # all are of the finest, and what that does not hold is cut off
+        if "step" not in values:  # all have the finest step, and larger displacements are clipped
             if np.abs(values["moved"]).max(initial=0) >= np.iinfo(np.int16).max:
                 raise ValueError("moved")
             values["step"] = FINEST
@@ -163,10 +163,10 @@ def load(path: Path, scene: TrainingScene | None = None) -> Rollout:
 
 
 def _check(rollout: Rollout, scene: TrainingScene | None) -> None:
-    """Refuse arrays that do not fit each other or the scene: training would break off in the middle of one.
+    """Refuse arrays that do not fit each other or the scene: training would fail halfway through.
 
     Raises:
-        ValueError: they do not.
+        ValueError: they do not fit.
     """
     frames, strands = len(rollout.vectors), len(rollout.strands)
     shapes = {
@@ -199,7 +199,7 @@ def _path(folder: Path, index: int) -> Path:
 
 
 def _work(scene: TrainingScene, folder: Path, indices: range, tell: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is only held back until now, on Windows not even that
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is only blocked until now, on Windows not even that
     parent = multiprocessing.parent_process()
     try:
         maker = RolloutMaker(scene)

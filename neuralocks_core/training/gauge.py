@@ -25,13 +25,13 @@ class Gauge:
     Attributes:
         position: error of a vertex in percent of strand length.
         rigid: the same for hair carried rigidly.
-        static: the same for the network's own answer for the pose held still.
+        static: the same for the network's own output for the pose held still.
         motion: error of the motion about its mean, rms over a strand relative to rigid (= 1), median over strands.
-        motion_static: the same for the held pose's answer.
+        motion_static: the same for the held pose's output.
         motion_ratio: length of the frame differences, relative to the solver's.
         droop: distance from rest, relative to the solver's.
         velocity: rms error of the frame differences, relative to their own rms.
-        penetration: share of vertices deeper than 1 mm under the body plane next to the solver's vertex, percent.
+        penetration: share of vertices deeper than 1 mm under the body plane nearest to the solver's vertex, percent.
     """
 
     position: float
@@ -70,7 +70,7 @@ def measure(
         bank: rollouts that it never saw.
         output: see `networks.deform`.
         history: where the history lies in the boundary vector.
-        anchored: its answer for the held bind pose is subtracted.
+        anchored: whether its output for the held bind pose is subtracted.
     """
     sums = {name: [] for name in ("position", "rigid", "static")}
     motion, motion_static, speeds, ways, wrong, deep = [], [], [], [], [], []

@@ -11,15 +11,15 @@ from neuralocks_core.rotation import unit
 from neuralocks_core.skinned_body import Body
 
 CELL = 0.012
-"""[m] Vertices within one such cell become one; on a head's curvature that moves the surface by 0.2 mm."""
+"""[m] Vertices within one cell of this size become one; at a head's curvature, this moves the surface by 0.2 mm."""
 FLAT = 0.5
-"""Cosine between a vertex's normal and its cell's mean normal; where one has less, all vertices of the cell stay."""
+"""Cosine between a vertex's normal and its cell's mean normal; if one is below this, all vertices of the cell stay."""
 
 
 def hair_body(character: Character, reach: float) -> Body | None:
     """The body from the top of the head down to `reach` [m] under the head joint, arms to the elbow.
 
-    Every vertex kept is one of the body's own, so its skinning weights and blend shapes stay true.
+    Every vertex kept is one of the body's own, so its skinning weights and blend shapes stay valid.
     """
     body = character.body
     if body is None:
@@ -30,7 +30,7 @@ def hair_body(character: Character, reach: float) -> Body | None:
     used = np.unique(faces)
     if not len(used):
         return None
-    # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs it hangs beside.
+    # Cells are split by the joint that moves a vertex most, or an arm would be welded to the ribs beside it.
     main = body.joint_indices[np.arange(len(points)), body.joint_weights.argmax(axis=1)]
     key = np.column_stack([np.floor(points[used] / CELL).astype(np.int64), main[used]])
     _, group = np.unique(key, axis=0, return_inverse=True)
@@ -47,9 +47,9 @@ def hair_body(character: Character, reach: float) -> Body | None:
 
 
 def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Groups (V,) int in which no vertices of opposite sides are together, from groups (V,) and normals (V, 3).
+    """Groups (V,) int that do not mix vertices of opposite sides, from groups (V,) and normals (V, 3).
 
-    An ear's two sides welded to one sheet have neither an inside nor an outside: hair 8 cm beside it is pulled in.
+    If an ear's two sides are welded into one sheet, it has no inside or outside: hair 8 cm away is pulled in.
     """
     mean = unit(np.stack([np.bincount(group, part) for part in normals.T], axis=1))
     flattest = np.full(len(mean), np.inf)

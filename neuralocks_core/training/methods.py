@@ -23,9 +23,9 @@ from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.selfsupervised import train_on_moments
 
 FIRST = 24
-"""Clips to wait for before the network starts: enough to normalise its inputs by."""
+"""Clips to wait for before training of the network starts: enough to normalise its inputs."""
 STEPS_EACH = 10
-"""Steps to each further clip of a run of so many steps: about as many as two cores take while one is made."""
+"""Steps per further clip, in a run with a given number of steps: about as many as two cores take while one clip is made."""
 
 
 def method_of(
@@ -35,13 +35,13 @@ def method_of(
     farm: RolloutFarm,
     report: Callable[..., None],
 ) -> RolloutMethod | MomentMethod:
-    """The method that the kind of options asks for; `codes` as for `RolloutBank`, else see `train.train_strands`."""
+    """The method that the kind of options asks for; `codes` as for `RolloutBank`; for the rest see `train.train_strands`."""
     kind = MomentMethod if isinstance(options, SelfSupervisedOptions) else RolloutMethod
     return kind(scene, codes, options, farm, report)
 
 
 class RolloutMethod:
-    """Regression on rollouts that a farm makes meanwhile; see `regression`."""
+    """Regression on rollouts that a farm makes at the same time; see `regression`."""
 
     name = "regression on rollouts of the reference solver"
 
@@ -54,7 +54,7 @@ class RolloutMethod:
         self.bank.add(self._at_step(0) if options.steps else farm.files())
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strand inputs (n, 142) and boundary vectors (m, F) as they come in training."""
+        """Strand inputs (n, 142) and boundary vectors (m, F) as they occur in training."""
         return samples(self.bank)
 
     def train(self, net: StrandNet, optimisers, **since) -> Iterator[Descended]:
@@ -62,11 +62,11 @@ class RolloutMethod:
         return regress(self.bank, net, self.options, optimisers, self.farm.files, at_step=self._at_step, **since)
 
     def _first(self, there: int, count: int) -> None:
-        """Waiting has a pace of its own, which is not that of the training after it."""
+        """Report waiting separately: its speed says nothing about the training after it."""
         self._report(there / count, f"first simulations: {there} of {count}", count)
 
     def _at_step(self, step: int) -> list[Path]:
-        """What a run of so many steps learns from at one of them, however fast the farm is; waits for it."""
+        """New rollouts for a step of a run with a given number of steps, however fast the farm is; waits for them."""
         count, farm = min(FIRST + step // STEPS_EACH, self.farm.count), self.farm
         if count == len(self.bank.rollouts):
             return []
@@ -76,11 +76,11 @@ class RolloutMethod:
         return farm.files(count)
 
     def material(self) -> str:
-        """What there is to learn from, in a word."""
+        """Short text about the training material."""
         return f"{len(self.bank.rollouts)} rollouts"
 
     def card(self) -> dict:
-        """For the model card."""
+        """Entries for the model card."""
         residual = float(np.median([r.residual for r in self.bank.rollouts]))
         return {"rollouts": len(self.bank.rollouts), "solver residual": residual}
 
@@ -104,7 +104,7 @@ class MomentMethod:
             self.pool.grow()
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strand inputs (n, 142) and boundary vectors (m, F) as they come in training."""
+        """Strand inputs (n, 142) and boundary vectors (m, F) as they occur in training."""
         frames = np.concatenate([m.vectors for m in self.pool.moments])
         if not self.options.random_materials:
             frames = frames.copy()
@@ -116,11 +116,11 @@ class MomentMethod:
         return train_on_moments(self.pool, self.inputs, net, self.options, optimisers, **since)
 
     def material(self) -> str:
-        """What there is to learn from, in a word."""
+        """Short text about the training material."""
         return f"{len(self.pool.moments)} moments"
 
     def card(self) -> dict:
-        """For the model card."""
+        """Entries for the model card."""
         return {"moments": len(self.pool.moments), "clips": len(self.pool.moments) // MOMENTS}
 
 
@@ -136,10 +136,10 @@ def samples(bank: RolloutBank) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wait(farm: RolloutFarm, count: int, say: Callable[[int, int], None], numbered: bool = False) -> None:
-    """Until a farm has made `count` rollouts, or if `numbered` the first `count`; `say` is told how many there are, and `count`.
+    """Wait until a farm has made `count` rollouts, or if `numbered` the first `count`; `say` gets their number, and `count`.
 
     Raises:
-        NeuralocksError: a process of it failed.
+        NeuralocksError: a process of the farm failed.
     """
     while True:
         alive = farm.alive  # before the count: a process may save its last and end between the two

@@ -15,13 +15,13 @@ from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.strands.strand_set import StrandSet, root_frames, root_uv
 
 POLAR = np.array([-1.0, 1.0, 1.0], np.float32)
-"""What the mirror, canonical x = 0, does to places, directions and accelerations (3,)."""
+"""Effect of the mirror, canonical x = 0, on positions, directions and accelerations (3,)."""
 AXIAL = -POLAR
-"""What it does to angular velocities (3,)."""
+"""Its effect on angular velocities (3,)."""
 
 
 def mirrored_strands(strands: StrandSet) -> StrandSet:
-    """The strands of the other side; order and locks stay."""
+    """The strands of the other side; order and locks are unchanged."""
     rest, centre = strands.rest * POLAR, strands.head_centre * POLAR
     normal = (strands.root_normal * POLAR).astype(np.float64)
     return replace(
@@ -34,14 +34,14 @@ def mirrored_strands(strands: StrandSet) -> StrandSet:
 
 
 def mirrored_vectors(spec: BoundarySpec, vectors: np.ndarray) -> np.ndarray:
-    """Boundary vectors (..., F) of the same motion in a mirror: what was left is right."""
+    """Boundary vectors (..., F) of the same motion in a mirror: left becomes right."""
     source, sign = _exchange(spec)
     return vectors[..., source] * sign
 
 
 @cache
 def _exchange(spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
-    """Which entry (F,) int each one is made of, and times what (F,)."""
+    """For each entry, the index (F,) int of the one it comes from, and its factor (F,)."""
     source, sign = np.arange(spec.size), np.ones(spec.size, np.float32)
     parts = spec.slices
     other = {"left": "right", "right": "left"}
@@ -50,7 +50,7 @@ def _exchange(spec: BoundarySpec) -> tuple[np.ndarray, np.ndarray]:
         twin = spec.pose_joints.index(f"{other[side]}_{rest}") if side in other else row
         own, its = (parts["pose"].start + 6 * i for i in (row, twin))
         source[own : own + 6] = np.arange(its, its + 6)
-        # The first two columns of a rotation R; the mirror M makes of it M R M.
+        # The first two columns of a rotation R; the mirror M turns it into M R M.
         sign[own : own + 6] = np.concatenate([-POLAR, POLAR])
     sign[parts["gravity"]] = POLAR
     linear = [POLAR] if spec.linear != "none" else []

@@ -35,11 +35,11 @@ def moment_losses(
     Args:
         net: the network.
         moments: B moments.
-        hair: the hair of each. Of small grooms it has fewer strands: moments are stacked with those of as many.
-        inputs: what the network reads of each groom's strands, one (S, 142) a groom.
+        hair: the hair of each. Small grooms have fewer strands: only moments with equally many are stacked.
+        inputs: the network's inputs from each groom's strands, one (S, 142) per groom.
         spec: of the boundary vectors.
         options: weights of the potentials, ranges of the materials, the device.
-        rng: draws the materials.
+        rng: source of random materials.
         dynamics: factor on inertia and damping; 0 is the quasi-static problem.
 
     Returns:
@@ -56,7 +56,7 @@ def moment_losses(
 
 
 def _stacked_losses(net, moments, hair, inputs, spec, options, rng, dynamics) -> dict[str, Tensor]:
-    """As `moment_losses`, of hair with the same number of strands each."""
+    """Like `moment_losses`, for hair with the same number of strands each."""
     device = options.device
     rods = _stacked(hair, device)
     materials = [_material(options, rng) for _ in moments]
@@ -101,7 +101,7 @@ def _stacked_losses(net, moments, hair, inputs, spec, options, rng, dynamics) ->
 
 
 def _around(x: Tensor, moments: list[Moment], hair: list[Hair], options: SelfSupervisedOptions) -> Surroundings:
-    """What acts at the moments; the nearest body element is that of the points themselves."""
+    """What acts at the moments, with the body element nearest to the current points."""
     device = x.device
     planes = distance = None
     if all(m.surface is not None for m in moments):
@@ -137,7 +137,7 @@ def _material(options: SelfSupervisedOptions, rng: np.random.Generator) -> Mater
 
 
 def _carried(transform: Tensor, points: Tensor) -> Tensor:
-    """Points (B, S, K, 3) by transforms (B, 4, 4)."""
+    """Points (B, S, K, 3) transformed by (B, 4, 4)."""
     return torch.einsum("bij,bskj->bski", transform[:, :3, :3], points) + transform[:, None, None, :3, 3]
 
 

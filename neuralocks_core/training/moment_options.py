@@ -15,27 +15,27 @@ class SelfSupervisedOptions:
     """How moments are learned.
 
     Attributes:
-        minutes: wall-clock budget; `steps` wins where it is given.
+        minutes: wall-clock budget; `steps` takes precedence.
         steps: number of steps, for reproducible runs.
-        poses: moments in a step; the paper has one.
-        strands: strands with each, in whole locks.
-        pool: moments kept.
+        poses: moments per step; the paper has one.
+        strands: strands per moment, in whole locks.
+        pool: moments kept in the pool.
         rate: Adam's first step size, falling along a cosine.
         output: "direction" or, as in the paper, "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
         strand_map: "linear" or "deep", see StrandNet.
         static: the quasi-static variant: no history, no inertia.
-        undetached: weight of a second inertia term whose past is not detached. The paper's detached term alone (0)
+        undetached: weight of a second inertia term whose past is not detached. With 0, the paper's detached term alone
             diverges for long, weakly damped hair; this one damps fast swings.
-        warmup: share of the budget that is trained without inertia; it then rises over another tenth.
+        warmup: share of the budget trained without inertia; it then rises over another tenth.
         form: how bending is measured; the paper's is `DIRECT`.
         supported: the groom carries its own weight in the bind pose, and the network's answer there is subtracted.
         random_materials: draw the four material constants for each moment; else the default ones.
-        damping: damping of the default material [1/s] where materials are not random; the paper has none.
-        paper_adhesion: to the nearest vertices, without rest distance.
-        style: stiffness of the hair style potential by groom [1/s^2]; the last holds for all that follow.
+        damping: damping of the default material [1/s] if materials are not random; the paper has none.
+        paper_adhesion: adhesion to the nearest vertices, without rest offset.
+        style: stiffness of the hair style potential per groom [1/s^2]; the last value holds for all further grooms.
         volume: stiffness of self-collision [m^2/s^2]; measured on a quarter of the poses, which is enough.
-        seed: of weights and batches.
+        seed: random seed of weights and batches.
         device: torch device.
     """
 
@@ -62,17 +62,17 @@ class SelfSupervisedOptions:
     device: str = "cpu"
 
     def optimisers(self, net: torch.nn.Module) -> list[torch.optim.Optimizer]:
-        """What trains `net`."""
+        """The optimisers for `net`."""
         return [torch.optim.Adam(net.parameters(), lr=self.rate)]
 
     @property
     def anchored(self) -> bool:
-        """Whether the network's answer for the bind pose is taken off."""
+        """Whether the network's output for the bind pose is subtracted."""
         return self.supported
 
     @classmethod
     def paper(cls, **changes) -> SelfSupervisedOptions:
-        """The paper's choices of network, inertia, bending, adhesion, damping and materials, `changes` on top;
+        """The paper's choices of network, inertia, bending, adhesion, damping and materials, with `changes` applied;
         `docs/deviations.md` lists what else differs.
         """
         settings = {

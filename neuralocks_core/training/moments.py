@@ -26,12 +26,12 @@ from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
 MOMENTS = 6
 """Moments taken from each random clip."""
 DEEPEST = 0.04
-"""[m] A nearest surface farther than this is no contact: the plane through it means nothing there."""
+"""[m] A surface farther than this is not in contact: its plane means nothing at that distance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """One frame to be penalised and the two before it.
+    """One frame that is penalised and the two before it.
 
     Attributes:
         hair: index of its locks in the pool.
@@ -59,9 +59,9 @@ class Hair:
         strands: (n,) indices into that groom.
         bind: the anchor's boundary vector (F,).
         rods: constants, float32 tensors.
-        margin: (n, 24) distance kept from the body, no more than at rest [m].
+        margin: (n, 24) distance kept from the body, at most the distance at rest [m].
         neighbours: (n, 24, N) int32 for adhesion.
-        rest_density: (n, 24) for self-collision; None where nothing asks for it.
+        rest_density: (n, 24) for self-collision; None if unused.
     """
 
     groom: int
@@ -74,13 +74,13 @@ class Hair:
 
 
 class MomentPool:
-    """A growing pool of moments, the same for the same scene.
+    """A growing pool of moments, always the same for the same scene.
 
     Args:
-        scene: what to draw from; `scene.strands` strands go with each moment.
+        scene: what to draw moments from; `scene.strands` strands go with each moment.
         supported: whether the rods carry their own weight at rest.
         nearest_vertices: adhesion to the five nearest vertices, as in the paper, not to the lock's nearest strands.
-        volume: whether self-collision counts, whose density at rest takes longest.
+        volume: whether self-collision is used; its rest density takes longest.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class MomentPool:
         self.hair.append(self._hair(draw, groom, rest, bind))
         rng = np.random.default_rng([self.scene.seed, 1, index])
         late = rng.integers(max(draw.first, 2), len(draw.times), size=MOMENTS)
-        # Heads between samples of the clip are taken as the boundary vectors take them, at the model's own steps.
+        # Head poses between samples of the clip are interpolated as for the boundary vectors, at the model's own steps.
         joints = draw.clip.at(draw.times[0] + dt * np.arange(len(draw.times)))
         head = character.canonical_to_world(joints)
         now = np.linalg.inv(head[late])
@@ -152,7 +152,7 @@ class MomentPool:
 
 
 def nearest_planes(surface: cKDTree, normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The body next to each point, as the plane of its nearest vertex.
+    """The body near each point, as the plane of its nearest vertex.
 
     Args:
         surface: tree over (V, 3) vertices.
@@ -160,15 +160,15 @@ def nearest_planes(surface: cKDTree, normals: np.ndarray, points: np.ndarray) ->
         points: (..., 3) in the same space.
 
     Returns:
-        planes (..., 4) float32, normal and offset; NO_PLANE where there is no contact to be had;
+        planes (..., 4) float32, normal and offset; NO_PLANE where contact is impossible;
         distance (...) float32 to the nearest vertex [m].
     """
     distance, index = surface.query(points)
     normal = normals[index]
     offset = (normal * surface.data[index]).sum(-1)
     height = (normal * points).sum(-1) - offset
-    # Under a point that is truly inside, the nearest vertex lies along its own normal. A plane that only reaches
-    # behind a far point, as the shoulder's does under the chin, is none.
+    # For a point that is really inside, the nearest vertex lies along its own normal. A plane that only reaches behind a
+    # distant point, as the shoulder's does under the chin, does not count.
     contact = (distance < DEEPEST) & ((height > 0) | (-height > 0.5 * distance) | (distance < 0.015))
     planes = np.concatenate([normal, offset[..., None]], axis=-1)
     planes[~contact] = NO_PLANE

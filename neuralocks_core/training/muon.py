@@ -9,7 +9,7 @@ import torch
 def muon(net: torch.nn.Module, rate: float, decay: float) -> list[torch.optim.Optimizer]:
     """Muon for the matrices of a network, AdamW for the rest.
 
-    Their steps are equally large, so that one rate does for both.
+    Their steps are equally large, so one rate suits both.
     """
     matrices = [p for p in net.parameters() if p.ndim == 2]
     rest = [p for p in net.parameters() if p.ndim != 2]
@@ -24,12 +24,12 @@ class Muon(torch.optim.Optimizer):
 
     Args:
         matrices: parameters of shape (rows, columns).
-        lr: root mean square of a step's numbers, over 0.2.
-        weight_decay: share of a weight that is taken off a step, over `lr`.
+        lr: root mean square of a step's entries, divided by 0.2.
+        weight_decay: share of a weight that is subtracted per step, divided by `lr`.
     """
 
     _MOMENTUM = 0.95
-    # So large are the numbers of AdamW's steps in practice, where its rate is 1.
+    # Size of the entries of AdamW's steps in practice, at rate 1.
     _RMS = 0.2
 
     def __init__(self, matrices: Iterable[torch.nn.Parameter], lr: float, weight_decay: float = 0.0) -> None:
@@ -37,7 +37,7 @@ class Muon(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> float | None:
-        """One step from the gradients that the parameters hold; `closure` computes them first where it is given."""
+        """One step from the gradients that the parameters hold; `closure`, if given, computes them first."""
         loss = None
         if closure is not None:
             with torch.enable_grad():

@@ -14,7 +14,7 @@ OUTPUTS = ("direction", "displacement")
 MOTIONS = ("linear", "encoder", "modulated")
 STRAND_MAPS = ("linear", "deep")
 LIMITED = (slice(2, 2 + 2 * CODE), slice(PLAIN_STRAND, STRAND))
-"""Where the strand's and its lock's code, and its rest points, lie among the strand inputs."""
+"""Positions of the strand's code, its lock's code and its rest points among the strand inputs."""
 DEEP = 192
 """Width of the deep map of the frame."""
 DEEP_STRAND = 128
@@ -22,14 +22,14 @@ DEEP_STRAND = 128
 RANKS = (64, 32)
 """Ranks of the matrices that a frame adds to the second layer's and to the output layer's."""
 HISTORY_SCALE = 0.25
-"""The many history entries are scaled down by it after normalisation, or they drown the pose."""
+"""Factor on the many history entries after normalisation; without it they would drown the pose."""
 
 
 def smoothing() -> np.ndarray:
     """(K, K) means of each vertex's offset and its neighbours' along the strand, a half and two quarters; clamped ones stay.
 
-    A network that is unsure answers the mean of what may be, which is shorter than any hair. Hair that keeps its length can
-    only be as short by zigzagging from edge to edge, which no such mean does.
+    An uncertain network outputs the mean of what is possible, which is shorter than any hair. Hair that keeps its length can
+    only be that short by zigzagging from edge to edge, which no such mean does.
     """
     matrix = np.eye(K)
     for i in range(CLAMPED, K):
@@ -43,20 +43,20 @@ _SMOOTHING = torch.from_numpy(smoothing()).float()
 
 
 class StrandNet(nn.Module):
-    """Maps what a strand is and what the body did to offsets of 24 vertices (paper section 3.3, figure 2).
+    """Maps a strand and the body's motion to offsets of 24 vertices (paper section 3.3, figure 2).
 
     The first layer is one linear map of the whole input, written as a sum of two: the strand part is constant for a
-    groom, the frame part for a frame, so a bake computes each once. What it reads of a strand is
-    `strand_session.strand_inputs`. Inputs are SI; normalisation lies in buffers and is folded into the weights at export.
+    groom, the frame part for a frame, so a bake computes each once. Its inputs from a strand are
+    `strand_session.strand_inputs`. Inputs are SI; normalisation is stored in buffers and folded into the weights at export.
 
     Args:
         frame_size: length of the boundary vector, `BoundarySpec.size`.
         motion: `"linear"`, as in the paper; `"encoder"`: a deeper map of the boundary vector is added to the linear
             one; `"modulated"`: that map also scales the units of both hidden layers and adds matrices of low rank to
-            the weights behind them. It runs once per frame, and so do these changes of the weights: nothing is added
+            the weights that follow them. The map and these changes are computed once per frame: nothing is added
             per strand.
-        strand_map: `"linear"`, as in the paper; `"deep"`: a deeper map of what a strand is is added to the linear one. It
-            runs once per groom: which way a strand points is no linear matter of its code, which lies in the scalp's axes.
+        strand_map: `"linear"`, as in the paper; `"deep"`: a deeper map of the strand inputs is added to the linear one. It runs
+            once per groom: a strand's direction is not linear in its code, which is in the scalp's axes.
     """
 
     def __init__(self, frame_size: int, *, motion: str = "linear", strand_map: str = "linear"):
@@ -67,7 +67,7 @@ class StrandNet(nn.Module):
         self.motion = motion
         self.strand = nn.Linear(STRAND, HIDDEN, bias=False)
         self.frame = nn.Linear(frame_size, HIDDEN)
-        # Both halves start as the slices of one Linear over the whole input would.
+        # Both halves start like slices of one Linear over the whole input.
         bound = (STRAND + frame_size) ** -0.5
         for parameter in (self.strand.weight, self.frame.weight, self.frame.bias):
             nn.init.uniform_(parameter, -bound, bound)
@@ -98,7 +98,7 @@ class StrandNet(nn.Module):
 
     @torch.no_grad()
     def set_normalisation(self, strands: Tensor, frames: Tensor, history: slice, *, static: bool = False) -> None:
-        """Takes mean and standard deviation of the inputs from training samples.
+        """Take mean and standard deviation of the inputs from training samples.
 
         Args:
             strands: (n, 142) sampled strand inputs.
@@ -109,12 +109,12 @@ class StrandNet(nn.Module):
         for name, samples in (("strand", strands), ("frame", frames)):
             samples = samples.to(torch.float64)
             mean, std = samples.mean(0), samples.std(0, unbiased=False)
-            # What never varied was never learned: reading it later could only add noise.
+            # An input that never varied was never learned: reading it later could only add noise.
             floor = 1e-5 * (1.0 + mean.abs())
             scale = torch.where(std > floor, 1.0 / std.clamp_min(1e-12), torch.zeros_like(std))
             if name == "strand":
-                # A code's last components tell hairs of one groom apart, as does how far a mohawk's lie beside each other;
-                # blown up to the size of the first, they would throw a groom that was not trained on far outside.
+                # A code's last components tell hairs of one groom apart, and so do small offsets between a mohawk's hairs;
+                # scaled up to the size of the first, they would put a groom that was not trained on far outside.
                 for part in LIMITED:
                     scale[part] = scale[part].clamp_max(50.0 / float(std[part].max().clamp_min(1e-9)))
             if name == "frame":
@@ -133,18 +133,18 @@ class StrandNet(nn.Module):
 
     def frame_part(self, frames: Tensor) -> Tensor:
         """First layer, body part and bias: (..., frame_size) -> (..., HIDDEN), or (..., 3 HIDDEN + sum(RANKS)) with the
-        factors of both hidden layers and of the matrices of low rank behind it.
+        factors of both hidden layers and of the low-rank matrices that follow them.
         """
         normal = (frames - self.frame_mean) * self.frame_scale
         part = self.frame(normal)
         if self.encoder is None:
             return part
         deep = self.encoder(normal)
-        # Factors have no linear part: they are one and what the deep map adds.
+        # Factors have no linear part: they are one plus the deep map's output.
         return deep + nn.functional.pad(part, (0, deep.shape[-1] - part.shape[-1]), value=1.0)
 
     def tail(self, strand_part: Tensor, frame_part: Tensor) -> Tensor:
-        """All that is left per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
+        """The work per strand and frame: broadcastable first-layer parts -> (..., S, outputs)."""
         hidden = strand_part.shape[-1]
         if self.motion != "modulated":
             return self.out(torch.relu(self.middle(torch.relu(strand_part + frame_part))))
@@ -155,14 +155,14 @@ class StrandNet(nn.Module):
 
 
 def _deep(inputs: int, width: int, layers: int, outputs: int) -> nn.Sequential:
-    """So many hidden layers with ReLU behind each, and a linear one."""
+    """This many hidden layers, each followed by ReLU, and a linear one."""
     sizes = [inputs, *[width] * layers]
     hidden = [part for pair in zip(sizes, sizes[1:]) for part in (nn.Linear(*pair), nn.ReLU())]
     return nn.Sequential(*hidden, nn.Linear(width, outputs))
 
 
 class LowRank(nn.Module):
-    """A matrix (outputs, inputs) of low rank whose terms a frame weighs: x -> back(weights * to(x))."""
+    """A low-rank matrix (outputs, inputs) whose terms a frame weights: x -> back(weights * to(x))."""
 
     def __init__(self, inputs: int, rank: int, outputs: int):
         super().__init__()
@@ -175,16 +175,16 @@ class LowRank(nn.Module):
 
 
 def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None, output: str = "direction") -> Tensor:
-    """Displacement of the vertices that the network's offsets stand for.
+    """Displacement of the vertices for the network's offsets.
 
     `"direction"`: edge i-1 -> i points along `normalise(e_rest + o_i)`, o smoothed along the strand, and keeps its length, so
-    stretch cannot happen and hair may turn far before any energy is in the way. `"displacement"` is the paper's choice, `x = x_rest + o`.
+    stretch cannot happen and hair may turn far without an energy barrier. `"displacement"` is the paper's choice, `x = x_rest + o`.
     The first CLAMPED vertices, 0 and 1, stay in both; zero offsets give exactly zero.
 
     Args:
         offsets: (..., S, 24, 3) network output.
         rest: (S, 24, 3), or broadcastable to the offsets; canonical space, metres.
-        anchored_offsets: the network's answer for the held bind pose, subtracted so that this pose gives the groom.
+        anchored_offsets: the network's output for the held bind pose, subtracted so that this pose gives the groom itself.
         output: `"direction"` or `"displacement"`.
 
     Returns:
@@ -204,7 +204,7 @@ def deform(offsets: Tensor, rest: Tensor, anchored_offsets: Tensor | None = None
     edges = rest[..., 1:, :] - rest[..., :-1, :]
     lengths = edges.square().sum(-1, keepdim=True).sqrt()
     turned = edges[..., 1:, :] + lengths[..., 1:, :] * offsets[..., CLAMPED:, :]
-    # The tiny number keeps edges of no length, and offsets that cancel an edge, finite in value and gradient.
+    # The tiny number keeps zero-length edges, and offsets that cancel an edge, finite in value and gradient.
     norm = turned.square().sum(-1, keepdim=True).clamp_min(1e-18).sqrt()
     change = turned * (lengths[..., 1:, :] / norm) - edges[..., 1:, :]
     moved = torch.cumsum(change, dim=-2)

@@ -12,25 +12,25 @@ from neuralocks_core.training.networks import MOTIONS, OUTPUTS, STRAND_MAPS
 
 CHOICES = {"output": OUTPUTS, "motion": MOTIONS, "strand_map": STRAND_MAPS, "optimiser": ("muon", "adamw")}
 SHARES = ("mirror", "warmup")
-"""Settings that are a share of something, 1 at most."""
+"""Settings that are a share, at most 1."""
 MOST = {"minutes": 100_000, "steps": 1_000_000_000, "rollouts": 1_000_000, "processes": 256}
-"""Beyond these it is a slip of the finger: a hundred thousand processes take a machine down."""
+"""Values above these are typing errors: a hundred thousand processes would take a machine down."""
 MOST_IN_A_STEP = {"clips": 10_000, "moments": 1000, "poses": 10_000, "strands": 100_000, "pool": 10_000_000}
-"""Beyond these no machine has memory enough."""
+"""Above these, no machine has enough memory."""
 
 BUDGET = ("minutes", "steps", "device")
-"""Options that change nothing of what is learned."""
+"""Options that do not change what is learned."""
 
 
 def check_options(options, rollouts: int = 1, processes: int = 1) -> None:
-    """Refuse amounts out of bounds, words that are unknown, weights below 0 and shares above 1.
+    """Refuse amounts out of bounds, unknown words, weights below 0 and shares above 1.
 
     Args:
         options: `RegressionOptions` or `SelfSupervisedOptions`.
         rollouts, processes: see `train.train_strands`.
 
     Raises:
-        NeuralocksError: names the option.
+        NeuralocksError: the message names the option.
     """
     _check_amounts({**vars(options), "rollouts": rollouts, "processes": processes})
     for name, default in ((field.name, field.default) for field in dataclasses.fields(options)):
@@ -38,17 +38,17 @@ def check_options(options, rollouts: int = 1, processes: int = 1) -> None:
 
 
 def changed(before: dict, now: dict) -> list[str]:
-    """What a resumed training learns in another way than before, one text for each option.
+    """Options that a resumed training would change, one text each.
 
     Args:
-        before, now: options by name, as plain values; those that were not noted before are not looked at.
+        before, now: options by name, as plain values; those that were not recorded before are ignored.
     """
     other = [name for name in now if name in before and name not in BUDGET and before[name] != now[name]]
     return [f"{name} {now[name]} after {before[name]}" for name in other]
 
 
 def _check_amounts(given: dict) -> None:
-    """Refuse those of MOST that are out of bounds; what is not given is not looked at."""
+    """Refuse those of MOST that are out of bounds; options that are not given are ignored."""
     for name, most in MOST.items():
         value = given.get(name)
         if isinstance(value, (int, float)) and not 0 < value <= most:
@@ -56,7 +56,7 @@ def _check_amounts(given: dict) -> None:
 
 
 def _check(name: str, value, default) -> None:
-    """One option of a method, whose default tells of what kind it is."""
+    """Check one option of a method, whose default tells its kind."""
     if name in CHOICES and value not in CHOICES[name]:
         raise NeuralocksError(f"--set {name}={value}: is unknown; give {'|'.join(CHOICES[name])}")
     if name == "seed" and not 0 <= value < 2**32:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training on rollouts of our own solver: positions, frame differences and the body they must stay out of.
+"""Training on rollouts of our own solver: positions, frame differences and collisions with the body.
 
 The paper's detached inertia term (its section 3.4.5) is an iteration that diverges for weakly damped hair; here each
-step is pulled to where the converged solver went instead. `selfsupervised.py` has the paper's way.
+step is pulled to the converged solver's result instead. `selfsupervised.py` has the paper's method.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from neuralocks_core.training.rollouts import Rollout, TrainingScene
 
 
 class RolloutBank:
-    """Rollouts in memory, with what the network reads of their strands.
+    """Rollouts in memory, with the network's inputs from their strands.
 
     Args:
         scene: the one that the rollouts were made from.
-        codes: gives latent codes (S, 32) of strands.
+        codes: function that gives the latent codes (S, 32) of strands.
     """
 
     def __init__(self, scene: TrainingScene, codes: Callable[[StrandSet], np.ndarray]):
@@ -45,7 +45,7 @@ class RolloutBank:
 
     @cached_property
     def _mirrored(self) -> list[np.ndarray]:
-        """As `inputs`, of the grooms seen in a mirror."""
+        """Like `inputs`, for the grooms seen in a mirror."""
         return [strand_inputs(groom, self._codes(groom)) for groom in map(mirrored_strands, self._scene.grooms)]
 
     def add(self, files: list[Path]) -> None:
@@ -57,8 +57,8 @@ class RolloutBank:
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Random strands of one material, which each lock has its own of: they share the frame's part of the first layer,
-        and how they part from each other can be compared.
+        """Random strands of one material (each lock has a material of its own): they share the frame's part of the first layer, and
+        how they part from each other can be compared.
         """
         same = rollout.materials == rollout.materials[rng.integers(len(rollout.strands))]
         strands = np.flatnonzero(same.all(axis=1))
@@ -103,15 +103,15 @@ def regress(
     step: int = 0,
     done: float = 0.0,
 ) -> Iterator[Descended]:
-    """Train `net` in place; yields what a caller may show, measure or save about every second.
+    """Train `net` in place; yields about every second, for a caller to display, measure or save.
 
     Args:
-        bank: holds rollouts already; grows by what `new_files` gives.
+        bank: already holds rollouts; grows by the files of `new_files`.
         net: normalised, on `options.device`.
         options: budget and settings.
-        optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
-        new_files: the rollouts on disk by now.
-        at_step: the rollouts for a step; asked in place of `new_files`, before each, where `options.steps` is given.
+        optimisers: `options.optimisers(net)`, or as restored from a checkpoint.
+        new_files: returns the rollouts on disk by now.
+        at_step: returns the new rollouts for a step; called before each step in place of `new_files` if `options.steps` is given.
         step, done: where an earlier run stopped.
     """
     net.train()
@@ -138,9 +138,9 @@ def predicted(net: StrandNet, bank: RolloutBank, rollout: Rollout, output: str, 
 
     Args:
         net: the network.
-        bank: where the rollout's strand inputs are.
-        rollout: whose strands, frames and materials.
-        output, anchored: see `networks.deform`; not anchored, the bind pose's own answer stays in.
+        bank: has the rollout's strand inputs.
+        rollout: gives strands, frames and materials.
+        output, anchored: see `networks.deform`; if not anchored, the bind pose's own output stays in.
     """
     chosen = rollout.strands
     device = next(net.parameters()).device

@@ -12,7 +12,7 @@ from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.regression_options import RegressionOptions
 
 STILL = 0.01
-"""Motion, in strand lengths, below which a strand counts as standing."""
+"""Motion, in strand lengths, below which a strand counts as standing still."""
 CREEP = 0.002
 """Motion from frame to frame, in strand lengths, below which a strand hardly moves."""
 TOGETHER = 0.003
@@ -20,18 +20,18 @@ TOGETHER = 0.003
 
 
 def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: RegressionOptions) -> dict[str, Tensor]:
-    """Weighted losses of a batch, each a mean in units of strand length, `swing`, `settling` and `parting` ratios.
+    """Weighted losses of a batch, each a mean in units of strand length; `swing`, `settling` and `parting` are ratios.
 
-    `position` |x - x*|, `velocity` the same of frame differences, `swing` how wrong a strand's motion is relative to
-    that motion, so that small motion counts as much as large, `settling` the same of one frame difference, so that hair
-    comes to rest when it should, `parting` how wrong it is which way the strands of a lock part, relative to how far
-    they do, `bending` how wrong the hair is bent from edge to edge, so that it does not crinkle, `collision` how far x lies
-    under the plane of the body next to x*, beyond where x* itself lies or MARGIN, whichever is nearer the body.
+    `position`: |x - x*|. `velocity`: the same for frame differences. `swing`: error of a strand's motion relative to that
+    motion, so that small motion counts as much as large. `settling`: the same for one frame difference, so that hair comes to
+    rest when it should. `parting`: error of how the strands of a lock part, relative to how far they part. `bending`: error of
+    the bend from edge to edge, so that hair does not crinkle. `collision`: how far x is under the body plane nearest to x*,
+    beyond MARGIN or the depth of x* itself, whichever is nearer to the body.
 
     Args:
         net: the network.
-        batch: what `RolloutBank.batch` gives.
-        options: weights, and what the network's output stands for.
+        batch: output of `RolloutBank.batch`.
+        options: weights, and the meaning of the network's output.
     """
     strands, moments = net.strand_part(batch["strands"]), net.frame_part(batch["frames"])
     offsets = net.tail(strands[:, None], moments[:, :, None])

@@ -17,11 +17,11 @@ class RegressionOptions:
     """How rollouts are learned.
 
     Attributes:
-        minutes: wall-clock budget; `steps` wins where it is given.
-        steps: number of steps; a run is then repeatable on one machine with one number of threads, whatever else it does.
-        clips: rollouts in a step.
-        moments: pairs of consecutive frames from each.
-        strands: strands from each.
+        minutes: wall-clock budget; `steps` takes precedence.
+        steps: number of steps; a run is then repeatable on one machine with the same number of threads, whatever its load.
+        clips: rollouts per step.
+        moments: pairs of consecutive frames from each rollout.
+        strands: strands from each rollout.
         rate: first step size, falling along a cosine.
         optimiser: "muon" for the weight matrices (AdamW for the rest), or "adamw" for all.
         position: weight of the position error, in strand lengths.
@@ -31,12 +31,12 @@ class RegressionOptions:
         parting: weight of the error about its mean over the strands of a lock, relative to how far these part.
         bending: weight of the error of the difference between successive edges, in edge lengths.
         collision: weight of the depth under the target's body plane, in strand lengths.
-        mirror: share of the rollouts of a step that are seen in a mirror.
+        mirror: share of the rollouts of a step that are mirrored.
         output: "direction" or "displacement".
         motion: "linear", "encoder" or "modulated", see StrandNet.
         strand_map: "linear" or "deep", see StrandNet.
         static: learn without history (the quasi-static variant, and the baseline of equal budget).
-        seed: of weights and batches.
+        seed: random seed of weights and batches.
         device: torch device.
     """
 
@@ -63,10 +63,10 @@ class RegressionOptions:
     device: str = "cpu"
 
     anchored: ClassVar[bool] = True
-    """The network's answer for the bind pose is taken off."""
+    """The network's output for the bind pose is subtracted."""
 
     def optimisers(self, net: nn.Module) -> list[torch.optim.Optimizer]:
-        """What trains `net`."""
+        """The optimisers for `net`."""
         if self.optimiser == "adamw":
             return [torch.optim.AdamW(net.parameters(), lr=self.rate, weight_decay=1e-4)]
         return muon(net, self.rate, 1e-4)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training material made on the fly: short simulations of a few locks of hair on a moving body.
 
-No outside data is needed: the motion is random, the solver is our own. Rollout number i depends only on the seed and on
+No outside data is needed: the motion is random, and the solver is our own. Rollout number i depends only on the seed and on
 i, so any process can make any rollout, and a run that was killed resumes where it stopped.
 """
 
@@ -23,15 +23,13 @@ from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
 FINEST = 2.0**-15
-"""[m] Displacements are kept as multiples of this, 0.03 mm, in two bytes; of longer hair, which they would not hold, of more."""
+"""[m] Displacements are multiples of this step, 0.03 mm, in two bytes; longer hair, which would not fit, has a larger step."""
 SHAPES = 0.6
-"""Weights of the body's blend shapes lie between minus and plus that."""
+"""Weights of the body's blend shapes are between minus and plus this."""
 FOLLOW = 0.04
 """[m] How far from the body hair still follows a change of its shape."""
 PREROLL = 30
-"""Frames at the head of a cut from motion capture that are simulated but not learned from: the hair was not
-at rest there.
-"""
+"""Frames at the start of a cut from motion capture that are simulated but not learned from: the hair was not at rest there."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +39,12 @@ class TrainingScene:
     Attributes:
         character: with its body.
         grooms: strands at rest; only valid ones are simulated.
-        clips: motion to cut from, beside the random one; may be empty.
-        spec: what the network reads.
-        seed: of everything random.
+        clips: motion to cut from, besides random motion; may be empty.
+        spec: the network's inputs.
+        seed: of all random choices.
         frames: length of a rollout, in steps of `spec.dt`.
         strands: strands of a rollout, in whole locks.
-        held_out: draw from the locks and the random numbers that training never sees.
+        held_out: draw from locks and random numbers that training never sees.
     """
 
     character: Character
@@ -66,12 +64,12 @@ class Rollout:
     Attributes:
         groom: index into the scene's grooms.
         strands: (n,) indices of its strands.
-        rest: their rest points on the body's shape (n, 24, 3) float32, canonical space.
+        rest: their rest points on the body with its shape (n, 24, 3) float32, canonical space.
         first: first frame to learn from.
         vectors: boundary vectors (T, F) float32.
         bind: the anchor's vector (F,) float32.
         moved: displacement in canonical space (T, n, 24, 3) int16, in units of `step`.
-        step: that unit [m].
+        step: this unit [m].
         planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest vertex.
         residual: of the solver, rms relative to weight.
         materials: log-ratios of each strand's material (n, 4) float32, the same within a lock; `vectors` and `bind`
@@ -98,7 +96,7 @@ class Draw:
     Attributes:
         groom: index into the scene's grooms.
         strands: (n,) indices of its strands.
-        materials: of each strand, the same within a lock: one motion shows many materials for the price of one.
+        materials: of each strand, the same within a lock: one motion covers many materials at the cost of one.
         shape: blend shape weights.
         clip: the motion.
         times: (T,) [s].
@@ -115,7 +113,7 @@ class Draw:
 
 
 class RolloutMaker:
-    """Makes the rollouts of a scene; what all share is computed once."""
+    """Makes the rollouts of a scene; what all of them share is computed once."""
 
     def __init__(self, scene: TrainingScene):
         self.scene = scene
@@ -178,7 +176,7 @@ class RolloutMaker:
         strands = self._locks(which, rng)
         locks, lock = np.unique(self.scene.grooms[which].lock[strands], return_inverse=True)
         by_lock = [Material.random(rng)]
-        # From a generator of their own, so that motion does not depend on the number of locks.
+        # Materials have their own random generator, so that motion does not depend on the number of locks.
         others = np.random.default_rng([self.scene.seed, self.scene.held_out, index, 1])
         by_lock += [Material.random(others) for _ in locks[1:]]
         by_lock[lock[0]], by_lock[0] = by_lock[0], by_lock[lock[0]]
@@ -192,7 +190,7 @@ class RolloutMaker:
         return sampler.vectors(draw.times, log), sampler.held_bind(log, draw.shape)
 
     def _locks(self, which: int, rng) -> np.ndarray:
-        """Indices of whole locks, cut to the scene's number of strands; of locks beyond 8 strands a neighbourhood."""
+        """Indices of whole locks, cut to the scene's number of strands; for locks of over 8 strands, a neighbourhood of each."""
         groom, usable = self.scene.grooms[which], self._usable[which]
         chosen: dict[int, None] = {}  # a set that keeps its order
         while len(chosen) < min(self.scene.strands, len(usable)):
@@ -222,9 +220,9 @@ class RolloutMaker:
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 
     def fitted(self, rest: np.ndarray, shape: np.ndarray) -> np.ndarray:
-        """Rest strands (n, 24, 3) on a body of another shape, as an artist would fit them.
+        """Rest strands (n, 24, 3) fitted to a body of another shape, as an artist would do it.
 
-        Roots follow the scalp; what lies on the body follows it, what hangs free follows its root.
+        Roots follow the scalp; hair on the body follows the body, free hair follows its root.
         """
         if self._surface is None or not shape.any():
             return rest
@@ -235,13 +233,13 @@ class RolloutMaker:
 
 
 def in_steps(moved: np.ndarray) -> tuple[np.ndarray, float]:
-    """Displacements [m] as int16, and the step [m] that they count: as fine as the largest of them allows."""
+    """Displacements [m] as int16, and their step [m], as fine as the largest of them allows."""
     step = max(FINEST, 2.0 ** np.ceil(np.log2(np.abs(moved).max(initial=FINEST) / 32767)))
     return np.round(moved / step).astype(np.int16), float(step)
 
 
 def learned_measures(character: Character) -> np.ndarray:
-    """The lowest and the highest `body_measures` (2, 10) [m] among a training's bodies, by the extremes of each blend shape and
+    """The lowest and the highest `body_measures` (2, 10) [m] of a training's bodies, from the extremes of each blend shape and
     some random draws.
     """
     count = 0 if character.body is None else len(character.body.shapes)
@@ -252,7 +250,7 @@ def learned_measures(character: Character) -> np.ndarray:
 
 
 def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
-    """Indices of the valid strands in every eighth lock (`held_out`), or in the others; all where there are too few
+    """Indices of the valid strands in every eighth lock (`held_out`), or in the others; all if there are too few
     locks.
     """
     kept_back = (groom.lock % 8 == 7) == held_out

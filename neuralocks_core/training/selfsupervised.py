@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's training: a network that minimises the physics of random moments, without any simulation.
 
-Three consecutive frames are predicted; the last is penalised, the two before give its inertia (paper section 3.4.5).
+Three consecutive frames are predicted; the last one is penalised, the two before it give its inertia (paper section 3.4.5).
 `SelfSupervisedOptions.paper` has the paper's choices of network, bending, adhesion and damping together; the defaults
-are what keeps the iteration stable and the hair moving. `docs/deviations.md` lists the other differences, and says why.
+keep the iteration stable and the hair moving. `docs/deviations.md` lists and explains the other differences.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from neuralocks_core.training.networks import StrandNet
 
 
 def paper_boundary() -> BoundarySpec:
-    """The paper's history: 30 steps of joint velocities and nothing of the head's own travel."""
+    """The paper's history: 30 steps of joint velocities without the head's linear motion."""
     return BoundarySpec(bins=(1,) * 30, linear="none", taper=0.0)
 
 
@@ -39,11 +39,11 @@ def train_on_moments(
     """Train `net` in place; the same protocol as `regression.regress`.
 
     Args:
-        pool: has moments already; grows to `options.pool` meanwhile.
-        inputs: what the network reads of each groom's strands, one (S, 142) a groom.
+        pool: already has moments; grows to `options.pool` during training.
+        inputs: the network's inputs from each groom's strands, one (S, 142) per groom.
         net: normalised, on `options.device`.
         options: budget and settings.
-        optimisers: `options.optimisers(net)`, or what a checkpoint made of them.
+        optimisers: `options.optimisers(net)`, or as restored from a checkpoint.
         step, done: where an earlier run stopped.
     """
     net.train()
@@ -51,7 +51,7 @@ def train_on_moments(
     taken = 0
 
     def losses(done: float) -> dict[str, torch.Tensor]:
-        # Moments are made one clip every few steps, so that training starts at once and is not held up long.
+        # Moments are made one clip every few steps, so that training starts at once and never waits long.
         nonlocal taken
         taken += 1
         if taken % 4 == 0 and len(pool.moments) < options.pool:

@@ -9,10 +9,10 @@ import torch
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """In this block, or in a function that it decorates, torch works in so many threads, and afterwards in as many as before.
+    """In this block, or in a function that it decorates, torch uses this many threads, and afterwards as many as before.
 
-    Threads that share small matrices wait for each other. Where other programs want the cores as well, that is nearly all
-    that they do: the tiny network of a rig then takes seven to twenty times as long in two threads as in one.
+    Threads that share small matrices wait for each other. If other programs also want the cores, they do little else: the
+    tiny network of a rig then takes seven to twenty times as long in two threads as in one.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(count)

@@ -46,9 +46,9 @@ from neuralocks_core.training.work import (
 HELD_OUT = 16
 """Rollouts that the gauge measures on."""
 SAVE_EVERY = 45.0
-"""[s] between checkpoints: a kill loses no more than that."""
+"""Time between checkpoints [s]: a kill loses at most this much."""
 THOUSANDTHS = 1000
-"""Parts of the budget in which progress is told."""
+"""Parts of the budget in which progress is reported."""
 
 
 def train_strands(
@@ -68,28 +68,28 @@ def train_strands(
 ) -> Path:
     """Train on rollouts of the solver, or on the physics of random moments, and write a model file.
 
-    The solver works in spawned processes, which import the calling script anew: a script calls this under
+    The solver works in spawned processes, which import the calling script again: a script must call this under
     `if __name__ == "__main__":`.
 
     Args:
         scene: character, grooms, motion.
         out: the model file to write, `*.neuralocks`.
-        options: budget and settings of the network's training; their kind chooses the way: RegressionOptions
+        options: budget and settings of the network's training; their type chooses the method: RegressionOptions
             for rollouts, SelfSupervisedOptions for the paper's.
         rollouts: how many to make while training goes on; about 2.4 MB of memory each.
-        processes: that make rollouts; the network's training uses what is left.
-        begin: a model whose network and strand codes are begun with, in place of random weights and codes of one's own.
-        resume: go on with what is in the folder `OUT.training` beside the model: simulations, strand codes, the
-            checkpoint if it came to one; with a larger budget than before, a finished run trains longer.
-        keep_work: leave that folder behind after success.
+        processes: processes that make rollouts; the network's training uses the remaining cores.
+        begin: a model whose network and strand codes training starts from, instead of random weights and new codes.
+        resume: continue from the folder `OUT.training` beside the model: simulations, strand codes, and the checkpoint if there
+            is one; with a larger budget than before, a finished run trains longer.
+        keep_work: keep this folder after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
-        tell: called with notes for the user on a resumed training.
-        progress: called with done, total and a message: of the first simulations, then thousandths of the budget with the
+        tell: called with notes for the user about a resumed training.
+        progress: called with done, total and a message: first for simulations, then in thousandths of the budget with the
             gauge.
 
     Raises:
-        NeuralocksError: an option out of bounds, nothing to train on, a model or a checkpoint that does not fit, or a
+        NeuralocksError: an option out of bounds, nothing to train on, a model or checkpoint that does not fit, or a
             failed solver process.
     """
     options = options or RegressionOptions()
@@ -126,7 +126,7 @@ def _trained(
     count = 0 if isinstance(options, SelfSupervisedOptions) else rollouts
     processes = processes if count else 0
     with (
-        threads(max(1, torch.get_num_threads() - processes)),  # a core is left to each process that makes rollouts
+        threads(max(1, torch.get_num_threads() - processes)),  # one core is left for each process that makes rollouts
         RolloutFarm(scene, work / "rollouts", count, processes) as farm,
         RolloutFarm(scene_out, work / "held_out", HELD_OUT) as held_farm,
     ):
@@ -151,15 +151,15 @@ def _trained(
 
 
 class _Run:
-    """A network while it learns: its optimisers, learning curve and checkpoint.
+    """A network during training: its optimisers, learning curve and checkpoint.
 
     Args:
         scene: what it learns on.
-        method: how.
-        held: held-out rollouts, which the gauge measures on as they come.
+        method: how it learns.
+        held: held-out rollouts, on which the gauge measures, as they become available.
         saved: the checkpoint's file.
-        beginning: the model whose weights come in place of random ones.
-        resume: begin with what that file holds.
+        beginning: the model whose weights replace random ones.
+        resume: begin from that file.
     """
 
     def __init__(
@@ -197,13 +197,13 @@ class _Run:
     def train(
         self, farm: RolloutFarm, held_farm: RolloutFarm, report: Callable[[float, str], None]
     ) -> dict[str, Gauge]:
-        """Until the budget is used; what the gauge says in the end, and what it says of the model that was begun with.
+        """Train until the budget is used; returns the final gauge, and that of the model that it started from.
 
         Raises:
             NeuralocksError: a process of the solver failed.
         """
         options, meta = self._options, self.meta
-        # Against this run's budget: a finished run goes on when it is given more time.
+        # Relative to this run's budget: a finished run continues if it gets more time.
         spent = meta["step"] / options.steps if options.steps else meta["seconds"] / (60 * options.minutes)
         began, last = time.monotonic() - meta["seconds"], time.monotonic()
         gauge = None
@@ -214,7 +214,7 @@ class _Run:
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
-                if state.done >= 1.0:  # short runs must not be judged by the few that there are
+                if state.done >= 1.0:  # short runs must not be judged by the few rollouts so far
                     self._wait(held_farm, report)
                 last, gauge = now, self._measured(held_farm)
                 self._save(state.step, now - began, gauge)
@@ -242,7 +242,7 @@ class _Run:
         wait(held_farm, HELD_OUT, lambda there, count: report(1.0, f"held-out simulations: {there} of {count}"))
 
     def _measured(self, held_farm: RolloutFarm) -> Gauge | None:
-        """The gauge on the held-out rollouts that there are by now, None before the first."""
+        """The gauge on the held-out rollouts so far, None before the first."""
         self.held.add(held_farm.files())
         return self._gauge(self.net) if self.held.rollouts else None
 
@@ -256,7 +256,7 @@ class _Run:
 
 
 class _Reporter:
-    """Thousandths of the budget, or a step of so many parts that comes before; silent where nobody listens."""
+    """Reports progress in thousandths of the budget, or in `parts` of an earlier step; silent if nobody listens."""
 
     def __init__(self, progress):
         self._progress = progress
@@ -267,7 +267,7 @@ class _Reporter:
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:
-    """For the card: measures of the body, strands of each groom, and where their codes come from, or how well they tell them."""
+    """For the card: measures of the body, strands of each groom, and the source of their codes, or the codes' error."""
     lowest, highest = learned_measures(scene.character).round(4).tolist()
     strands = {"measures": {"lowest": lowest, "highest": highest}}
     strands["strands"] = [int(groom.valid.sum()) for groom in scene.grooms]
@@ -278,7 +278,7 @@ def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginn
 
 
 def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
-    """The strand autoencoder: trained once, kept for a resumed run."""
+    """The strand autoencoder: trained once, and kept for a resumed run."""
     saved = work / CODES
     if saved.exists():
         return kept_coder(work)
@@ -292,10 +292,10 @@ def _coder(scene, work: Path, options, report) -> StrandAutoencoder:
 
 
 def _told(seconds: float, gauge) -> list[dict[str, float]]:
-    """A point of the learning curve, where there is something to measure on."""
+    """A point of the learning curve, if there is something to measure on."""
     return [] if gauge is None else [{"minutes": round(seconds / 60, 2), **gauge.to_json()}]
 
 
 def _plain(fields: list[tuple[str, object]]) -> dict:
-    """Options as JSON takes them."""
+    """Options as JSON values."""
     return {name: value.value if isinstance(value, Enum) else value for name, value in fields}

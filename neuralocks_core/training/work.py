@@ -19,22 +19,22 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write, cannot_write
 from neuralocks_core.lock_file import FolderLock
 
-if TYPE_CHECKING:  # what tidies up after a training needs no solver
+if TYPE_CHECKING:  # cleaning up after a training needs no solver
     from neuralocks_core.training.rollouts import TrainingScene
 
 BEGINNING = "begin.neuralocks"
-"""In the work folder: the model that a training begins with."""
+"""In the work folder: the model that a training starts from."""
 CODES = "codes.npz"
-"""In the work folder: the strand autoencoder, where a training makes its own."""
+"""In the work folder: the strand autoencoder, if a training makes its own."""
 INPUTS = "inputs.json"
-"""In the work folder: what its simulations were made of."""
+"""In the work folder: what its simulations were made from."""
 
 
 def work_folder(out: str | Path, resume: bool) -> Path:
-    """The folder of a training, checked before anything is read.
+    """The folder of a training, checked before anything is read from it.
 
     Raises:
-        NeuralocksError: `out` is no name for a model, or there is nothing to resume.
+        NeuralocksError: `out` is not a name for a model, or there is nothing to resume.
     """
     work = folder_beside(model.named(out))
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
@@ -43,21 +43,21 @@ def work_folder(out: str | Path, resume: bool) -> Path:
 
 
 def folder_beside(out: Path) -> Path:
-    """Where the training of this model works."""
+    """The folder in which this model's training works."""
     return out.with_name(out.name + ".training")
 
 
 def reserve(out: Path) -> bool:
-    """Make this folder for a training that begins soon, which is to write a new model: no other one chooses its name then. It
-    goes with `abandon`, or as the training ends. False where the name is taken.
+    """Create this folder for a training that will start soon and write a new model, so that no other training takes its name. It is
+    removed by `abandon`, or as the training ends. False if the name is taken.
 
     Raises:
-        NeuralocksError: it cannot be made.
+        NeuralocksError: the folder cannot be made.
     """
     work = folder_beside(out)
     try:
         work.mkdir()
-        if out.exists():  # looked for now: another training may just have ended
+        if out.exists():  # checked now: another training may just have ended
             work.rmdir()
             return False
     except FileExistsError:
@@ -68,8 +68,8 @@ def reserve(out: Path) -> bool:
 
 
 def abandon(out: str | Path) -> None:
-    """Remove what an ended training that nobody is to resume has left beside its model, which may be gigabytes; what another
-    training is at work in stays.
+    """Remove what an ended training that nobody will resume has left beside its model, which may be gigabytes; a folder in which
+    another training is running stays.
     """
     work = folder_beside(Path(out))
     with suppress(NeuralocksError, OSError):
@@ -79,10 +79,10 @@ def abandon(out: str | Path) -> None:
 
 
 def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | None:
-    """The model that a training begins with, or that a resumed one began with.
+    """The model that a training starts from, or that a resumed one started from.
 
     Raises:
-        NeuralocksError: the resumed one did not begin with `begin`, or what it had in place of a model is lost.
+        NeuralocksError: the resumed one did not start from `begin`, or its own codes in place of a model are lost.
     """
     if not resume:
         return Path(begin) if begin else None
@@ -90,23 +90,23 @@ def beginning_of(work: Path, begin: str | Path | None, resume: bool) -> Path | N
     if begin and not (kept and Path(begin).is_file() and filecmp.cmp(kept, begin, shallow=False)):
         raise NeuralocksError(f"{begin}: the training in {work} did not begin with it; resume without --begin")
     if kept is None and (work / "checkpoint.npz").exists() and not (work / CODES).exists():
-        # Its network would go on with codes of strands that mean something else to it.
+        # Its network would continue with strand codes that mean something else to it.
         raise NeuralocksError(f"{work}: lacks {CODES}, with which its network reads strands; train without --resume")
     return kept
 
 
 def keep_beginning(model_file: Path, work: Path) -> None:
-    """Copy the model that a training begins with, so that it can be resumed whatever happens to the file."""
+    """Copy the model that a training starts from, so that it can be resumed whatever happens to the file."""
     with atomic_write(work / BEGINNING) as part:
         shutil.copyfile(model_file, part)
 
 
 @contextmanager
 def claimed(work: Path) -> Iterator[None]:
-    """The folder for one training: two would learn from each other's simulations.
+    """Lock the folder for one training: two would learn from each other's simulations.
 
     Raises:
-        NeuralocksError: another training is at work in it, or it cannot be made.
+        NeuralocksError: another training is running in it, or it cannot be made.
     """
     lock = FolderLock(work, work, "another training is running there; wait for it, or choose another name")
     try:
@@ -116,10 +116,10 @@ def claimed(work: Path) -> Iterator[None]:
 
 
 def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
-    """Note what simulations are made of, and refuse to go on with those of another scene.
+    """Record what simulations are made from, and refuse to continue with those of another scene.
 
     Raises:
-        NeuralocksError: those in the folder were made of something else.
+        NeuralocksError: those in the folder were made from something else.
     """
     file, now = work / INPUTS, _inputs(scene)
     if resume and file.exists():
@@ -174,7 +174,7 @@ def _digest(arrays: list[np.ndarray]) -> str:
 
 
 def discard(work: Path) -> None:
-    """Remove what trainings leave in a folder; `claimed` removes the folder where nothing else is in it."""
+    """Remove what trainings leave in a folder; `claimed` removes the folder if nothing else is in it."""
     for name in ("rollouts", "held_out"):
         shutil.rmtree(work / name, ignore_errors=True)
     for name in ("checkpoint", "codes"):

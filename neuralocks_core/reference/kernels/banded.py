@@ -32,7 +32,7 @@ def add_row(
     next: wp.float64,
     w: wp.float64,
 ):
-    """Add w times the outer square of a row over (edge i, edge i+1, twist i, twist i+1) to the Hessian."""
+    """Add w times the outer product of a row with itself, over (edge i, edge i+1, twist i, twist i+1) to the Hessian."""
     zero = wp.float64(0.0)
     a = wp.vec4d(-before[0], -before[1], -before[2], zero)
     m = before - after
@@ -60,7 +60,7 @@ def take(v: wp.vec4d):
 
 @wp.func
 def inverse_factor(a: wp.mat44d):
-    """Inverse G of the Cholesky factor of a: G a G^T = 1. An inverse of `a` itself would lose all digits here."""
+    """Inverse G of the Cholesky factor of a: G a G^T = 1. An inverse of `a` itself would lose all precision here."""
     one = wp.float64(1.0)
     zero = wp.float64(0.0)
     tiny = wp.float64(1e-30)
@@ -87,7 +87,7 @@ def inverse_factor(a: wp.mat44d):
 
 @wp.func
 def factor_and_solve(scratch: Scratch, c: int):
-    """Block Cholesky of the banded system; the step ends in `step`.
+    """Block Cholesky of the banded system; the solution is left in `step`.
 
     diagonal becomes the inverse factor, lower1 and lower2 the factor's blocks.
     """

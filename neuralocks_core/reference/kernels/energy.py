@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy of one inextensible strand as warp functions: bending against its curls at rest, a pull, and the body."""
+"""The energy of one inextensible strand as warp functions: bending relative to its rest curl, a pull, and the body."""
 
 import warp as wp
 
@@ -8,7 +8,7 @@ from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
 FOLD = wp.constant(wp.float64(0.02))
 """1 + cos of the angle between two edges below which (168 degrees) the bend's direction fades out. The direction of an
-exact fold is undefined, and a strand that swings through one would meet a cliff in the energy."""
+exact fold is undefined, and a strand that swings through one would meet a discontinuity of the energy."""
 MARGIN_LINEAR = wp.constant(wp.float64(LINEAR))
 
 
@@ -24,9 +24,9 @@ class Rods:
 
 @wp.struct
 class Load:
-    """What acts on the strands in one step beside their own bending: springs and the body. Arrays are (K, S).
+    """What acts on the strands in one step besides their own bending: springs and the body. Arrays are (K, S).
 
-    turn is the head's; a spring of stiffness `pull` [1/s^2 times mass] draws each vertex to `target`; vertices nearer
+    turn is the head's rotation; a spring of stiffness `pull` [1/s^2 times mass] draws each vertex to `target`; vertices nearer
     than `margin` to the body's `plane`, (normal, offset) in the world, are pushed off with stiffness `collision`.
     """
 
@@ -48,7 +48,7 @@ def collision_energy(depth: wp.float64, stiffness: wp.float64):
 
 @wp.func
 def bend_scale(open: wp.float64):
-    """1 / sqrt(2 (1 + cos)), which makes the cross product of two edges sin(theta/2) long; straight on below FOLD."""
+    """1 / sqrt(2 (1 + cos)), which makes the cross product of two edges sin(theta/2) long; continued linearly below FOLD."""
     limit = wp.max(open, FOLD)
     scale = wp.float64(1.0) / wp.sqrt(wp.float64(2.0) * limit)
     return scale - scale * scale * scale * (open - limit)

@@ -2,12 +2,12 @@
 """Newton's method on one inextensible strand per thread: warp kernels for CPU and CUDA from one source.
 
 Unknowns are the vertices behind the clamp and, so that the band stays narrow, the twist of each edge's parallel
-transported frame: a change of an early edge turns all later frames (holonomy), which would make the Hessian dense.
+transported frame: a change of one edge turns all later frames (holonomy), which would make the Hessian dense.
 With the twist as a fourth unknown, tied to the edges by a stiff row, the system is block-banded: 4x4 blocks, two to
 each side, solved by a block Cholesky. Edges never change length: a step turns them.
 
 All arrays are (K, S), vertex first, so that GPU threads read neighbouring memory. Scratch has one column per thread on
-a GPU and a single one on a CPU, where threads run one after the other and the column stays in the cache.
+a GPU and a single one on a CPU, where threads run one after another and the column stays in the cache.
 """
 
 import warp as wp
@@ -24,9 +24,9 @@ from neuralocks_core.reference.kernels.banded import (
 from neuralocks_core.reference.kernels.energy import FOLD, MARGIN_LINEAR, Load, Rods, bend_scale, energy
 
 RATE = wp.constant(wp.float64(1.0))
-"""Most that a Newton step believes the bend vector to turn with an edge; 1/2 on a straight strand."""
+"""Largest rate at which a Newton step lets the bend vector turn with an edge; 1/2 on a straight strand."""
 STRETCH = wp.constant(wp.float64(1e6))
-"""Stiffness against stretch inside a Newton step [m^2/s^2]; what is left of it becomes the tension."""
+"""Stiffness against stretch inside a Newton step [m^2/s^2]; the remaining stretch becomes the tension."""
 TWIST_TIE = wp.constant(wp.float64(1e3))
 """Stiffness of the row that ties the frames' twist to the edges, in units of the bend stiffness."""
 
@@ -63,8 +63,8 @@ def begin_with_load(rods: Rods, load: Load, scratch: Scratch, c: int, s: int):
 
 @wp.func
 def add_bend(rods: Rods, scratch: Scratch, c: int, s: int):
-    """Bending, from the tip to the root; `moment` is the slope of the bends passed when all their frames twist together,
-    which is what turning an edge before them does (holonomy)."""
+    """Bending, from the tip to the root; `moment` is the slope of the bends passed so far when all their frames twist together,
+    as turning an edge before them does (holonomy)."""
     zero = wp.float64(0.0)
     one = wp.float64(1.0)
     two = wp.float64(2.0)
@@ -189,8 +189,8 @@ def newton(
 ):
     """Improve each strand by at most `iterations` Newton steps with a backtracking line search on the true energy.
 
-    residual: rms over the free vertices of the net force per mass [m/s^2], tension solved for; a strand stops where
-    it is below `tolerance`. again: the step's first solve was before; strands solved then and not woken are skipped.
+    residual: rms over the free vertices of the net force per mass [m/s^2], with tension solved for; a strand stops if it
+    is below `tolerance`. again: not the step's first solve; strands solved before and not woken are skipped.
     """
     s = wp.tid()
     if again == 1 and wake[s] == 0 and residual[s] < tolerance:
@@ -216,7 +216,7 @@ def newton(
             while search:
                 turn_edges(rods, scratch, c, s, size)
                 value = energy(rods, load, scratch.trial, scratch.frame, c, s)
-                # rounding decides below 1e-13: a converged strand still wants its tension, so equal counts as better
+                # rounding decides below 1e-13: a converged strand still needs its tension, so equal counts as better
                 if value <= best + wp.float64(1e-13) * wp.abs(best):
                     best = value
                     search = False
@@ -235,7 +235,7 @@ def newton(
                         d = d - take(scratch.step[k - 1, c])
                     tension[k, s] = tension[k, s] + size * STRETCH * wp.dot(d, e) / rods.length[k, s]
                 else:
-                    # tensions of another state may have misled the step
+                    # tensions from another state may have misled the step
                     tension[k, s] = wp.float64(0.0)
             if size > wp.float64(0.0):
                 for k in range(2, vertices):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a time step around the Newton solve: prediction, forces, neighbours, body contact. Arrays are (K, S)."""
+"""The parts of a time step besides the Newton solve: prediction, forces, neighbours, body contact. Arrays are (K, S)."""
 
 import warp as wp
 
@@ -25,7 +25,7 @@ def predict(
     before: array_vec,
     x: array_vec,
 ):
-    """Clamp to the posed groom; behind it, edges go on as they turned in the last step."""
+    """Clamp to the posed groom; past the clamp, edges keep turning as in the last step."""
     s = wp.tid()
     vertices = x.shape[0]
     x[0, s] = origin + wp.quat_rotate(turn, rest[0, s])
@@ -42,7 +42,7 @@ def predict(
 
 @wp.kernel(enable_backward=False)
 def carry_along(carry: wp.quatd, origin: wp.vec3d, last: array_vec, x: array_vec):
-    """Where the last state lies when the head takes it along: next to the body as it was, so on its right side."""
+    """The last state as the head carries it along: it stays next to the body as before, so on the correct side."""
     k, s = wp.tid()
     x[k, s] = wp.quat_rotate(carry, last[k, s]) + origin
 
@@ -68,10 +68,10 @@ def forces(
     target: array_vec,
     pull: array_real,
 ):
-    """Everything quadratic in one spring per vertex: pull/2 |x - target|^2.
+    """All quadratic terms in one spring per vertex: pull/2 |x - target|^2.
 
     carry takes a point fixed to the head from the last pose to this one: velocity is damped towards it. Neighbours are
-    read as they are now (Jacobi). While settling there is neither velocity nor damping.
+    read in their current state (Jacobi). While settling there is neither velocity nor damping.
     """
     k, s = wp.tid()
     if k > 1:
@@ -117,11 +117,11 @@ def body_planes(
     plane: wp.array2d(dtype=wp.vec4d),
     wake: wp.array(dtype=wp.int32),
 ):
-    """Nearest body element as a plane through its closest point; inside is negative.
+    """Nearest body element as a plane through its closest point; distances inside are negative.
 
-    drift: how far any point of the body has gone in the head's frame since the beginning, summed over steps. A vertex
+    drift: the farthest that any point of the body has moved in the head's frame since the beginning, summed over steps. A vertex
     that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`) has no plane;
-    one that hardly moved on a body that stands still (`moved` 0) keeps its plane; else its strand is woken. The element
+    one that hardly moved on a still body (`moved` 0) keeps its plane; else its strand is woken. The element
     found last, where it is now, bounds the search.
     """
     k, s = wp.tid()
@@ -155,7 +155,7 @@ def body_planes(
         away = (q - near) * hit.sign
         gap = wp.length(away)
         free = wp.float64(gap * hit.sign)
-        # on the surface itself the difference has no direction: take the face's
+        # on the surface itself the difference has no direction: use the face's normal
         n = wp.mesh_eval_face_normal(mesh, hit.face)
         if gap > 1.0e-4:
             n = away / gap
@@ -171,7 +171,7 @@ def body_planes(
 
 @wp.kernel(enable_backward=False)
 def rest_margin(x: array_vec, plane: wp.array2d(dtype=wp.vec4d), widest: wp.float64, margin: array_real):
-    """Hair that lies closer to the body at rest than the margin, or in it, is not pushed out of its rest shape."""
+    """Hair that rests closer to the body than the margin, or inside it, is not pushed out of its rest shape."""
     k, s = wp.tid()
     p = x[k, s]
     wall = plane[k, s]

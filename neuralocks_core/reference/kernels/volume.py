@@ -9,7 +9,7 @@ from neuralocks_core.materials import SMOOTHING
 from neuralocks_core.reference.kernels.banded import array_real, array_vec
 
 STRIDE = wp.constant(wp.float64(0.1 * SMOOTHING))
-"""[m] Most that this force alone moves a vertex between two looks at it."""
+"""[m] Farthest that this force alone may move a vertex between two updates of it."""
 H = wp.constant(wp.float64(SMOOTHING))
 PEAK = wp.constant(wp.float64(1.0 / (4.0 * math.pi * SMOOTHING**3)))
 REACH = wp.constant(wp.float32(2.0 * SMOOTHING))
@@ -18,7 +18,7 @@ LEAST = wp.constant(wp.float64(1e-12))
 
 @wp.func
 def slope(distance: wp.float64):
-    """dW/dr of the cubic spline whose value `weight` is [1/m^4]."""
+    """dW/dr [1/m^4] of the cubic spline `weight`."""
     s = distance / H
     near = wp.max(wp.float64(1.0) - s, wp.float64(0.0))
     far = wp.max(wp.float64(2.0) - s, wp.float64(0.0))
@@ -36,7 +36,7 @@ def weight(distance: wp.float64):
 
 @wp.kernel(enable_backward=False)
 def rounded(x: array_vec, points: wp.array2d(dtype=wp.vec3)):
-    """Single precision is what the grid of neighbours takes."""
+    """Points in single precision, which the neighbour grid requires."""
     k, s = wp.tid()
     p = x[k, s]
     points[k, s] = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
@@ -57,7 +57,7 @@ def densities(grid: wp.uint64, points: wp.array(dtype=wp.vec3), mass: array_real
 
 @wp.kernel(enable_backward=False)
 def pressures(rest_density: array_real, density: array_real):
-    """3 max(rho / rho_rest - 1, 0)^2 / rho_rest, in place of the density."""
+    """3 max(rho / rho_rest - 1, 0)^2 / rho_rest, written in place of the density."""
     k, s = wp.tid()
     own = wp.max(rest_density[k, s], LEAST)
     rise = wp.max(density[k, s] / own - wp.float64(1.0), wp.float64(0.0))
@@ -75,9 +75,9 @@ def push(
     target: array_vec,
     pull: array_real,
 ):
-    """The energy's negative gradient, as a shift of the spring `pull` to `target` that stands for all other forces.
+    """The energy's negative gradient, as a shift of the spring (`pull`, `target`) that represents all other forces.
 
-    pressure: of `pressures`; stiffness [m^2/s^2]; grid and points as in `densities`.
+    pressure: from `pressures`; stiffness [m^2/s^2]; grid and points as in `densities`.
     """
     k, s = wp.tid()
     if k < 2:

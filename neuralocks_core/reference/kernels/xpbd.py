@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Extended position based dynamics of one strand per thread, in the small-step form: float32, as games run it.
 
-Macklin, Mueller, Chentanez 2016 (XPBD) with the single iteration a substep of Macklin et al. 2019: Gauss-Seidel from
+Macklin, Mueller, Chentanez 2016 (XPBD) with a single iteration per substep as in Macklin et al. 2019: Gauss-Seidel from
 root to tip over distances (rigid), bends (compliance 1 / stiffness) and body planes. Arrays are (K, S).
 """
 
@@ -14,8 +14,8 @@ array_real = wp.array2d(dtype=wp.float32)
 
 NO_PLANE = wp.constant(wp.vec4(*materials.NO_PLANE))
 CAUTION = wp.constant(1.5)
-"""How much of a bend's correction is held back, as a factor on its vertices' inverse mass: with 1, a single pass whose
-corrections reach back to the root shakes short stiff curls at rest. It is lost in the compliance as substeps get short."""
+"""How much a bend's correction is reduced, as a factor on its vertices' inverse mass: with 1, a single pass whose
+corrections reach back to the root shakes short stiff curls at rest. It vanishes in the compliance as substeps get short."""
 
 
 @wp.func
@@ -32,9 +32,9 @@ def hold_length(x: array_vec, inverse_mass: array_real, length: float, k: int, s
 
 @wp.func
 def carry_frame(x: array_vec, twist: array_vec, q: wp.quat, along: wp.vec3, spin: float, i: int, s: int):
-    """Frame and direction of the edge that ends in vertex i, and in `twist` [1/m] how it turns as vertices move.
+    """Frame and direction of the edge that ends in vertex i; sets `twist` [1/m] to how the frame turns as vertices move.
 
-    q: frame of the edge before, made when that went `along`; spin: how far it has turned about the edge since.
+    q: frame of the edge before, built when that edge pointed `along`; spin: how far it has turned about the edge since.
     """
     d = x[i - 1, s] - x[i - 2, s]
     f = x[i, s] - x[i - 1, s]
@@ -68,8 +68,8 @@ def hold_bend(
 ):
     """Two constraints, u . (bend - rest) = 0 for the directions u across edge i; see `rod.add_bend`.
 
-    Returns how far the edge's frame has turned. The first u is where `rest` goes when the frame turns. What this asks
-    of vertices before i - 1, which this pass does not read again, waits in `waiting`; settled: their |twist|^2 / mass.
+    Returns how far the edge's frame has turned. The first u is where `rest` moves when the frame turns. Corrections for vertices
+    before i - 1, which this pass does not read again, wait in `waiting`; settled: their |twist|^2 / mass.
     """
     d = x[i, s] - x[i - 1, s]
     f = x[i + 1, s] - x[i, s]
@@ -140,10 +140,10 @@ def frame(
     twist: array_vec,
     waiting: array_real,
 ):
-    """All substeps of a frame. turns: the head's at each substep, the frame's start first.
+    """All substeps of a frame. turns: the head's rotation at each substep, the frame's start first.
 
-    x: from the head's place at that moment, along the world's axes, since float32 is too coarse far from the origin.
-    moves: how far that place went in each substep; the first is not read. plane: in the head's frame. push: rest support
+    x: relative to the head's position at that moment, in world axes, since float32 is too coarse far from the origin.
+    moves: how far that position moved in each substep; the first is not read. plane: in the head's frame. push: rest support
     per mass, head axes. stiffness: 4 B / l per interior vertex. twist, waiting: scratch of `carry_frame` and `hold_bend`.
     """
     s = wp.tid()
@@ -203,9 +203,9 @@ def look(
     x: array_vec,
     plane: wp.array2d(dtype=wp.vec4),
 ):
-    """Nearest body element of each vertex, taken along by a turn of the head; a plane in the head's frame.
+    """Nearest body element of each vertex, turned with the head; a plane in the head's frame.
 
-    Mesh and x: from the head's place.
+    Mesh and x: relative to the head's position.
     """
     k, s = wp.tid()
     q = wp.quat_rotate(carry, x[k, s])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The body around the head of a rig with mesh hair: posed, and how far from it points are."""
+"""The body around the head of a rig with mesh hair: its poses, and distances of points from it."""
 
 from dataclasses import replace
 
@@ -12,14 +12,14 @@ from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
 
 AROUND = 1000
-"""Body vertices that a simulation meets."""
+"""Number of body vertices that a simulation collides with."""
 
 
 class BodyPatch:
     """The part of the body around the head that hair can reach.
 
     Attributes:
-        body: that part, whose blend shapes leave the head as it is.
+        body: that part, with blend shapes that leave the head unchanged.
         kept: vertices whose planes are used.
         rim: which of these touch the cut, (kept,).
     """
@@ -52,11 +52,11 @@ def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
-    """Distance (V,) [m] that canonical points (V, 3) may come near the body: what they have in bind pose, exactly or by
-    the nearest body vertex's plane, whichever is less.
+    """Distance (V,) [m] that canonical points (V, 3) may come near the body: their distance in bind pose, exact or to the plane
+    of the nearest body vertex, whichever is less.
 
-    Poses are measured by such planes. Over the faces of a coarse body these are centimetres off, and hair would be thrown
-    from where the artist has put it.
+    In poses, distances are to such planes. Over the faces of a coarse body they are wrong by centimetres, and hair would be
+    thrown from where the artist put it.
     """
     exact, body = rest_distances(rig, points), rig.character.body
     if body is None or not len(points):

@@ -13,22 +13,22 @@ from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.poses import PosePool
 
 COLLIDING = 96
-"""Hair vertices that collide in one step, drawn anew: finding the nearest body is half of a step's time."""
+"""Hair vertices that collide in one step, drawn again in each: finding the nearest body is half of a step's time."""
 EVERY, RENEWED = 16, 8
-"""Every so many steps so many poses are replaced: with a fixed pool hair keeps clear of the bodies that it knows, and
-goes twice as deep into others."""
+"""Every EVERY steps, RENEWED poses are replaced: with a fixed pool, hair avoids the bodies that it knows, and goes twice as
+deep into others."""
 HARD = 256
-"""So many situations in which hair lay deepest are remembered. Among random ones alone they are met too seldom to be
-learned: of 1,000 held-out poses hair is then deeper than 5 mm in ten to twenty, and so in at most six."""
+"""This many situations in which hair was deepest are remembered. At random they are too rare to be learned: of 1,000 held-out
+poses, hair is then deeper than 5 mm in ten to twenty; with them, in at most six."""
 
 GENTLE, GROWING = 1e-3, 0.6
-"""Contact begins with this share of its weight, which grows evenly in its logarithm over this share of the budget. With all
-of it from the start the first steps throw hair off the body as far as it goes, and where it comes down again, in front of a
-shoulder or behind it, is luck: one seed in four never comes near the others' energy."""
+"""Contact begins with this share of its weight, which grows evenly in its logarithm over this share of the budget. With full
+weight from the start, the first steps throw hair far off the body, and whether it comes down in front of a shoulder or behind
+it is luck: one seed in four never comes near the others' energy."""
 
 
 def contact_weight(done: float) -> float:
-    """Share of contact's weight when a share `done` of the budget is used."""
+    """Share of the contact weight when a share `done` of the budget is used."""
     return GENTLE ** max(0.0, 1.0 - done / GROWING)
 
 
@@ -37,7 +37,7 @@ class Moments:
     """Moments of bodies in motion.
 
     Attributes:
-        features: what the network reads in each, (M, F) float32.
+        features: the network's inputs in each, (M, F) float32.
         skinning: posed @ inverse(bind) of every joint, (M, J, 4, 4).
     """
 
@@ -51,10 +51,10 @@ class HairOnBodies:
     Args:
         rig: chains, hair vertices and body.
         material: constants of the energy.
-        count: bodies to draw from.
-        rng: decides which.
-        spec: what the network reads.
-        moments: of motion, to draw the bodies from; held poses of random necks if left out.
+        count: number of bodies to draw from.
+        rng: decides which bodies.
+        spec: the network's inputs.
+        moments: moments of motion to draw the bodies from; held poses of random necks if left out.
     """
 
     def __init__(
@@ -69,16 +69,16 @@ class HairOnBodies:
         self.pool = PosePool(rig, count, rng, moving=None if moments is None else moments.skinning)
         self.energy = RigEnergy(rig, material)
         self._rng, self._spec, self._moments, self._taken = rng, spec, moments, 0
-        # Body, features, and collision energy when last met.
+        # Body, features, and collision energy at its last use.
         self._hard = (np.zeros(0, int), np.zeros((0, len(feature_columns(spec))), np.float32), np.zeros(0, np.float32))
 
     def parts(self, net: torch.nn.Module, batch: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Elastic energy (batch - batch // 2,) of a network's answers in random situations, and collision energy (batch,) in
-        these and, up to half of all, where hair lay deepest before: that says how to keep out of bodies, but is no sample.
+        """Elastic energy (batch - batch // 2,) of a network's outputs in random situations, and collision energy (batch,) in
+        these and, for up to half, in those where hair was deepest before: they teach it to avoid bodies, but are no fair sample.
 
         Args:
             net: features (B, F) -> turns (B, N, 4).
-            batch: how many situations.
+            batch: number of situations.
         """
         self._taken += 1
         if self._taken % EVERY == 0:

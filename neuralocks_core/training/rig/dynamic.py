@@ -28,29 +28,29 @@ from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.threads import threads
 
 _VELOCITY = 20.0
-"""Of squared errors of the motion from one sample to the next, against squared errors of places."""
+"""Weight of squared errors of the motion from one sample to the next, relative to squared errors of positions."""
 _BESIDE = 0.02
-"""How far beside a bone's end [m] a turn shows: of ends alone networks learn that locks may twist as they like."""
+"""Offset of points beside a bone's end [m], which show its turn: from ends alone, networks learn that twist does not matter."""
 _COLLISION, _HELD_COLLISION, _HELD_ELASTIC = 1.5e-4, 2e-4, 2e-3
-"""Of the skinned mesh's contact in motion and in held poses, and of gravity and bending in held poses [m^2/s^2], against
-squared errors [m^2]. Clips hold few of the poses that necks can take; energy needs no clip."""
+"""Weights of the skinned mesh's contact in motion and in held poses, and of gravity and bending in held poses [m^2/s^2], relative
+to squared errors [m^2]. Clips hold few of the poses that necks can take; energy needs no clip."""
 _DEEP = 3.0
-"""Contact in a held pose counts by its logarithm beyond this energy [m^2/s^2]: else the few poses in which a lock would lie
+"""Contact in a held pose counts by its logarithm beyond this energy [m^2/s^2]: otherwise the few poses in which a lock would be
 deepest outweigh all those in which it would hang, and it stands out from the head in all of them."""
 _RATE = 3e-3
 _POOL = 256
-"""Bodies held ready, as many in motion."""
+"""Number of bodies held ready, and as many in motion."""
 _HELD, _MOVING = 16, 8
-"""Bodies in held poses and in motion of which the contact is felt in a step."""
+"""Bodies in held poses and in motion whose contact counts in a step."""
 _CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
-"""About how long each takes [s], so that progress goes evenly."""
+"""Approximate time that each takes [s], for even progress."""
 _MOMENTS = 16
-"""Of each simulated motion, from which those in motion are drawn."""
+"""Moments of each simulated motion, from which the bodies in motion are drawn."""
 _WILD = 0.0
-"""Share of clips that spin or tumble: so small a network learns these at the cost of all other motion."""
+"""Share of clips that spin or tumble: such a small network learns them at the cost of all other motion."""
 _ROOM, _HELD_ROOM = 0.006, 0.012
-"""Kept from the body over the material's margin while learning, in motion and in held poses [m]: the network cannot hit the
-mark to the millimetre, and held poses and body shapes are farther apart than those in motion."""
+"""Kept from the body beyond the material's margin while learning, in motion and in held poses [m]: the network is not exact to the
+millimetre, and held poses and body shapes are farther apart than those in motion."""
 
 
 @threads(1)
@@ -74,12 +74,12 @@ def train_dynamic(
     Args:
         rig: chains and body.
         material: constants; `damping` counts here.
-        seconds: how long to regress, after the simulations; `steps`, if given, takes its place.
+        seconds: time for the regression, after the simulations; `steps`, if given, replaces it.
         hidden: width of both layers.
-        seed: decides clips and first weights.
-        clips: how many random motions are simulated.
+        seed: decides clips and initial weights.
+        clips: number of random motions to simulate.
         clip_seconds: length of each [s].
-        batch: pairs of consecutive samples a step.
+        batch: pairs of consecutive samples per step.
         report_poses: held-out poses of the report, which also compares with spring bones in motion; 0 leaves it out.
         keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
@@ -110,7 +110,7 @@ def train_dynamic(
             "motion": _VELOCITY * (now - before).square().sum(-1).mean(),
         }
         if held.pool.collides:
-            # Near the body a small error is a deep one, which squared errors do not tell.
+            # Near the body a small error may be a deep one, which squared errors do not show.
             elastic, collision = held.parts(net, _HELD)
             felt = contact_weight(done)
             bounded = _DEEP * torch.log1p(collision / _DEEP)
@@ -147,14 +147,14 @@ def train_dynamic(
 
 
 def _marks(energy: RigEnergy, turns: torch.Tensor) -> torch.Tensor:
-    """Bones' ends, and points BESIDE them in three directions less these, (B, M, 12) [m], of turns (B, N, 4)."""
+    """Bones' ends, and points _BESIDE them in three directions minus the ends, (B, M, 12) [m], of turns (B, N, 4)."""
     rotations, _, ends = energy.pose(turns)
     beside = _BESIDE * rotations[:, energy.bone_joint]
     return torch.cat([ends, beside.flatten(-2)], dim=-1)
 
 
 def _simulated(rig, material, spec, clips, seconds, rng, say) -> tuple[np.ndarray, np.ndarray, Moments]:
-    """Features (C, T, F) and turns (C, T, N, 4) of random motions, a few at a time so that progress can be told; and
+    """Features (C, T, F) and turns (C, T, N, 4) of random motions, a few at a time so that progress can be reported; and
     some moments of each.
     """
     parts, read, posed = [], [], []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Energy of hair joint chains as rods, with the collision of the skinned mesh (paper section 4.4), differentiable.
 
-Per unit of mass [m^2/s^2], zero at rest. Bones do not stretch, so what is left of the rod potentials is
+Per unit of mass [m^2/s^2], zero at rest. Bones do not stretch, so the remaining rod potentials are
 gravity, and bend-twist with the joints' own rotations as the material frame: Omega = 2 / l Im(q), q the turn of
 a joint from rest (paper eq. 3 with q^0 = 1).
 """
@@ -47,7 +47,7 @@ class RigEnergy(torch.nn.Module):
         keep("rest_ends", chains.origins[chains.bone_joint] + chains.bones)
         keep("points", rig.points[chosen])
         keep("weights", rig.weights[chosen])
-        # What rests on the skin, or in it, is not pushed.
+        # Vertices that rest on the skin, or in it, are not pushed.
         keep("margins", np.minimum(material.margin, rest_clearance(rig, rig.points[chosen])))
         self.bone_joint = torch.as_tensor(chains.bone_joint.astype(np.int64))
         self.levels = [torch.as_tensor(level) for level in chains.levels()]
@@ -55,7 +55,7 @@ class RigEnergy(torch.nn.Module):
         self.order = torch.argsort(torch.cat(self.levels))
 
     def draw(self, rng: np.random.Generator, count: int) -> torch.Tensor:
-        """Indices of at most `count` of the vertices that collide, without repetition."""
+        """Indices of at most `count` colliding vertices, without repetition."""
         return torch.as_tensor(rng.choice(len(self.chosen), min(count, len(self.chosen)), replace=False))
 
     def pose(self, quaternions: torch.Tensor):
@@ -94,13 +94,13 @@ class RigEnergy(torch.nn.Module):
         return torch.einsum("bvij,vj->bvi", blended[..., :3], points) + blended[..., 3]
 
     def parts(self, pool: PosePool, poses, quaternions, gravity, some=None) -> tuple[torch.Tensor, torch.Tensor]:
-        """Elastic and collision energy (B,) each, of turns (B, N, 4) in poses (B,) of the pool.
+        """Elastic and collision energy, (B,) each, for turns (B, N, 4) in poses (B,) of the pool.
 
         Args:
             pool: posed bodies; poses: which of them, (B,) int.
             quaternions: the turns, wxyz, canonical.
             gravity: its directions in the head's frame, (B, 3) numpy.
-            some: which hair vertices collide; all if left out. Their planes are those of the state itself.
+            some: which hair vertices collide; all if left out. Their planes come from the current state itself.
         """
         rotation, position, ends = self.pose(quaternions)
         elastic = self.elastic(quaternions, torch.as_tensor(gravity, dtype=ends.dtype) * G, ends)

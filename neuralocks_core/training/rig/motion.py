@@ -51,17 +51,17 @@ def motion_report(
     """Held-out scripted clips: models and spring bones against the simulation, and hair carried rigidly.
 
     Args:
-        rig: what the models were trained for.
+        rig: the rig that the models were trained for.
         material: constants of the simulation.
-        models: by the name that they have in the report.
-        kinds: which clips.
+        models: by their names in the report.
+        kinds: kinds of clips.
         progress: called with (done, total, message).
 
     Returns:
         `motion_error`: rms error of `report.hair_points`, relative to hair carried rigidly (= 1);
         `motion_error_by_kind`: the same for each kind of motion;
         `motion_ratio`: mean speed in the head's frame over the simulation's;
-        `motion_depth`: what lies in the body at every eighth sample, as `report.depths`; of the simulation too. The
+        `motion_depth`: hair inside the body at every eighth sample, as in `report.depths`, also for the simulation. The
         spring bones have no colliders;
         `rates`: rms difference at shared times of 24 and 30 fps from 60 fps sampling of the same motion [mm];
         `teleport`: see `_teleports`; `cost`: see `_network_cost`.
@@ -94,7 +94,7 @@ def motion_report(
 
 
 def _errors(rig: HairRig, candidates: dict[str, np.ndarray], true: np.ndarray, kinds) -> dict[str, dict]:
-    """Errors and motion ratios of turns (C, T, N, 4) by name, one clip a kind, against true hair points (C, T, P, 3) [m]."""
+    """Errors and motion ratios of turns (C, T, N, 4) by name, one clip per kind, relative to true hair points (C, T, P, 3) [m]."""
     rest = hair_points(rig, no_turns(rig))
     carried = np.square(rest - true).sum(-1).mean(axis=(1, 2))
     speed = np.linalg.norm(np.diff(true, axis=1), axis=-1).mean()
@@ -141,9 +141,9 @@ def _rates(rig, models, fit) -> dict:
 
 
 def _teleports(rig, models, fit) -> dict:
-    """A character that stands still is put 2 m aside and a quarter turned within one frame of 1/60 s, and nobody resets
-    its hair. How far the hair is flung from where it hung [mm], and after how many seconds it is, and
-    stays, within 5 mm of it. Who resets a network's history at the cut sees neither.
+    """A character that stands still is moved 2 m aside and turned by a quarter within one frame of 1/60 s, without resetting
+    its hair. How far the hair is flung from where it hung [mm], and after how many seconds it is, and stays, within 5 mm
+    of it. If a network's history is reset at the cut, neither happens.
     """
     rate, before, frames = 60, 60, 240
     bind = rig.character.skeleton.bind
@@ -165,14 +165,14 @@ def _teleports(rig, models, fit) -> dict:
 
 
 def _network_cost(model: RigModel) -> dict:
-    """Of one avatar and frame; `benchmarks/rig_speed.py` prints times."""
+    """Cost of one avatar and frame; `benchmarks/rig_speed.py` prints times."""
     work = sum(weight.size for weight, _ in model.layers) + 10 * len(model.chains)
     history = HISTORY_BYTES if model.dynamic else 0
     return {"multiply_adds": int(work), "square_roots": 2 * len(model.chains), "bytes_carried_on": history}
 
 
 def _spring_cost(rig) -> dict:
-    """As the algorithm is written: per joint two rotations of a vector, three normalisations and two products of
+    """Cost of the algorithm as specified: per joint two rotations of a vector, three normalisations and two products of
     quaternions; two tails are carried from frame to frame.
     """
     joints = len(rig.chains)

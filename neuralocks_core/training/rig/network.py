@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tiny network of a rig while it is trained."""
+"""The tiny network of a rig during training."""
 
 from itertools import pairwise
 
@@ -38,7 +38,7 @@ class TinyNet(torch.nn.Module):
         """Scale the inputs of a dynamic network by a sample (n, F) of motion."""
         self.mean.copy_(torch.as_tensor(features.mean(0)))
         deviation = np.maximum(features.std(0), 0.02)
-        deviation[POSE:] *= 3.0  # the long history must not drown the pose
+        deviation[POSE:] *= 3.0  # so that the long history does not drown the pose
         self.scale.copy_(torch.as_tensor(1 / deviation))
         self.mean[POSE:] = 0
 
@@ -53,7 +53,7 @@ class TinyNet(torch.nn.Module):
         return bounded_turns(raw.reshape(len(features), self.joints, 3), MAX_ANGLE)
 
     def model(self, chains, training: dict) -> RigModel:
-        """What runs without torch, for the chains that this was trained on."""
+        """The model that runs without torch, for the chains that this was trained on."""
         limits = input_limits(self.spec)
         return RigModel(chains, self.spec, self.plain_layers(chains.axes), limits, training=training)
 

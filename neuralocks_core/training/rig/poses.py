@@ -17,32 +17,32 @@ from neuralocks_core.runtime import cores
 from neuralocks_core.training.rig.body import BodyPatch
 
 RANGE = np.radians([60.0, 80.0, 45.0])
-"""Most nod, turn and tilt of the head against the chest that people have [rad]."""
+"""Largest nod, turn and tilt of people's heads relative to the chest [rad]."""
 KEPT = 2000
-"""Vertices of each body, by whose planes depths are told."""
+"""Vertices of each body whose planes give depths."""
 _SIEVE = 5e-3
-"""Points farther than this [m] outside the plane of the nearest body vertex are not asked for exactly."""
+"""Points farther than this [m] outside the plane of the nearest body vertex are not measured exactly."""
 _TOGETHER = 96
-"""Points for which the nearest body vertex is looked for together: what is compared for them stays in the processor's cache,
-and takes a third of the time of asking a tree.
+"""Points whose nearest body vertices are searched together: the distances compared stay in the processor's cache, which takes a
+third of the time of a tree query.
 """
 _scratch = Scratch()
 
 
 class PosePool:
-    """Posed bodies to draw from; renewed bit by bit, so that no network learns their shapes by heart.
+    """Posed bodies to draw from; renewed bit by bit, so that no network memorises their shapes.
 
     Args:
         rig: hair and body.
-        count: how many poses are held at a time.
+        count: number of poses held at a time.
         rng: decides all of them.
         whole: keep each whole body around the head too, for exact distances.
         moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
             necks if left out.
 
     Attributes:
-        moment: which of these each pose is, (P,).
-        relative: neck and upper chest relative to the head, since bind, canonical, (P, 2, 3, 3).
+        moment: the index of each pose's moment, (P,).
+        relative: neck and upper chest relative to the head, from the bind pose, canonical, (P, 2, 3, 3).
         shapes: blend shape weights of each, (P, B).
         bodies: with `whole`, vertices of the body around the head of each (V, 3) float32 [m], canonical; else None.
     """
@@ -63,7 +63,7 @@ class PosePool:
         self.bodies = [None] * count if self._patch and whole else None
         kept = len(self._patch.kept) if self._patch else 0
         self._normals = np.empty((count, kept, 3), np.float32)
-        # x, y, z and x.x of each body vertex: a matrix product with (-2 p, 1) tells which is nearest to p.
+        # x, y, z and x.x of each body vertex: a matrix product with (-2 p, 1) finds the nearest to p.
         self._points = np.empty((count, 4, kept), np.float32)
         self.renew(count)
 
@@ -73,7 +73,7 @@ class PosePool:
         return self._patch is not None
 
     def renew(self, count: int) -> np.ndarray:
-        """Put new poses in the place of the oldest; which these were, (count,)."""
+        """Replace the oldest poses by new ones; returns their indices (count,)."""
         character = self.rig.character
         rows = (self._oldest + np.arange(count)) % self.count
         self._oldest = (self._oldest + count) % self.count
@@ -112,7 +112,7 @@ class PosePool:
         return np.einsum("nij,nj->ni", self.relative[poses, 1], trunk)
 
     def features(self, spec, poses: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        """What the network reads of these poses (n, F) float32."""
+        """The network's inputs for these poses, (n, F) float32."""
         return held_features(spec, self.relative[poses], gravity)
 
     def planes(self, poses: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -124,12 +124,12 @@ class PosePool:
             nearest = _nearest(points[row], self._points[pose])
             normals[row] = self._normals[pose, nearest]
             offsets[row] = np.einsum("vi,iv->v", normals[row], self._points[pose, :3][:, nearest])
-            # Where the rest of the body was cut off, a plane says nothing about inside and outside.
+            # At the cut to the rest of the body, a plane says nothing about inside and outside.
             offsets[row][self._patch.rim[nearest]] = NO_PLANE[3]
         return normals, offsets
 
     def distances(self, poses: np.ndarray, points: np.ndarray, progress: Progress = silent) -> np.ndarray:
-        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be in it, 1 elsewhere; needs `whole`."""
+        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be inside, 1 elsewhere; needs `whole`."""
         normals, offsets = self.planes(poses, points)
         near = np.einsum("nvi,nvi->nv", normals, points) - offsets < _SIEVE
         result = np.ones(near.shape)
@@ -158,9 +158,9 @@ def _nearest(points: np.ndarray, body: np.ndarray) -> np.ndarray:
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:
-    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang more or less."""
+    """posed @ inverse(bind) of every joint (P, J, 4, 4): head and neck turn, the arms hang to varying degrees."""
     turns = {}
-    # Evenly in an ellipsoid that is a tenth larger than what a neck can do; its corners no neck can reach.
+    # Uniform in an ellipsoid a tenth larger than what a neck can do; no neck reaches the corners of its box.
     direction = rng.normal(size=(count, 3))
     direction *= (1.1 * rng.random(count) ** (1 / 3) / np.linalg.norm(direction, axis=1))[:, None]
     total = RANGE * direction

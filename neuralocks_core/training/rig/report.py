@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How good a rig network is in held poses: energy against direct optimisation, and how much hair lies in the body."""
+"""How good a rig network is in held poses: energy relative to direct optimisation, and how much hair is inside the body."""
 
 import numpy as np
 import torch
@@ -14,9 +14,9 @@ from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
 from neuralocks_core.training.rig.poses import PosePool
 
 POINTS = 400
-"""Of a hair mesh, by which its motion is measured."""
+"""Points of a hair mesh by which its motion is measured."""
 OPTIMISED = 250
-"""Steps of the direct optimisation from each of its beginnings."""
+"""Steps of the direct optimisation from each of its starts."""
 
 
 def static_report(
@@ -26,20 +26,20 @@ def static_report(
 
     Args:
         model: the trained RigModel.
-        rig: what it was trained for.
+        rig: the rig that it was trained for.
         material: constants of the energy.
         count: held-out poses and body shapes for the penetration.
-        seed: decides them; not the seed of training.
+        seed: decides them; use another seed than training.
         progress: called with (done, total, message).
-        optimised: how many of them are also optimised directly.
+        optimised: number of them that are also optimised directly.
 
     Returns:
         plain numbers; energies in m^2/s^2 per unit of mass, zero in the bind pose, shares in percent, depths and
         distances in millimetres. `energy`: means over the optimised poses; `excess_percent` is the network's excess
         over direct optimisation, which is not fully converged, in percent of the latter's magnitude. `tip_error_mm`: mean
-        distance of the chains' ends from where direct optimisation has them. `most_turned`: the joint that is turned most
-        in the mean over all poses, and by how much [degrees]; it tells of a lock that stands out from the head.
-        `penetration_*`: of the vertices that lie outside at rest, exact distances.
+        distance of the chains' ends from those of direct optimisation. `most_turned`: the joint that is turned most on
+        average over all poses, and by how much [degrees]; it reveals a lock that stands out from the head.
+        `penetration_*`: for the vertices that are outside at rest, exact distances.
     """
     say = progress or silent
     pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)
@@ -83,8 +83,8 @@ def static_report(
 
 
 def hair_points(rig, turns: np.ndarray) -> np.ndarray:
-    """Where the hair is, canonical (..., P, 3) [m], for turns (..., N, 4): vertices of its mesh, at most POINTS and evenly
-    chosen, or the bones' ends where it has none. Vertices tell of locks that twist about themselves, as ends do not.
+    """Positions of the hair, canonical (..., P, 3) [m], for turns (..., N, 4): at most POINTS evenly chosen vertices of its
+    mesh, or the bones' ends if it has none. Vertices show locks that twist about themselves, ends do not.
     """
     posed = pose_chains(rig.chains, from_quaternion(turns.reshape(-1, *turns.shape[-2:]).astype(float)))
     few = np.linspace(0, len(rig.points) - 1, min(POINTS, len(rig.points))).astype(int)
@@ -118,7 +118,7 @@ def _ends(rig, turns: np.ndarray) -> np.ndarray:
 
 
 def _optimise(energy, pool, poses, gravity, max_angle, start, say) -> np.ndarray:
-    """Turns (B, N, 4) of the lowest energy that Adam finds from the network's own answer and from rest."""
+    """Turns (B, N, 4) of the lowest energy that Adam finds from the network's own output and from rest."""
     vector = start[..., 1:] / np.sin(max_angle / 2)
     near = vector / np.sqrt(np.maximum(1 - np.sum(vector**2, axis=-1, keepdims=True), 1e-3))
     lowest, state = np.full(len(poses), np.inf), start

@@ -23,15 +23,15 @@ from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.threads import threads
 
 _POOL = 512
-"""Poses to draw from."""
+"""Number of poses to draw from."""
 _ROOM = 0.01
-"""Kept from the body over the material's margin while learning [m]: the network sees neither the body's shape nor its arms,
-nor can it hit the mark to the millimetre, and so goes less deep into the body."""
+"""Kept from the body beyond the material's margin while learning [m]: the network sees neither the body's shape nor its arms and
+is not exact to the millimetre, so hair goes less deep into the body with this."""
 _COLLISION = 0.3
-"""Times the body's stiffness."""
+"""Factor on the body's stiffness."""
 _RATE = 3e-3
 _LEARNING = 700
-"""Thousandths of the work that are learning, as by default; the rest is the report."""
+"""Thousandths of the work that are learning, by default; the rest is the report."""
 
 
 @threads(1)
@@ -53,10 +53,10 @@ def train_static(
     Args:
         rig: chains, hair vertices and body.
         material: constants of the energy.
-        seconds: how long to train; `steps`, if given, takes its place and makes the result repeatable.
+        seconds: time to train; `steps`, if given, replaces it and makes the result repeatable.
         hidden: width of both layers (the paper's 16).
-        seed: decides poses and first weights.
-        batch: poses a step.
+        seed: decides poses and initial weights.
+        batch: poses per step.
         report_poses: held-out poses of the report; 0 leaves it out.
         keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
