@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run the benchmarks of speed that need no Blender, one after the other: `make bench`."""
+"""Run the benchmarks of speed that need no Blender, one after another: `make bench`."""
 
 import argparse
 import subprocess

@@ -51,7 +51,7 @@ ROWS = {
     "no velocity loss": {"options": {"velocity": 0.0}},
     "no collision loss": {"options": {"collision": 0.0}},
 }
-"""Variant -> what differs from the shipped settings."""
+"""Variant -> its differences from the shipped settings."""
 
 
 def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollouts: int) -> None:

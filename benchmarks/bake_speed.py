@@ -3,11 +3,11 @@
 
     python benchmarks/bake_speed.py [MODEL] [--strands 120000] [--frames 36] [--pairs 5]
 
-The groom is grown on the shipped character. Bakes and posing alone take turns, as the speed of a machine changes
-while they run. Memory is the peak of the bake's own process above what it held once the shot was read; the number of
-frames is doubled at last to see whether it grows. Run it on an idle machine; on a busy one only the CPU times and the
-memory say something. What is baked, some gigabytes, lies meanwhile in the folder that the environment variable
-NEURALOCKS_SCRATCH names, or else where the system keeps temporary files.
+The groom is grown on the shipped character. Bakes and posing alone take turns, because the speed of a machine changes
+over time. Memory is the peak of the bake's own process above what it held once the shot was read; finally, the number of
+frames is doubled to see whether it grows. Run it on an idle machine; on a busy one, only the CPU times and the memory
+mean something. The bakes, some gigabytes, are temporarily in the folder that the environment variable
+NEURALOCKS_SCRATCH names, or else in the system's folder for temporary files.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def _baked(shot: Path, folder: Path, model, frames: int, plain: bool) -> dict:
 
 
 def import_time() -> float:
-    """Seconds that the runtime adds to a start of Python; the best of three."""
+    """Seconds that importing the runtime adds to a start of Python; the best of three."""
 
     def once(code):
         start = time.perf_counter()
@@ -95,7 +95,7 @@ def brings_torch() -> bool:
 
 
 def large_shot(folder: Path, strands: int) -> Path:
-    """The shipped shot with its groom's strands repeated beside themselves."""
+    """The shipped shot with copies of its groom's strands beside them."""
     from pxr import Usd, UsdGeom, Vt
 
     from usd.review.demo import shipped_shot
@@ -133,7 +133,7 @@ def in_process(function, *arguments) -> dict:
 
 
 def _told(function, *arguments) -> dict:
-    """Call a function; an error of a kind that cannot be sent to another process is sent as its message."""
+    """Call a function; an error that cannot be sent to another process is sent as its message."""
     try:
         return function(*arguments)
     except Exception as error:
@@ -176,7 +176,7 @@ def _write(shot, out, model, frames, plain) -> dict:
     attributes = [curves.CreatePointsAttr()] + ([] if plain else [curves.CreateVelocitiesAttr()])
     for frame in range(frames):
         for number, attribute in enumerate(attributes):
-            # Each array differs in one number, or USD would store equal ones once.
+            # Each array differs in one number, or USD would store equal arrays only once.
             points[0, 0] = frame + 0.5 * number
             attribute.Set(Vt.Vec3fArray.FromNumpy(points.reshape(-1)), frame)
             stage.GetRootLayer().Save()
@@ -188,7 +188,7 @@ def _spent(start: float, busy: float) -> dict:
 
 
 def _forget_peak() -> float:
-    """What this process holds now [MiB]; what it once held more than that is forgotten where the system can."""
+    """Current memory of this process [MiB]; resets its peak if the system can."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
         return _status("VmRSS")

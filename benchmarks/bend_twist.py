@@ -4,7 +4,7 @@
     python benchmarks/bend_twist.py [--strands 300 3000] [--threads 2] [--device cuda]
 
 The paper gives 0.16 s for its fast transport, 0.98 s for the exact one and 0.14 s for Quaffure's. Times here are the
-smallest of several rounds in which the forms take turns, so that their ratios hold on a busy machine too.
+smallest of several rounds in which the forms take turns, so that their ratios are valid on a busy machine too.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def curl(turns: float, length: float = 0.2) -> torch.Tensor:
 
 
 def false_twist(form: Cosserat, turns: float) -> float:
-    """Largest part of the strain along the edge, as l/2 Omega, where there is none."""
+    """Largest component of the strain along the edge, as l/2 Omega, for a curl that has none."""
     helix = curl(turns)
     edges = torch.nn.functional.normalize(helix.diff(dim=-2), dim=-1)
     straight = torch.arange(24, dtype=torch.float64)[:, None] * edges[:, :1]
@@ -89,7 +89,7 @@ def false_twist(form: Cosserat, turns: float) -> float:
 
 
 def fold_gradient(form: Cosserat) -> float:
-    """Largest gradient of the energy of a strand of which one edge points back along the root edge."""
+    """Largest gradient of the energy of a strand in which one edge points back along the root edge."""
     angle = torch.tensor([0.0, 0.9, 1.8, 2.6, math.pi - 0.01, 2.6, 1.8], dtype=torch.float64)
     edges = 0.01 * torch.stack([torch.sin(angle), -torch.cos(angle), 0 * angle], -1)
     x = torch.cat([torch.zeros(1, 3, dtype=torch.float64), edges.cumsum(0)])[None]
@@ -100,7 +100,7 @@ def fold_gradient(form: Cosserat) -> float:
 
 
 def droop(form: Cosserat, turns: float, steps: int = 5) -> float:
-    """How far the tip of a strand that stands out sideways comes down in equilibrium [m]."""
+    """How far the tip of a strand that sticks out sideways hangs down in equilibrium [m]."""
     rest = curl(turns)[..., [1, 0, 2]] * torch.tensor([-1.0, 1.0, 1.0], dtype=torch.float64)
     constants = rods(rest, supported=False)
     edges = rest.diff(dim=-2)
@@ -112,9 +112,9 @@ def droop(form: Cosserat, turns: float, steps: int = 5) -> float:
         moved = torch.cumsum(turned * constants.length[:, 1:, None], -2)
         return torch.cat([rest[:, :2], rest[:, 1:2] + moved], -2)
 
-    # The weight grows in steps: all at once, the search may end with the curl wound another way.
+    # The weight grows in steps: in one step, the search may end with the curl wound differently.
     for part in range(1, steps + 1):
-        # Anew, for its memory is of other weights; torch's own tolerances end it short of the equilibrium.
+        # A new optimiser, since its memory is of other weights; torch's default tolerances stop it before the equilibrium.
         optimiser = torch.optim.LBFGS(
             [turn],
             max_iter=4000,

@@ -4,10 +4,10 @@
     .venv-blender-4.5/bin/python benchmarks/blender_dynamics.py MODEL      beside particle hair dynamics
     .venv-blender-5.2/bin/python benchmarks/blender_dynamics.py MODEL      beside the "Hair Dynamics" asset (XPBD)
 
-3,000 straight strands of 24 vertices and 0.2 m stand on a ball, the head of an armature that moves by 8 cm and turns by
-0.6. Both solvers run at their defaults, without a collider, and hair is not kept out of the ball here either. Prints
-milliseconds a frame, all of `scene.frame_set` (median of sequential frames), and how long the strands have become by
-the last one. MODEL left out means the shipped one. Wall-clock time: run it on an idle machine.
+3,000 straight strands of 24 vertices and 0.2 m are on a ball, the head of an armature that moves by 8 cm and turns by
+0.6. Both solvers run at their defaults, without a collider, and our hair is not kept out of the ball either. Prints
+milliseconds per frame, all of `scene.frame_set` (median of sequential frames), and the length of the strands at the
+last frame. Without MODEL, the shipped model is used. Times are wall-clock time: run it on an idle machine.
 """
 
 import math
@@ -29,7 +29,7 @@ SLOW_FRAMES = 12
 
 
 def main() -> None:
-    """Measure what this Blender has of its own, then ours in the same scene."""
+    """Measure this Blender's own dynamics, then ours in the same scene."""
     import dcc_addon
 
     dcc_addon.register()
@@ -75,7 +75,7 @@ def particles():
 
 
 def xpbd():
-    """Hair curves with the asset that comes with Blender 5.2, in its mode Physics at default steps."""
+    """Hair curves with the asset of Blender 5.2, in its mode Physics with default steps."""
     from dcc_addon.scene import curves
 
     rig, ball = _head()
@@ -134,7 +134,7 @@ def _live(hair, rig, model: str):
 
 
 def _measured(name: str, hair, frames: int) -> float:
-    """Print and return milliseconds a frame."""
+    """Print and return milliseconds per frame."""
     from benchmarks.blender_live import median
 
     found = median(bpy.context.scene, frames)
@@ -143,7 +143,7 @@ def _measured(name: str, hair, frames: int) -> float:
 
 
 def _length(hair) -> float:
-    """Mean length of the strands as they are shown [m]."""
+    """Mean length of the strands as displayed [m]."""
     graph = bpy.context.evaluated_depsgraph_get()
     shown = hair.evaluated_get(graph)
     if hair.type == "CURVES":

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live hair in Blender at several sizes, and in the shipped shot; `blender_dynamics.py` has it beside Blender's own.
+"""Live hair in Blender at several sizes, and in the shipped shot; `blender_dynamics.py` compares it with Blender's own.
 
     .venv-blender-5.2/bin/python benchmarks/blender_live.py MODEL
 
-Prints milliseconds a frame (median of sequential frames), everything counted: all of `scene.frame_set`. MODEL left out
-means the shipped one. Run it on an idle machine: the numbers are wall-clock time; on a busy one with --cpu-time, which
-counts the processor time of all threads. Strands have 24 vertices, unevenly spaced, as a groom of somebody else has. The
-shipped shot has a skinned body that the hair is kept out of; its motion is sampled as often as it is played, in turns.
+Prints milliseconds per frame (median of sequential frames) for all of `scene.frame_set`. Without MODEL, the shipped model is
+used. Times are wall-clock time, so run it on an idle machine, or on a busy one with --cpu-time, which counts the processor
+time of all threads. Strands have 24 vertices, unevenly spaced, as in other people's grooms. The shipped shot has a skinned
+body that the hair is kept out of; sampling its motion and playing it take turns.
 """
 
 import os
@@ -52,7 +52,7 @@ def live(scenes, model: str, count: int) -> dict[str, float]:
     hair = scenes.hair(rig, count)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = model
-    bpy.context.view_layer.update()  # from now on there is something that a frame must evaluate
+    bpy.context.view_layer.update()  # from now on a frame has something to evaluate
     plain = median(scene, FRAMES)
     bpy.ops.neuralocks.sample_motion()
     hair.neuralocks_hair.live = True
@@ -96,7 +96,7 @@ def shipped_shot(scenes, model: str) -> dict[str, float]:
 
 
 def median(scene, frames: int) -> float:
-    """Milliseconds a frame of going through the frames in order."""
+    """Milliseconds per frame when stepping through the frames in order."""
     spent = []
     for frame in range(1, frames + 1):
         began = clock()

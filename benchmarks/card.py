@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put what docs/ablations.md measured of a model, by hairstyle and on real grooms, into the card inside the model's file.
+"""Put the measurements of docs/ablations.md, by hairstyle and on real grooms, into the card in a model file.
 
     python benchmarks/card.py neuralocks_core/shipped/strands.neuralocks
 
 The card also says in words which hair the model does not get right: motion error over 0.6, position error over 5 % of
-length, sliders off the solver's effect by more than 30 %. Only the card changes, the graphs stay the same bytes.
+length, sliders off the solver's effect by more than 30 %. Only the card changes; the graphs stay the same, byte for byte.
 `neuralocks inspect MODEL` prints it.
 """
 
@@ -49,7 +49,7 @@ def measured(text: str) -> dict:
 
 
 def table(text: str, heading: str) -> dict[str, dict[str, float]]:
-    """Row -> column -> number of the first table below a heading; the row of means left out."""
+    """Row -> column -> number, from the first table below a heading, without the row of means."""
     lines = text.split(f"# {heading}\n", 1)[1].splitlines()
     first = next(i for i, line in enumerate(lines) if line.startswith("|"))
     last = next((i for i, line in enumerate(lines[first:], first) if not line.startswith("|")), len(lines))

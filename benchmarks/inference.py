@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Split inference beside the same network on whole inputs, and beside the machine's own matrix rate.
+"""Split inference compared with the same network on whole inputs, and with the machine's own matrix rate.
 
     python benchmarks/inference.py [MODEL] [--threads 2]
 
 Times are medians of repeated calls, all in one run; compare the ratios, not the milliseconds of two machines. Run it
-on an idle machine. It needs the extra `train`, which has onnx.
+on an idle machine. It needs the extra `train`, which includes onnx.
 """
 
 import argparse
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 class Inputs:
-    """The shipped groom, its strands repeated up to one size, with everything that a groom computes once."""
+    """The shipped groom, its strands repeated up to one size, with everything that is computed once per groom."""
 
     def __init__(self, model, real, strands: int):
         from neuralocks_core.deformation.strand_session import strand_inputs
@@ -120,7 +120,7 @@ def shipped(model):
 
 
 def whole_graph(model):
-    """One ONNX graph over (S, 142 + F): the network as a user without the split would run it, deep maps and all."""
+    """One ONNX graph over (S, 142 + F): the network as it would run without the split, including deep maps."""
     import onnx
     import onnxruntime
     from onnx import compose, helper, numpy_helper
@@ -149,11 +149,11 @@ def whole_graph(model):
 
 
 ONE_FRAME = ("weighed", "change", "whole", "rows")
-"""What the frame's graph makes of the weights behind it; there is one for all strands only where the frame is one."""
+"""Results of the frame's graph for the weights that follow; all strands share them only if they share the frame."""
 
 
 def own_weights(node, make) -> list:
-    """A node of the tail as it is where each strand comes with a frame of its own."""
+    """A node of the tail for strands that each have a frame of their own."""
     if node.op_type != "Gemm" or node.input[1] not in MATRICES:
         return [node]
     value, name, bias = node.input
@@ -196,7 +196,7 @@ def quantised(model, vector):
 
 
 def half_refused() -> str:
-    """Why onnxruntime's CPU provider cannot multiply matrices in bfloat16 here; empty where it can."""
+    """Why onnxruntime's CPU provider cannot multiply matrices in bfloat16 here; empty if it can."""
     import onnxruntime
     from onnx import TensorProto, helper
 
@@ -212,7 +212,7 @@ def half_refused() -> str:
 
 
 def floor(strands: int, threads: int) -> float:
-    """Milliseconds that the two matrix products left would take at the best rate of this machine's matrix library."""
+    """Milliseconds that the two remaining matrix products would take at the best rate of this machine's matrix library."""
     from concurrent.futures import ThreadPoolExecutor
 
     import onnxruntime
@@ -243,7 +243,7 @@ def floor(strands: int, threads: int) -> float:
 
 
 def timed(function, seconds: float = 1.5):
-    """Result, and the median wall time of a call [ms]."""
+    """The result, and the median wall time of a call [ms]."""
     result = function()
     spent = []
     while sum(spent) < seconds and len(spent) < 200 or len(spent) < 5:

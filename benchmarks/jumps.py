@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often hair jumps where it is pushed out of the body: the network has it deep, and its way out changes sides.
+"""How often hair jumps when it is pushed out of the body, because the network has it deep and its way out changes sides.
 
     python benchmarks/jumps.py [MODEL] [--style NAME ...] [--motion FILE.bvh ...] [--strands 300]
 
-Looked at 48 times a second, for five seconds, in poses that breathe and in scripted clips, or in files. A strand jumps where
-one of its vertices goes more than 15 mm from one look to the next, and more than three times as far, and 5 mm, as the network
-moves any of that strand. `jumps` are counted for each strand and second, `pushed` is the share of strands that are pushed
-at a time. Hair is grown with a seed that no model was trained on.
+Hair is checked 48 times per second, for five seconds, in poses that breathe and in scripted clips, or in files. A strand
+jumps if one of its vertices moves more than 15 mm from one check to the next, and more than three times as far as the
+network moves any vertex of the strand, plus 5 mm. `jumps` counts them per strand and second; `pushed` is the share of strands
+that are pushed at a time. Hair is grown with a seed that no model was trained on.
 """
 
 import argparse
@@ -29,7 +29,7 @@ POSES = {
     "tilted": (0.1 * FRONT, 0.1 * SIDE + 0.3 * UP + 0.6 * FRONT, 0 * SIDE),
     "prone": (0 * SIDE, 0 * SIDE, 1.5 * SIDE),
 }
-"""Rotation vectors [rad] of the trunk, of the head and of the whole body, which are then held."""
+"""Rotation vectors [rad] of trunk, head and whole body for poses that are held."""
 CLIPS = ("turn", "nod", "bow", "walk", "bang")
 
 
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def held(character, trunk, head, whole):
-    """A pose that is taken in a second and held, but for breath."""
+    """A pose that is taken within a second and then held, apart from breathing."""
     times = np.arange(round(SECONDS * 30) + 1) / 30
     puppet, taken = Puppet(character, times), ease(times, 0.2, 1.0)[:, None]
     puppet.turn("root", taken * whole)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the material sliders act: each constant's effect in a model beside its effect in the reference solver.
+"""Whether the material sliders work: each constant's effect in a model beside its effect in the reference solver.
 
     python benchmarks/materials.py [MODEL] [--character SHOT] [--groom FILE]... [--constant NAME]...
 
-Each constant is set to the low end, the default and the high end of its range, the others staying at their default,
-in motion that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the
-body bows; `swing`, how far vertices move about their mean while the head shakes; `parting`, how far the tips of
-neighbouring strands move apart or together, rms over six motions: few pairs part far, which ones depends on the motion.
-Strands are of locks that training keeps back. The last column is the model's effect over the solver's.
+Each constant is set to the low end, the default and the high end of its range, with the others at their defaults, in motion
+that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the body bows;
+`swing`, how far vertices move about their mean while the head shakes; `parting`, how far the tips of neighbouring strands
+move apart or together, rms over six motions, since few pairs part far and the motion decides which. Strands are from locks
+that training holds out. The last column is the model's effect divided by the solver's.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def solved(scene: TrainingScene, drawn: np.ndarray, kind: str, material: Materia
 def answered(
     strand_model: StrandModel, scene: TrainingScene, drawn: np.ndarray, kind: str, material: Material
 ) -> np.ndarray:
-    """The model's displacement (T, n, 24, 3) [m]; it sees the whole groom, or locks would be cut."""
+    """The model's displacement (T, n, 24, 3) [m]; it sees the whole groom; otherwise locks would be cut."""
     groom: StrandSet = scene.grooms[0]
     clip = _clip(scene, kind)
     sampler = BoundarySampler(strand_model.spec, scene.character, clip)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mean of a model and of one that began with it: often better than both, where a longer training with larger steps has
+"""The mean of a model and of one that started from it: often better than both, if a longer training with larger steps has
 left the valley of the first.
 
     python benchmarks/mean_model.py MODEL BEGUN SHARE -o OUT
 
-SHARE is BEGUN's, from 0 to 1. Strand codes are those of both. The card is BEGUN's and says so, without what was measured of
-BEGUN.
+SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which stay. The card is that of BEGUN and says
+so, without the measurements of BEGUN.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
     kind = {name: meta["training"]["options"][name] for name in ("motion", "strand_map")}
     second = StrandNet(spec.size, **kind)
     Beginning(begun).fill(second)
-    first = deepcopy(second)  # a deep map that the model lacks answers nothing, and has the other's hidden layers
+    first = deepcopy(second)  # a deep map that the model lacks outputs zero, with the other's hidden layers
     Beginning(model).fill(first)
     with torch.no_grad():
         for ours, theirs in zip(first.parameters(), second.parameters(), strict=True):

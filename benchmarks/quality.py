@@ -4,18 +4,18 @@
     python benchmarks/quality.py [--model MODEL] [--static MODEL] [--floor] [--motion FILE.bvh ...] [--style NAME ...]
                                  [--groom FILE ...] [--shape SEED]
 
-Hair is grown with a seed that no model was trained on, and of it only the locks that training leaves out are looked
-at; the motion is the scripted clips, or files. Hair files in place of grown hair are put on the head by the spheres
-through the roots of each folder's files and through the scalp (`real_grooms.py` takes them through the whole command);
+Hair is grown with a seed that no model was trained on, and only the locks that training leaves out are measured; the
+motion is the scripted clips, or files. Hair files instead of grown hair are placed on the head by matching two spheres:
+through the roots of each folder's files, and through the scalp (`real_grooms.py` takes such files through all commands).
 `--shape` gives the body a random shape. Rigid hair has motion error 1 and velocity error 1 by definition.
 
-The scripted clips are made of the gestures that training draws at random, with sizes near the middle of the random
-ones': no clip was trained on, but it is motion of that kind. All is measured on the network's 24 vertices, before hair
-is kept out of the body. `echo` is the speed of the tips half a second to two seconds after a stop, in percent of the
-solver's largest after it, `echo error` that of their difference from the solver's. `turn` is the mean angle between
-successive edges: what is above the solver's is crinkled. `mirror` is how far the network's answer is from what it answers
-to the same hair and motion in a mirror, rms, in percent of how far hair is from rest. The floor is measured from one
-history's length on, and the columns after it are the network's in the same frames.
+The scripted clips consist of the gestures that training draws at random, with sizes near the middle of the random ones: no
+clip was trained on, but motion of that kind was. Everything is measured on the network's 24 vertices, before hair is kept
+out of the body. `echo` is the speed of the tips half a second to two seconds after a stop, in percent of the solver's
+largest after it; `echo error` is that of their difference from the solver's. `turn` is the mean angle between successive
+edges: hair above the solver's is crinkled. `mirror` is how far the network's output is from its output for the same hair
+and motion in a mirror, rms, in percent of the hair's displacement from rest. The floor is measured from one history's
+length on, and the columns after it are the network's in the same frames.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Bench:
         return self.character.canonical(self.body.shaped(self.shape))
 
     def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times, mirror=False) -> np.ndarray:
-        """The network's displacement (T, n, 24, 3); with `mirror`, what it answers to the same in a mirror, put right."""
+        """The network's displacement (T, n, 24, 3); with `mirror`, its output for the same in a mirror, mirrored back."""
         key = (id(model), style, mirror)
         if key not in sessions:
             groom = self.styles[style]
@@ -112,7 +112,7 @@ class Bench:
 
 def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarray, rest: np.ndarray) -> list[float]:
     """Shares of vertices inside the body and deeper than 3 mm [%], every 12th frame, the share in the worst of these
-    frames [%] and the worst depth [mm]; those at rest inside and the two clamped ones of a strand left out.
+    frames [%] and the worst depth [mm]; without those that rest inside, and without the two clamped ones of a strand.
     """
     bind = Collider(bench.bind_body(), bench.body.triangles)
     free = bind.distance(rest[:, 2:].reshape(-1, 3), limit=0.02)[0] >= 0
@@ -216,7 +216,7 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
 
 
 def stops(clip, times: np.ndarray) -> float:
-    """When the body comes to rest [s]; not a number where the clip has no second of rest at its end."""
+    """When the body comes to rest [s]; NaN if the clip does not end with a second of rest."""
     joints = clip.at(times)
     moving = np.abs(np.diff(joints, axis=0)).max(axis=(1, 2, 3)) > 1e-4
     stop = times[np.flatnonzero(moving).max(initial=-1) + 1]

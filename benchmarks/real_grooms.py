@@ -3,10 +3,10 @@
 
     python benchmarks/real_grooms.py FILE... [--model MODEL] [--frames A:B] [--train MINUTES [--begin MODEL]]
 
-Files of one folder are parts of one head of hair: they are put on the shot's head together, by the sphere through their
-roots and the one through the roots of the shot's own hair. Then come the commands that a user has: `neuralocks bake`, and
+Files of one folder are parts of one head of hair: they are put on the shot's head together, by matching the sphere through
+their roots to the sphere through the roots of the shot's own hair. Then the user's commands run: `neuralocks bake`, and
 `neuralocks evaluate --reference`, which simulates 200 strands of each file. With `--train`, a model is trained for each
-first, by `neuralocks train` on made-up motion, and its bake is measured; `--begin nothing` leaves out the shipped model.
+first, by `neuralocks train` on random motion, and its bake is measured; `--begin nothing` trains from scratch.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def rows(paths, model=None, frames=None, training: dict | None = None):
-    """Yield the numbers of each file, by column; with `training`, those of a model of its own."""
+    """Yield the numbers of each file, by column; with `training`, those of a model trained for it."""
     from usd.baking.bake import bake
     from usd.models.train import train
     from usd.review.evaluate import evaluate
@@ -67,7 +67,7 @@ def rows(paths, model=None, frames=None, training: dict | None = None):
     character = shot.grooms[0].attachment.character
     fitted = on_head(paths, character, character.canonical(roots(shot.grooms[0].groom)))
     with tempfile.TemporaryDirectory() as folder:
-        for number, (path, groom) in enumerate(fitted.items()):  # files of several folders may have one name
+        for number, (path, groom) in enumerate(fitted.items()):  # files in different folders may have the same name
             scene = write_scene(Path(folder) / f"{number}.usda", groom, character)
             baked = Path(folder) / f"{number}_hair.usdc"
             if training:
@@ -110,9 +110,9 @@ def on_head(paths, character, scalp: np.ndarray) -> dict[Path, Groom]:
     """Hair files on a character's head, in bind-world metres.
 
     Args:
-        paths: files whose hair stands upright and faces +Z; those of one folder share their place and size.
+        paths: files whose hair stands upright and faces +Z; those of one folder share position and scale.
         character: whose head.
-        scalp: (n, 3) canonical roots of hair that covers it [m].
+        scalp: (n, 3) canonical roots of hair that covers the scalp [m].
     """
     from neuralocks_core.formats.reading import read
 
@@ -132,8 +132,8 @@ def on_head(paths, character, scalp: np.ndarray) -> dict[Path, Groom]:
 
 
 def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of the sphere next to points (n, 3), in least squares; a tail's hair tie lies off it and is
-    left out.
+    """Centre and radius of the sphere nearest to points (n, 3), in least squares; outliers, such as a tail's hair tie, are left
+    out.
     """
     used = points
     for _ in range(4):

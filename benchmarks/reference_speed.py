@@ -3,7 +3,7 @@
 
     python benchmarks/reference_speed.py [--strands N] [--frames T] [--device cpu|cuda] [--body V]
 
-One warp thread a strand; on a CPU warp runs on one core. Error: distance to the reference at 8 substeps, in percent of
+One warp thread per strand; on a CPU warp runs on one core. Error: distance to the reference at 8 substeps, in percent of
 how far the hair moved; stretch: mean and worst, in percent.
 """
 
@@ -42,7 +42,7 @@ def swing(frames: int) -> np.ndarray:
 
 
 def ball(vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """A head of 9.8 cm radius with about so many vertices."""
+    """A head of 9.8 cm radius with about `vertices` vertices."""
     import trimesh
 
     mesh = trimesh.creation.icosphere(max(0, round(np.log(vertices / 10) / np.log(4))), radius=0.098)
@@ -50,7 +50,7 @@ def ball(vertices: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def frame_cost(solver: Callable, rest: np.ndarray, head: np.ndarray, device: str, settings: dict) -> float:
-    """Seconds a frame, the first and what settles before it left out; on a CPU those that this process got."""
+    """Seconds per frame, without the first and the settling before it; on a CPU, this process's CPU time."""
     clock = time.process_time if device == "cpu" else time.perf_counter
     ticks = []
     solver(rest, head, device=device, progress=lambda *_: ticks.append(clock()), **settings)

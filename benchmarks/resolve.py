@@ -3,9 +3,9 @@
 
     python benchmarks/resolve.py [MODEL] [--shot SHOT] [--every 6]
 
-CPU time of the best of three calls, one thread, of the shot's first groom. Penetration is measured against the exact
-collider; a jump is how far a vertex goes from one frame to the next against the head. The last line is of half frames: how
-far a vertex's push, that is where it is with the step less where it is without, goes from one to the next.
+CPU time of the best of three calls, one thread, of the shot's first groom. Penetration is measured with the exact collider; a
+jump is how far a vertex moves from one frame to the next relative to the head. The last line is for half frames: how far a
+vertex's push, its position with this step minus that without it, moves from one to the next.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 MEASURED = 4
-"""One strand in so many is measured."""
+"""One strand in this many is measured."""
 
 
 def main() -> None:
@@ -75,14 +75,14 @@ def main() -> None:
 
 
 def _pushes(poser: dict, codes: np.ndarray) -> str:
-    """How far pushes go between samples that follow each other, in words."""
+    """How far pushes move between successive samples, as text."""
     steps, before = [], None
     for code in codes.tolist():
         push = poser["with"].moved(code) - poser["without"].moved(code)
         if before is not None:
             steps.append(1000 * np.linalg.norm(push - before, axis=2).ravel())
         before = push
-    # Most are zero: those that are not are all that is kept.
+    # Most are zero: only the others are kept.
     count, steps = sum(map(len, steps)), np.concatenate([each[each > 0.01] for each in steps])
     far = ", ".join(f"{np.sum(steps > limit)} by more than {limit}" for limit in (5, 10, 20, 40))
     return f"of {count} steps {far}; the farthest {steps.max(initial=0):.0f} mm"

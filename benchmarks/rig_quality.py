@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of the rig models that are shipped, beside spring bones, in one run: held poses, motion, frame rates, teleports.
+"""Quality of the shipped rig models, beside spring bones, in one run: held poses, motion, frame rates, teleports.
 
     python benchmarks/rig_quality.py [MODEL...] [--poses 1000] [--seed 1] [--floor] [--json]
 
-Poses, body shapes and motion are held out: their seed is not that of training, and the scripted clips are in no training.
+Poses, body shapes and motion are held out: their seed is not the training's, and no training has the scripted clips.
 """
 
 import argparse
@@ -75,8 +75,8 @@ def main() -> None:
 
 
 def floor_of_forgetting(rig, material: RigMaterial, moments: int = 8) -> float:
-    """Motion error of the simulation itself, restarted at rest as long before as the dynamic network's history reaches, at
-    a few moments of each scripted clip.
+    """Motion error of the simulation itself, restarted at rest as long ago as the dynamic network's history reaches, at a few
+    moments of each scripted clip.
     """
     steps = rig_spec(dynamic=True).steps
     clips = [scripted_clip(rig.character, kind, 4.0, RATE) for kind in KINDS]

@@ -4,7 +4,7 @@
     python benchmarks/selfsupervised.py OUT.neuralocks.training --character BODY.usd --groom GROOM.usd ... --steps 700
 
 The folder is what `neuralocks train --keep-work` leaves behind: strand codes, and the solver's rollouts of held-out
-strands and motion that all variants are measured on. Nothing of it is learned from.
+strands and motion that all variants are measured on. No variant learns from them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {
     "style held near the body": (replace(OURS, style=(2500.0,)), None),
     "no self-collision": (replace(OURS, volume=0.0), None),
 }
-"""Variant -> options, and the boundary history where it is not the scene's."""
+"""Variant -> options, and the boundary history if it is not the scene's."""
 
 
 def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:

@@ -4,7 +4,7 @@
     python benchmarks/training_curves.py MODEL [MODEL ...] -o docs/training.png
 
 Motion error (1: hair carried rigidly) and position error of the gauge, on strands and motion that training never saw.
-Prints the same at a few times as a table.
+Also prints a table of them at a few times.
 """
 
 from __future__ import annotations
