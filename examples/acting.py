@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The motion of the shipped shot: she walks in, turns to us, nods, shakes her head, jumps, stops and holds.
 
-Curves, no motion capture, so no licence but ours. Hips and head follow least-jerk curves, the feet stand where they
-were put, and the legs follow from both.
+The motion is made of curves, without motion capture, so its licence is ours. Hips and head follow minimum-jerk curves, the feet
+stay where they were put, and the legs follow from both.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ SECONDS = 10.0
 STEP = 0.54
 """[s] from one heel strike to the next."""
 STRIDE = 0.64
-"""[m] from one footprint to the next, other foot."""
+"""[m] from one footprint to the next, of the other foot."""
 HEADING = 0.5 * np.pi
 """[rad] She walks in towards +X and turns to face +Z."""
 TURN = 2.75
@@ -52,7 +52,7 @@ def act(character: Character, rate: float = 24.0) -> Clip:
     rise, _ = leap(times, JUMP, HEIGHT, 0.2, 0.17)
     bob = walking * (0.018 * np.cos(2 * phase + np.pi - 0.7) - 0.014)
     puppet.position += path + (bob + rise - 0.012)[:, None] * UP
-    # The root turns about its own joint on the floor, below the hips only at rest.
+    # The root turns about its own joint on the floor, which is below the hips only at rest.
     sway = walking * 0.022 * np.cos(phase - 0.4)
     puppet.position += sway[:, None] * (SIDE[None] * np.cos(yaw)[:, None] - FRONT[None] * np.sin(yaw)[:, None])
     crouch = 0.5 * (np.sqrt(rise**2 + 0.08**2) - rise) - 0.04  # no kink as the feet leave
@@ -91,7 +91,7 @@ def _arms(puppet, times, walking, phase):
         arm = walking * 0.4 * np.cos(phase) * sign
         puppet.turn_further(f"{side}_upper_arm", (arm + 0.6 * back - 1.3 * up)[:, None] * SIDE)
         puppet.turn_further(f"{side}_upper_arm", (0.15 * up * sign)[:, None] * FRONT)
-        # The bind pose bends the elbow more than a hanging arm does.
+        # The elbow is bent more in the bind pose than in a hanging arm.
         bend = -0.42 + walking * (0.15 - 0.45 * arm) + 0.3 * back + 0.3 * up
         puppet.turn(f"{side}_lower_arm", bend[:, None] * hinge)
 
@@ -103,7 +103,7 @@ def _footprints(times, character):
     stop = (last + 0.35) * STEP
     speed = STRIDE / STEP
     slow = 0.9
-    # Constant speed, then a least-jerk stop: the way left while braking is half of what full speed would have made.
+    # Constant speed, then a minimum-jerk stop: braking covers half the distance that full speed would have covered.
     u = np.clip((times - stop + slow / 2) / slow, 0, 1)
     way = speed * (np.minimum(times, stop - slow / 2) + slow * (u - u**4 * (2.5 - 3 * u + u**2)))
     end = speed * (stop - slow / 2) + speed * slow * 0.5
@@ -165,7 +165,7 @@ def _ahead(yaw):
 
 
 def _legs(puppet, prints, hips, pelvis, yaw, rise):
-    """Turn thighs, shins and feet so that the ankles go where the footprints want them."""
+    """Turn thighs, shins and feet so that the ankles go where the footprints need them."""
     character = puppet.character
     bind, humanoid = character.skeleton.bind[:, :3, 3], character.humanoid
     root = rotation.from_vector(yaw[:, None] * UP)

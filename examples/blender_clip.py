@@ -3,7 +3,7 @@
 
     .venv-blender-4.5/bin/python examples/blender_clip.py OUT_FOLDER [--model FILE] [--frames 60:146:2] [--size 400]
 
-Writes the single frames, and of them `clip.gif` where pillow is installed beside Blender.
+Writes single frames, and makes `clip.gif` from them if pillow is installed for Blender.
 """
 
 import argparse
@@ -80,7 +80,7 @@ def stage(armature) -> None:
 
 
 def follow(armature) -> None:
-    """Camera and lights go with the hips, so that the head's own motion shows."""
+    """Make camera and lights follow the hips, so that the head's own motion shows."""
     graph = bpy.context.evaluated_depsgraph_get()
     posed = armature.evaluated_get(graph)
     bone = posed.pose.bones[0]
@@ -112,14 +112,14 @@ def settings(wanted) -> None:
 
 
 def clip(folder: Path, pictures: list[str]) -> Path:
-    """The frames as a moving picture; the folder of the frames where pillow is missing."""
+    """The frames as a moving picture; the folder of the frames if pillow is missing."""
     try:
         from PIL import Image
     except ImportError:
         return folder
     out = folder / "clip.gif"
     frames = [Image.open(picture).convert("RGB") for picture in pictures]
-    # One palette for all, and no dithering: what stands still stays still, and takes no room.
+    # One palette for all, and no dithering: still parts do not flicker, and take no space.
     some = Image.fromarray(np.concatenate([np.asarray(frame) for frame in frames[:: len(frames) // 6 + 1]]))
     palette = some.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=3)
     first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The end of a script that has imported bpy: some builds hang or crash when Python ends with a handler or a class still
+"""Ends a script that has imported bpy: some builds hang or crash when Python ends with a handler or a class still
 registered, as after an error.
 """
 
@@ -9,7 +9,7 @@ import traceback
 
 
 def run_and_leave(main) -> None:
-    """Call `main()`, then end this process at once: status 0, or 1 with a traceback where it raised."""
+    """Call `main()`, then end this process at once: status 0, or 1 with a traceback if it raised."""
     status = 1
     try:
         main()

@@ -5,7 +5,7 @@
         --python examples/blender_panel.py -- OUT.png
 
 `--model FILE` chooses a model, `--frame N` the frame. Needs a Blender with a window; the packages of the add-on must be
-importable (install the extension, or set PYTHONPATH). Where VIRTUAL_ENV has no torch, the panel says how to get it.
+importable (install the extension, or set PYTHONPATH). If VIRTUAL_ENV has no torch, the panel says how to get it.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from mathutils import Euler, Vector
 
 
 def options():
-    """What was given after `--`."""
+    """The options after `--`."""
     parser = argparse.ArgumentParser()
     parser.add_argument("out", type=Path)
     parser.add_argument("--model", default="")
@@ -45,7 +45,7 @@ def prepare(wanted) -> None:
         bpy.data.objects.remove(thing)
     armature, _, hair = blender_shot.build(strands=wanted.strands)
     armature.hide_set(True)
-    # As an artist has it: the file saved, the model beside it.
+    # As for an artist: the file saved, the model beside it.
     folder = Path(tempfile.mkdtemp())
     if wanted.model:
         shutil.copy(wanted.model, folder / "hair.neuralocks")
@@ -60,11 +60,11 @@ def prepare(wanted) -> None:
 
 
 def _view(area, armature) -> None:
-    """Material Preview with the lights of the clip, of the head left of the sidebar."""
+    """Material Preview with the lights of the clip; the head is left of the sidebar."""
     scene, space = bpy.context.scene, area.spaces.active
     blender_clip.stage(armature)
     scene.render.hair_subdiv = 2
-    if hasattr(scene.eevee, "use_gtao"):  # newer ones shade corners by themselves
+    if hasattr(scene.eevee, "use_gtao"):  # newer versions shade corners by themselves
         scene.eevee.use_gtao, scene.eevee.gtao_distance = True, 0.05
     space.show_region_ui, space.overlay.show_overlays = True, False
     shading = space.shading
@@ -92,31 +92,31 @@ def _head(armature) -> str:
 
 
 def clicks() -> list:
-    """What an artist does to see the panel: click the tab, draw the sidebar wider. Python cannot before Blender 4.2.
+    """What an artist does to see the panel: click the tab, draw the sidebar wider. Python cannot do this before Blender 4.2.
 
-    One event a step: Blender takes a click to be where the pointer is when it comes to it, not where it was.
+    One event per step: Blender handles a click at the pointer's position at that time, not at the position of the event.
     """
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
     side = next(r for r in area.regions if r.type == "UI")
     top = window.height - (side.y + side.height)
     tab, edge = f"mousemove {side.x + side.width - 12} {top + TAB}", f"mousemove {side.x} {top + 400}"
-    # The first click may only put the splash screen away.
+    # The first click may only close the splash screen.
     way = ["mousemove 120 700", "click 1", tab, "click 1", edge, "mousedown 1"]
     way += [f"mousemove {side.x - step} {top + 400}" for step in (30, 60, 90)] + ["mouseup 1", "mousemove 8 500"]
     return [lambda step=step: subprocess.Popen(["xdotool", *step.split()]) for step in way]
 
 
 ROUND = 36
-"""How far round to the character's left the view stands [degrees]."""
+"""How far the view is turned to the character's left [degrees]."""
 ASIDE = (0.04, -0.03, 0)
-"""Where the view looks from the head joint, to its right and up [m]."""
+"""Point that the view looks at, relative to the head joint [m]: to its right and up."""
 TAB = 130
-"""How far below the top of the sidebar the third tab lies."""
+"""Distance of the third tab below the top of the sidebar."""
 
 
 def main() -> None:
-    """Steps with pauses in between, so that the window can draw."""
+    """Run the steps with pauses in between, so that the window can draw."""
     wanted = options()
     steps = [lambda: prepare(wanted), lambda: steps.extend([*clicks(), lambda: None, lambda: _shoot(wanted.out)])]
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shipped shot as a Blender scene: armature with its animation, body and hair, through the add-on's own functions.
 
-Works in every Blender that the add-on supports, also where Blender itself cannot read USD.
+Works in every Blender that the add-on supports, even if Blender itself cannot read USD.
 """
 
 import sys
@@ -115,7 +115,7 @@ def _hair(armature, item, up, strands):
     if strands and strands < groom.strand_count:
         groom = groom.subset(np.linspace(0, groom.strand_count - 1, strands).astype(int))
     points = (groom.points @ up[:3, :3].T).astype(np.float32)
-    # A little wider than a hair, for there are fewer of them than on a head.
+    # Slightly wider than a real hair, since there are fewer strands than on a head.
     radii = np.concatenate([np.linspace(4e-4, 1.4e-4, n) for n in groom.counts]).astype(np.float32)
     data = curves.create("Hair", groom.counts, points, radii, _hair_material())
     hair = bpy.data.objects.new("Hair", data)
@@ -137,7 +137,7 @@ def _material(name, colour, roughness):
 
 
 def _skin():
-    """Skin above the collar, dark cloth below: the attribute `height` is one half there."""
+    """Skin above the collar, dark cloth below: the attribute `height` is one half at the collar."""
     material = _material("Skin", (0.52, 0.30, 0.22, 1), 0.45)
     nodes, links = material.node_tree.nodes, material.node_tree.links
     shader = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
@@ -162,7 +162,7 @@ def _hair_material():
 
 
 def _fibres(tree) -> None:
-    """For Cycles, hair that light goes through; other engines do not know it, and keep the plain shader."""
+    """Translucent hair for Cycles; other engines do not support its shader, and keep the plain one."""
     plain = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
     plain.target = "EEVEE"
     fibre, output = tree.nodes.new("ShaderNodeBsdfHairPrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")

@@ -4,7 +4,7 @@
     python examples/make_mesh_hair.py [-o examples/mesh_hair]
 
 writes `character.usda` (body, hair mesh and hair joints, at rest) and `shot.usda` (the same with a loop of head
-and body motion; the hair joints rest), both on top of `examples/shot/body.usdc`. Then:
+and body motion; the hair joints stay at rest), both on top of `examples/shot/body.usdc`. Then:
 
     neuralocks rig train examples/mesh_hair/character.usda -o hair.neuralocks
     neuralocks rig bake examples/mesh_hair/shot.usda -o baked.usda --model hair.neuralocks
@@ -44,7 +44,7 @@ LOCKS = {
 }
 JOINTS = 4
 RATE, SECONDS = 24, 8.0
-"""Of the shot."""
+"""Frame rate and length of the shot."""
 
 
 def main() -> None:
@@ -63,10 +63,10 @@ class Hair:
 
     Attributes:
         names: joint paths, roots of locks below the head.
-        parents: index of each joint's parent among the body's joints and these.
+        parents: index of each joint's parent among the joints of body and hair.
         bind: bind transforms (4, 4), world.
         points: of the mesh (V, 3) [m], world.
-        faces: vertex indices of each.
+        faces: vertex indices of each face.
         indices, weights: joints that move each vertex and their shares, (V, 2).
     """
 
@@ -117,7 +117,7 @@ def _hair(body_stage, character) -> Hair:
 
 
 def _add_joints(skeleton: UsdSkel.Skeleton, body: JointSource, hair: Hair) -> None:
-    """Put the hair's joints behind the body's."""
+    """Append the hair's joints to the body's."""
     bind = np.concatenate([body.bind, hair.bind])
     rest = [*body.rest, *(np.linalg.inv(bind[parent]) @ matrix for parent, matrix in zip(hair.parents, hair.bind))]
     skeleton.GetJointsAttr().Set([*body.names, *hair.names])
@@ -189,13 +189,13 @@ def _layer_over(path: Path, below: Path) -> Usd.Stage:
 
 
 def _bone(curve, i):
-    """Begin and end of bone i; arc zero is where the lock leaves the head."""
+    """Start and end of bone i; arc length zero is where the lock leaves the head."""
     length = curve[1][-1]
     return at(curve, length * i / JOINTS), at(curve, length * (i + 1) / JOINTS)
 
 
 def _bone_frame(begin, end, head_at):
-    """Bind transform (4, 4) of a joint whose own Y runs along its bone, as modelling tools have it."""
+    """Bind transform (4, 4) of a joint whose own Y runs along its bone, as in modelling tools."""
     y = (end - begin) / np.linalg.norm(end - begin)
     x = np.cross(y, [0.0, 0.0, 1.0] if abs(y[2]) < 0.9 else [1.0, 0.0, 0.0])
     x /= np.linalg.norm(x)
@@ -206,9 +206,9 @@ def _bone_frame(begin, end, head_at):
 
 
 def _influences(along, head, first):
-    """Joints and weights (n, 2): each joint fades into the next over the third of a bone around their meeting."""
+    """Joints and weights (n, 2): each joint fades into the next over a third of a bone around the point where they meet."""
     place = along * JOINTS
-    bone = np.clip(np.round(place).astype(int), 0, JOINTS - 1)  # the meeting that is nearest
+    bone = np.clip(np.round(place).astype(int), 0, JOINTS - 1)  # the nearest meeting point
     second = np.clip((place - bone) * 1.5 + 0.5, 0, 1)
     before = np.where(bone == 0, head, first + bone - 1)
     after = first + bone

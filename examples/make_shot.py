@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build the shipped shot: python examples/make_shot.py [-o examples/shot] [--strands 3200] [--body]
 
-Layers as a pipeline has them: body.usdc (character), motion.usdc (animation), groom.usdc (hair at rest, skinned to the
+Layers as in a pipeline: body.usdc (character), motion.usdc (animation), groom.usdc (hair at rest, skinned to the
 head) and shot.usda, which puts them together with a camera and lights.
 """
 
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def grow_groom(body: Path, style: str, strands: int) -> Groom:
-    """Hair of one of the library's styles on the body's marked scalp."""
+    """Hair in one of the library's styles on the body's marked scalp."""
     character = read_rigs(body)[0].character
     stage = Usd.Stage.Open(str(body))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(MESH))
@@ -66,7 +66,7 @@ def grow_groom(body: Path, style: str, strands: int) -> Groom:
     skin = character.body
     scalp = Scalp(np.array(mesh.GetPointsAttr().Get(), float), triangles, centre)
     groom = grow(style, scalp, strands, seed=1, body=(skin.points, skin.triangles))
-    # As many vertices as the network has keep a bake of ten seconds under half a gigabyte.
+    # With the network's number of vertices, a bake of ten seconds stays under half a gigabyte.
     points, _ = resample(groom, VERTICES)
     kept = np.linspace(0, groom.counts[0] - 1, VERTICES, dtype=int)
     width = np.reshape(groom.widths, (strands, -1))[:, kept]

@@ -7,11 +7,11 @@ import numpy as np
 from pxr import UsdGeom
 
 RINGS, SIDES = 15, 10
-"""Of a lock's tube, from where it leaves the head."""
+"""Rings and sides of a lock's tube, from where it leaves the head."""
 CLEARANCE = 0.008
-"""From the skin to the middle of a lock, over its half thickness [m]."""
+"""Distance from the skin to the middle of a lock, beyond half its thickness [m]."""
 THICKNESS, HAIRLINE = 0.009, 0.002
-"""Of the cap: how far it lies off the skin, and how far at its edge [m]."""
+"""Distance of the cap from the skin, and at its edge [m]."""
 
 
 class Lock(NamedTuple):
@@ -25,7 +25,7 @@ class Lock(NamedTuple):
 
 
 def curve_of(collider, lock: Lock):
-    """Middle of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
+    """Centre line of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
     angle = np.radians(lock.degrees)
     out = np.array([np.sin(angle), 0.0, np.cos(angle)])
     clearance = lock.half_thickness + CLEARANCE
@@ -66,7 +66,7 @@ def at(curve, arc):
 
 
 def tube(curve, flats, lock: Lock):
-    """A flat tapered tube: points (n, 3), faces, and arc length over the chain's per point (n,)."""
+    """A flat tapered tube: points (n, 3), faces, and arc length per point, divided by the chain's (n,)."""
     arcs = np.concatenate([np.linspace(curve[1][0], 0, 4, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
     middle = at(curve, arcs)
     tangent = np.gradient(middle, axis=0)
@@ -94,7 +94,7 @@ def tube(curve, flats, lock: Lock):
 
 
 def cap(mesh: UsdGeom.Mesh, collider, head_at):
-    """Points (n, 3) and faces of the cap: the scalp a little off the skin, with a smooth hairline."""
+    """Points (n, 3) and faces of the cap: the scalp slightly off the skin, with a smooth hairline."""
     subset = UsdGeom.Subset(next(p for p in mesh.GetPrim().GetChildren() if p.GetName() == "scalp"))
     counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get())
     corners = np.split(np.asarray(mesh.GetFaceVertexIndicesAttr().Get()), np.cumsum(counts)[:-1])
@@ -105,7 +105,7 @@ def cap(mesh: UsdGeom.Mesh, collider, head_at):
     edges, uses = np.unique(ends, axis=0, return_counts=True)
     beside, along = (_means(chosen, len(used)) for chosen in (edges, edges[uses == 1]))
     on_edge = along.any(axis=1)
-    # The scalp ends with whole faces, in steps: each vertex of its edge goes to the middle of its neighbours there, the others
+    # The scalp ends with whole faces, in steps: each vertex of its edge moves to the middle of its neighbours there, the others
     # make room, and all return to the skin.
     for _ in range(24):
         points[on_edge] += 0.5 * (along @ points - points)[on_edge]

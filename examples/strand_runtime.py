@@ -2,12 +2,12 @@
 """The strand network in a runtime of one's own: python examples/strand_runtime.py FOLDER SHOT BAKED [NAME=VALUE ...]
 
 FOLDER is what `neuralocks export -o FOLDER --shot SHOT` wrote, BAKED what `neuralocks bake SHOT -o BAKED --no-resolve`
-did, with `--material NAME=VALUE` where that is given here (bend, weight, damping or clumping). Nothing of Neuralocks is
-imported: this is a worked example of `description.json` for whoever writes the same in an engine, and prints how far its
-strands lie from the bake's. The stage must be in metres, Y up, its animation on ones, without cuts and without blend shapes that
-change. The network's strands have 24 vertices, even in arc length, and no corner above 52 degrees.
-Where the groom's are otherwise, the bake lays them along the network's with their own lengths, which this example does not:
-there the median tells whether the runtime is right, and tips differ by millimetres, as on the shipped shot.
+wrote, with `--material NAME=VALUE` if that is given here (bend, weight, damping or clumping). Nothing of Neuralocks is
+imported: this is a worked example of `description.json` for those who write the same in an engine, and it prints how far its
+strands are from the bake's. The stage must be in metres, Y up, its animation on ones, without cuts and without changing blend
+shapes. The network's strands have 24 vertices, even in arc length, and no corner above 52 degrees.
+If the groom's strands are different, the bake lays them along the network's with their own lengths, which this example does
+not: then the median tells whether the runtime is right, and tips differ by millimetres, as on the shipped shot.
 """
 
 import argparse
@@ -27,7 +27,7 @@ DEFAULT = {"bend": 1e-3, "weight": 1.0, "damping": 10.0, "clumping": 60.0}
 
 
 class Runtime:
-    """One groom in one material: what no frame changes is read once; `strands` makes a frame."""
+    """One groom in one material: what is the same in all frames is read once; `strands` computes a frame."""
 
     def __init__(self, folder: Path, name: str, material: dict[str, float]):
         described = json.loads((folder / "description.json").read_text("utf-8"))
@@ -48,19 +48,19 @@ class Runtime:
         self.stray = ((own + 120 * tie) / (own + 2 * material["clumping"] * tie))[:, None, None]
 
     def turns(self, rotations: np.ndarray) -> np.ndarray:
-        """(T, n, 3, 3) world rotations of the joints named, since the bind pose."""
+        """(T, n, 3, 3) world rotations of the named joints, from the bind pose."""
         return rotations @ np.swapaxes(self.fixed["bind"], -1, -2) @ self.fixed["facing"].T
 
     def vector(self, places: np.ndarray, turns: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         """The boundary vector (F,) of the newest of some moments, each the model's dt before the one before it.
 
         Args:
-            places: (steps + 2, 3) the head joint's, newest first [m].
-            turns: (steps + 2, n, 3, 3) as `turns` gives them; head, upper chest, pose joints.
-            drawn: (n, 3, 3), the same of the pose that is drawn at the newest.
+            places: (steps + 2, 3) positions of the head joint, newest first [m].
+            turns: (steps + 2, n, 3, 3) from `turns`; head, upper chest, pose joints.
+            drawn: (n, 3, 3), the same for the pose that is drawn at the newest moment.
         """
         dt, bins = self.model["boundary"]["dt"], self.model["boundary"]["bins"]
-        result = self.fixed["held"].copy()  # shape and material stay as they are
+        result = self.fixed["held"].copy()  # shape and material do not change
         head = drawn[0]
         pose = head.T @ drawn[2:] @ self.fixed["stance"]
         result[slice(*self.parts["pose"])] = pose[:, :, :2].transpose(0, 2, 1).ravel()
@@ -82,7 +82,7 @@ class Runtime:
         return result
 
     def made(self, vector: np.ndarray) -> dict[str, np.ndarray]:
-        """What frame.onnx makes of a boundary vector."""
+        """Outputs of frame.onnx for a boundary vector."""
         return {o.name: v for o, v in zip(self.frame.get_outputs(), self.frame.run(None, {"frame": vector[None]}))}
 
     def answer(self, output: str, frame: dict[str, np.ndarray], locks: str = "") -> np.ndarray:
@@ -108,13 +108,13 @@ class Runtime:
 
 
 def limited(vectors: np.ndarray, longest) -> np.ndarray:
-    """Vectors (n, 3), those beyond a length, or one each (n, 1), cut to it."""
+    """Vectors (n, 3), limited to a length, or to one each (n, 1)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors * np.minimum(1, longest / np.maximum(length, 1e-9))
 
 
 def softened(times: np.ndarray, places: np.ndarray, dt: float = 1 / 30) -> np.ndarray:
-    """A path (T, 3) whose velocity changes at a sample by no more than 6 g would change it in the time to the next, or in dt."""
+    """A path (T, 3) whose velocity changes at a sample by at most what 6 g cause in the time to the next, or in dt if longer."""
     spans = np.diff(times)
     velocity = np.diff(places, axis=0) / spans[:, None]
     longest = 6 * 9.81 * np.maximum((spans[1:] + spans[:-1]) / 2, dt)[:, None]
@@ -123,13 +123,13 @@ def softened(times: np.ndarray, places: np.ndarray, dt: float = 1 / 30) -> np.nd
 
 
 def turned(transforms: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) of transforms (..., 4, 4) that scale alike in all directions."""
+    """Rotations (..., 3, 3) of transforms (..., 4, 4) that scale equally in all directions."""
     linear = transforms[..., :3, :3]
     return linear / np.cbrt(np.linalg.det(linear))[..., None, None]
 
 
 def joints_of(facts: dict) -> list[str]:
-    """Paths of the joints that a groom's boundary vector is made of: head, upper chest, pose joints."""
+    """Paths of the joints that a groom's boundary vector is made from: head, upper chest, pose joints."""
     joints = facts["joints"]
     return [joints["head"], joints["upper chest"], *joints["pose"]]
 
@@ -156,7 +156,7 @@ class Motion:
         return (local @ np.array(place.GetLocalToWorldTransform(self._prim))).transpose(0, 2, 1)
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, 3) of the hair's origin and rotations (T, n, 3, 3) of the joints; straight on before the clip, still after."""
+        """Positions (T, 3) of the hair's origin and joint rotations (T, n, 3, 3); straight on before the clip, still after it."""
         inside = np.clip(times, *self._times[[0, -1]])
         places = self._curve(inside) + np.minimum(times - inside, 0)[:, None] * self._curve(inside, 1)
         turns = Rotation.from_quat(self._turn(inside).reshape(-1, 4)).as_matrix()
@@ -164,7 +164,7 @@ class Motion:
 
 
 def clip_codes(stage: Usd.Stage, samples: list[float]) -> list[float]:
-    """Time codes at which a bake reads the motion; `clip` in the description says why. The shot is one of frames."""
+    """Time codes at which a bake reads the motion; `clip` in the description says why. The shot must have frames."""
     second, start, end = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()
     before = [start] if samples[0] - start >= 0.1 * second - 1e-6 else []
     codes = [*before, *samples, max(end, samples[-1])]
@@ -173,7 +173,7 @@ def clip_codes(stage: Usd.Stage, samples: list[float]) -> list[float]:
 
 
 def curves_at(stage: Usd.Stage, prim: str) -> UsdGeom.BasisCurves:
-    """The groom of a stage; ends where it has none there."""
+    """The groom of a stage; exits if there is none."""
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(prim))
     if not curves:
         file = stage.GetRootLayer().GetDisplayName()
@@ -182,7 +182,7 @@ def curves_at(stage: Usd.Stage, prim: str) -> UsdGeom.BasisCurves:
 
 
 def shares(curves: UsdGeom.BasisCurves) -> list[np.ndarray]:
-    """Where the vertices of each of the groom's strands lie on it as modelled: shares of its length, from 0 to 1."""
+    """Positions of the vertices along each of the groom's strands as modelled: shares of its length, from 0 to 1."""
     ends = np.cumsum(curves.GetCurveVertexCountsAttr().Get())[:-1]
     strands = np.split(np.array(curves.GetPointsAttr().Get(), dtype=float), ends)
     lengths = [np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))) for points in strands]
@@ -190,14 +190,14 @@ def shares(curves: UsdGeom.BasisCurves) -> list[np.ndarray]:
 
 
 def evenly(points: np.ndarray, at: list[np.ndarray]) -> np.ndarray:
-    """24 points (S, 24, 3) at even shares of the length of strands whose vertices lie at those shares."""
+    """24 points (S, 24, 3) at even shares of the length of strands, whose vertices are at the shares `at`."""
     even, ends = np.linspace(0, 1, 24), np.cumsum([len(shares) for shares in at])[:-1]
     strands = zip(at, np.split(points, ends))
     return np.array([np.stack([np.interp(even, own, axis) for axis in strand.T], axis=1) for own, strand in strands])
 
 
 def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float]) -> np.ndarray:
-    """How far this runtime's strands lie from a bake's in the same material, at each vertex in each sample [m]."""
+    """Distance of this runtime's strands from a bake's in the same material, at each vertex in each sample [m]."""
     described = json.loads((folder / "description.json").read_text("utf-8"))
     if "grooms" not in described:
         sys.exit(f"{folder}: holds no groom; let neuralocks export write it with --shot SHOT")
@@ -224,7 +224,7 @@ def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float
 
 
 def setting(word: str) -> tuple[str, float]:
-    """The name and the number of NAME=VALUE; a ValueError tells argparse that a word is none."""
+    """The name and the number of NAME=VALUE; a ValueError tells argparse that a word is invalid."""
     name, value = word.split("=")
     return name, float(value)
 
@@ -233,7 +233,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ("folder", "shot", "baked"):
         parser.add_argument(name, type=Path)
-    # Without a default the error on an empty line would call it required.
+    # Without a default, the error for an empty line would call it required.
     parser.add_argument("material", nargs="*", default=[], metavar="NAME=VALUE", type=setting)
     given = parser.parse_args()
     numbers = dict(given.material)

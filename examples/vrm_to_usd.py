@@ -3,8 +3,8 @@
 
     python examples/vrm_to_usd.py avatar.vrm -o avatar.usdc     (in a Python that has bpy: pip install bpy)
 
-prints the `--chains` patterns that the VRM's spring-bone groups name, for `neuralocks rig train avatar.usdc`. Rest transforms
-of Blender's files are the pose at the first frame; bind transforms are right, and those are what is read.
+prints the `--chains` patterns that the VRM's spring-bone groups name, for `neuralocks rig train avatar.usdc`. In Blender's
+files, rest transforms are the pose at the first frame; bind transforms are right, and are the ones that we read.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def main() -> None:
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.render.fps = options.fps  # glTF has seconds, of which the importer makes frames
+    bpy.context.scene.render.fps = options.fps  # glTF has seconds, which the importer converts to frames
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "avatar.glb"  # the importer goes by the extension
         copy.write_bytes(packed(scene, rest))
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def set_range(bpy, scene) -> bool:
-    """Give the scene the frames of what is animated in it; False where nothing is."""
+    """Set the scene's frame range to its animation; False if nothing is animated."""
     moved = [thing.animation_data for thing in (*bpy.data.objects, *bpy.data.shape_keys)]
     ranges = [each.action.frame_range for each in moved if each and each.action]
     if ranges:
@@ -63,7 +63,7 @@ def set_range(bpy, scene) -> bool:
 
 
 def read(path: Path) -> tuple[dict, bytes]:
-    """A binary glTF file's JSON, and all that comes after it."""
+    """A binary glTF file's JSON, and everything after it."""
     data = path.read_bytes()
     magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data.ljust(20))
     if magic != b"glTF" or kind != b"JSON" or 20 + length > len(data):
@@ -72,15 +72,15 @@ def read(path: Path) -> tuple[dict, bytes]:
 
 
 def packed(scene: dict, rest: bytes) -> bytes:
-    """A binary glTF file of what `read` gave."""
+    """A binary glTF file from the output of `read`."""
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
 
 
 def name_apart(scene: dict) -> None:
-    """Give all nodes names that USD and Blender take as they are, no two the same: glTF allows equal ones and long ones, and
-    Blender numbers those and cuts these itself.
+    """Give all nodes unique names that USD and Blender keep unchanged: glTF allows equal and long names, and Blender numbers the
+    former and cuts the latter itself.
     """
     taken = set()
     for node in scene.get("nodes", ()):
@@ -96,7 +96,7 @@ def name_apart(scene: dict) -> None:
 
 
 def cut(name: str, ending: str = "") -> str:
-    """A name and its ending, of whole letters and no more bytes than LONGEST."""
+    """A name with its ending, in whole letters and at most LONGEST bytes."""
     return name.encode()[: LONGEST - len(ending)].decode(errors="ignore") + ending
 
 
