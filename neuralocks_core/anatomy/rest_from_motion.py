@@ -107,7 +107,7 @@ def _limb(turns, places, humanoid: Humanoid, names: list[str], along: np.ndarray
             down = np.cos(INSTEP) * _FRONT - np.sin(INSTEP) * _UP
             body[joint] = _between(turns[:, joint], way, turns[:, lower] @ body[lower] @ across, down, across)
         elif _angle(here, there) < NEAR:
-            # The same axes lie along both bones, so others across them do, too: forearms turn about themselves.
+            # Both bones run along the same axis of their joints, so the axes across agree, too: forearms twist.
             body[joint] = body[above]
         else:
             body[joint] = _axes(turns[:, joint], second, hinge, along, across)

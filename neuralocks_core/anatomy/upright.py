@@ -63,7 +63,7 @@ def upright(rest: np.ndarray, world: np.ndarray, parents, humanoid: Humanoid) ->
 
 
 def mostly_lies(world: np.ndarray, humanoid: Humanoid) -> bool:
-    """Whether a motion, world transforms (T, J, 4, 4), Y up, shows a body that lies in more than half of its poses."""
+    """Whether a motion, world transforms (T, J, 4, 4), Y up, shows a body that lies down in more than half of its poses."""
     return bool(np.mean([lies(pose[:, :3, 3], humanoid, AXES["Y"])[0] for pose in _some(world)]) > 0.5)
 
 

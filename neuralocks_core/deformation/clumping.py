@@ -43,7 +43,7 @@ class Locks:
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:
-        """The locks of a groom; hairs that are no strands do not count."""
+        """The locks of a groom; invalid strands do not count."""
         count = len(strands.rest)
         flat = np.concatenate([strands.rest.reshape(count, -1), strands.uv, strands.root_normal], axis=1)
         mates = lock_mates(strands.rest, strands.lock)

@@ -21,7 +21,7 @@ _ON_HEAD, _TAIL = 18, 60
 
 @dataclass(frozen=True)
 class Tied(Style):
-    """A style that gathers hair in one place: where it is tied, and how the hair behind the tie goes on."""
+    """A style that gathers hair in one place: where it is tied, and how the hair continues behind the tie."""
 
     tie: tuple[float, float, float]
     """Direction of the tie from the head's centre."""

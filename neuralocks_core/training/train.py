@@ -81,7 +81,7 @@ def train_strands(
         begin: a model whose network and strand codes training starts from, instead of random weights and new codes.
         resume: continue from the folder `OUT.training` beside the model: simulations, strand codes, and the checkpoint if there
             is one; with a larger budget than before, a finished run trains longer.
-        keep_work: keep this folder after success.
+        keep_work: keep `OUT.training` after success.
         credits: lines for the model card: whose data was used.
         command: the command line, for the model card.
         tell: called with notes for the user about a resumed training.
