@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Make the example of rigged mesh hair: eight locks of four joints and a cap on the shipped body, and a short shot.
+"""Make the example of rigged mesh hair: eight locks of four joints, a fringe and a cap on the shipped body, and a short shot.
 
     python examples/make_mesh_hair.py [-o examples/mesh_hair]
 
@@ -33,15 +33,20 @@ from usd.skel.source import read_rig
 HERE = Path(__file__).resolve().parent
 
 LOCKS = {
-    "front_l": Lock(62, 0.045, 0.24, 0.019, 0.009),
-    "front_r": Lock(-62, 0.045, 0.24, 0.019, 0.009),
-    "side_l": Lock(100, 0.050, 0.27, 0.030, 0.011),
-    "side_r": Lock(-100, 0.050, 0.27, 0.030, 0.011),
-    "back_l": Lock(136, 0.045, 0.29, 0.032, 0.012),
-    "back_r": Lock(-136, 0.045, 0.29, 0.032, 0.012),
-    "nape_l": Lock(168, 0.040, 0.30, 0.030, 0.013),
-    "nape_r": Lock(-168, 0.040, 0.30, 0.030, 0.013),
+    "front_l": Lock((0.004, 0.050), 64, 0.045, 0.22, 0.030, 0.009),
+    "front_r": Lock((-0.004, 0.050), -64, 0.045, 0.22, 0.030, 0.009),
+    "side_l": Lock((0.006, 0.025), 95, 0.050, 0.25, 0.042, 0.010),
+    "side_r": Lock((-0.006, 0.025), -95, 0.050, 0.25, 0.042, 0.010),
+    "back_l": Lock((0.006, -0.005), 132, 0.045, 0.28, 0.046, 0.012),
+    "back_r": Lock((-0.006, -0.005), -132, 0.045, 0.28, 0.046, 0.012),
+    "nape_l": Lock((0.010, -0.030), 165, 0.040, 0.30, 0.044, 0.013),
+    "nape_r": Lock((-0.010, -0.030), -165, 0.040, 0.30, 0.044, 0.013),
 }
+FRINGE = [
+    Lock((0.004, 0.068), 42, 0.085, 0.05, 0.022, 0.007),
+    Lock((-0.004, 0.068), -42, 0.085, 0.05, 0.022, 0.007),
+]
+"""Locks on the forehead, too short to swing."""
 JOINTS = 4
 RATE, SECONDS = 24, 8.0
 """Frame rate and length of the shot."""
@@ -93,13 +98,12 @@ def make_character(path: Path, body_path: Path) -> None:
 
 
 def _hair(body_stage, character) -> Hair:
-    """The cap and all locks."""
+    """The cap, all locks and the fringe."""
     head = character.head
     head_at = character.skeleton.bind[head, :3, 3]
     collider = Collider(character.body.points - head_at, character.body.triangles)
     points, faces = cap(UsdGeom.Mesh(next(p for p in body_stage.Traverse() if p.IsA(UsdGeom.Mesh))), collider, head_at)
-    tied = np.full((len(points), 2), head), np.tile([1.0, 0.0], (len(points), 1))
-    hair = Hair([], [], [], points, faces, *tied)
+    hair = Hair([], [], [], points, faces, *_tied(len(points), head))
     for name, lock in LOCKS.items():
         curve, flats = curve_of(collider, lock)
         first = len(character.skeleton.names) + len(hair.names)
@@ -107,13 +111,26 @@ def _hair(body_stage, character) -> Hair:
             hair.names.append(f"{hair.names[-1] if i else character.skeleton.names[head]}/hair_{name}_{i + 1}")
             hair.parents.append(first + i - 1 if i else head)
             hair.bind.append(_bone_frame(*_bone(curve, i), head_at))
-        ring_points, ring_faces, along = tube(curve, flats, lock)
-        hair.faces += [[f + len(hair.points) for f in face] for face in ring_faces]
-        hair.points = np.concatenate([hair.points, ring_points])
-        own, share = _influences(along, head, first)
-        hair.indices, hair.weights = np.concatenate([hair.indices, own]), np.concatenate([hair.weights, share])
+        points, faces, along = tube(curve, flats, lock)
+        _add(hair, points, faces, *_influences(along, head, first))
+    for lock in FRINGE:
+        points, faces, _ = tube(*curve_of(collider, lock), lock)
+        _add(hair, points, faces, *_tied(len(points), head))
     hair.points = hair.points + head_at
     return hair
+
+
+def _add(hair: Hair, points, faces, indices, weights) -> None:
+    """Add a piece of mesh."""
+    hair.faces += [[vertex + len(hair.points) for vertex in face] for face in faces]
+    hair.points = np.concatenate([hair.points, points])
+    hair.indices = np.concatenate([hair.indices, indices])
+    hair.weights = np.concatenate([hair.weights, weights])
+
+
+def _tied(count, head):
+    """Joints and weights (n, 2) of vertices that the head carries."""
+    return np.full((count, 2), head), np.tile([1.0, 0.0], (count, 1))
 
 
 def _add_joints(skeleton: UsdSkel.Skeleton, body: JointSource, hair: Hair) -> None:

@@ -1,22 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shapes that the example of rigged mesh hair is made of: locks along the head, and a cap on the scalp."""
+"""The shapes that the example of rigged mesh hair is made of: locks that fall from the parting, and a cap on the scalp."""
 
 from typing import NamedTuple
 
 import numpy as np
 from pxr import UsdGeom
 
-RINGS, SIDES = 15, 10
-"""Rings and sides of a lock's tube, from where it leaves the head."""
+TOP, RINGS, SIDES = 8, 15, 10
+"""Rings of a lock's tube above and below the point where it leaves the head, and vertices per ring."""
 CLEARANCE = 0.008
 """Distance from the skin to the middle of a lock, beyond half its thickness [m]."""
+ROUND = 0.11
+"""Radius of a lock's bend across its width on the head [m]; the bend fades out over the same length below."""
 THICKNESS, HAIRLINE = 0.009, 0.002
 """Distance of the cap from the skin, and at its edge [m]."""
 
 
 class Lock(NamedTuple):
-    """Where a lock leaves the head (degrees from the face, height above the head joint [m]) and its size [m]."""
+    """Where a lock begins, where it leaves the head, and its size.
 
+    Attributes:
+        parting: where on the head it begins: left and in front of the head joint [m].
+        degrees: its direction from there, from the face to the left.
+        height: above the head joint; below it, the lock hangs freely [m].
+        length: of the free part [m].
+        half_width, half_thickness: [m].
+    """
+
+    parting: tuple[float, float]
     degrees: float
     height: float
     length: float
@@ -25,15 +36,14 @@ class Lock(NamedTuple):
 
 
 def curve_of(collider, lock: Lock):
-    """Centre line of a lock from scalp to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
+    """Centre line of a lock from parting to tip (n, 3), head at the origin, and its outward directions (n, 3)."""
     angle = np.radians(lock.degrees)
     out = np.array([np.sin(angle), 0.0, np.cos(angle)])
     clearance = lock.half_thickness + CLEARANCE
     # Down the skull on a slope, then free fall that keeps clear of neck and shoulders.
     points, flats = [], []
-    place = np.array([0.0, 0.115, 0.015]) + 0.05 * out
     step, travelled, falling = 0.004, 0.0, False
-    heading = out.copy()
+    place, heading = _onto_head(collider, lock.parting, clearance), out.copy()
     while travelled < lock.length:
         distance, normal = collider.distance(place[None], limit=0.1)
         place = place + normal[0] * max(0.0, clearance - distance[0]) if distance[0] < clearance else place
@@ -66,8 +76,8 @@ def at(curve, arc):
 
 
 def tube(curve, flats, lock: Lock):
-    """A flat tapered tube: points (n, 3), faces, and arc length per point, divided by the chain's (n,)."""
-    arcs = np.concatenate([np.linspace(curve[1][0], 0, 4, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
+    """A flat tapered tube, bent round the head: points (n, 3), faces, and arc length per point, divided by the chain's (n,)."""
+    arcs = np.concatenate([np.linspace(curve[1][0], 0, TOP, endpoint=False), np.linspace(0, curve[1][-1], RINGS)])
     middle = at(curve, arcs)
     tangent = np.gradient(middle, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -76,13 +86,12 @@ def tube(curve, flats, lock: Lock):
     thick /= np.linalg.norm(thick, axis=1, keepdims=True)
     wide = np.cross(tangent, thick)
     share = (arcs - arcs[0]) / (arcs[-1] - arcs[0])
-    size = np.minimum(1, 0.45 + 2.2 * share) * np.sqrt(np.clip(1 - share**3, 0, 1)) + 0.02
+    size = np.sqrt(np.minimum(1, 0.2 + 2.5 * share)) * np.clip(1 - share**3.5, 0, 1) ** 0.7 + 0.02
     angle = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
-    rings = (
-        middle[:, None]
-        + (size * lock.half_width)[:, None, None] * np.cos(angle)[:, None] * wide[:, None]
-        + (size * lock.half_thickness)[:, None, None] * np.sin(angle)[:, None] * thick[:, None]
-    )
+    across = size[:, None] * lock.half_width * np.cos(angle)
+    inwards = np.interp(arcs, [0, ROUND], [1, 0])[:, None] * across**2 / (2 * ROUND)
+    outwards = size[:, None] * lock.half_thickness * np.sin(angle) - inwards
+    rings = middle[:, None] + across[..., None] * wide[:, None] + outwards[..., None] * thick[:, None]
     faces = []
     for ring in range(len(arcs) - 1):
         for i in range(SIDES):
@@ -116,6 +125,14 @@ def cap(mesh: UsdGeom.Mesh, collider, head_at):
     for _ in range(2):
         rings = np.where(on_edge, 0.0, (rings + beside @ rings) / 2)
     return points + (HAIRLINE + (THICKNESS - HAIRLINE) * rings)[:, None] * normal, faces.tolist()
+
+
+def _onto_head(collider, parting, clearance):
+    """The place (3,) on top of the head at a parting, `clearance` off the skin."""
+    place = np.array([parting[0], 0.19, parting[1]])  # 19 cm up is above every head
+    for _ in range(30):
+        place[1] -= 0.5 * (collider.distance(place[None], limit=0.1)[0][0] - clearance)
+    return place
 
 
 def _means(edges, count):

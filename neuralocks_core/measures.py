@@ -84,7 +84,7 @@ def another_body(character: Character, shape: np.ndarray, learned) -> str:
         learned: lowest and highest measures, as in a model's card, which comes from a file and may contain anything.
     """
     bounds = _bounds(learned)
-    if bounds is None or character.head_skin is None:  # of that, an average is told
+    if bounds is None or character.head_skin is None:  # the network reads an average
         return ""
     lowest, highest = bounds
     measures = body_measures(character, shape)
